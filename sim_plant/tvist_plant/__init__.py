@@ -1,0 +1,1 @@
+"""A flexible robot arm: drive commands in, measurements out."""

@@ -1,0 +1,227 @@
+"""A robot as its file describes it: numbers with units, checked, nothing computed."""
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta, Struct
+
+Number = Annotated[float, Meta(ge=-1e7, le=1e7)]
+Positive = Annotated[float, Meta(gt=0.0, le=1e7)]
+NotNegative = Annotated[float, Meta(ge=0.0, le=1e7)]
+Vector3 = tuple[Number, Number, Number]
+Tensor = tuple[NotNegative, Number, Number, NotNegative, Number, NotNegative]
+"""Symmetric 3x3: xx xy xz yy yz zz."""
+
+MAX_JOINTS = 7
+
+
+class DescriptionError(ValueError):
+    """A robot file is wrong: the message names the file, the key, the value and what is allowed."""
+
+
+class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One table of the file; unknown keys are refused."""
+
+
+class Robot(_Table):
+    """Names."""
+
+    name: str
+    model: str
+    joints: tuple[str, ...]
+    """From the base to the flange; their number is the number of joints everywhere."""
+
+
+class Kinematics(_Table):
+    """Standard Denavit-Hartenberg parameters, one entry a joint."""
+
+    a: tuple[Number, ...]
+    """Link lengths [m]."""
+    d: tuple[Number, ...]
+    """Link offsets [m]."""
+    alpha: tuple[Number, ...]
+    """Link twists [rad]."""
+
+
+class Links(_Table):
+    """Rigid-body masses, in the Denavit-Hartenberg frame of each link."""
+
+    mass: tuple[Positive, ...]
+    """[kg]."""
+    com: tuple[Vector3, ...]
+    """Centres of mass [m]."""
+    inertia: tuple[Tensor, ...]
+    """About the centres of mass [kg m^2]."""
+
+
+class Limits(_Table):
+    """What the controller allows, one entry a joint where it is a tuple."""
+
+    position: tuple[Positive, ...]
+    """Either way from zero [rad]."""
+    velocity: tuple[Positive, ...]
+    """[rad/s]."""
+    acceleration: tuple[Positive, ...]
+    """[rad/s^2]."""
+    jerk: tuple[Positive, ...]
+    """[rad/s^3]."""
+    torque: tuple[Positive, ...]
+    """[N m]."""
+    payload: NotNegative
+    """Rated [kg]."""
+    repeatability: Positive
+    """[m]."""
+
+
+class Payload(_Table):
+    """A rigid body on the flange."""
+
+    mass: NotNegative = 0.0
+    """[kg]."""
+    com: Vector3 = (0.0, 0.0, 0.0)
+    """Centre of mass in the flange frame [m]."""
+    inertia: Tensor = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    """About the centre of mass, flange axes [kg m^2]."""
+
+
+class Drives(_Table):
+    """Motors, strain wave gears and the drives' cascaded loops, one entry a joint where it is a tuple."""
+
+    gear_stiffness: tuple[Positive, ...]
+    """K_g [N m/rad]."""
+    gear_damping: tuple[NotNegative, ...]
+    """D_g [N m s/rad]."""
+    rotor_inertia: tuple[Positive, ...]
+    """B, reflected to the joint side [kg m^2]."""
+    velocity_gain: tuple[NotNegative, ...]
+    """K_d [N m s/rad]."""
+    position_gain: tuple[NotNegative, ...]
+    """K_p [1/s]."""
+    integral_gain: tuple[NotNegative, ...]
+    """K_i [1/s]."""
+    coulomb_friction: tuple[NotNegative, ...]
+    """F_c [N m]."""
+    friction_width: Positive
+    """w of F_c tanh(velocity/w) [rad/s]."""
+    friction_feedforward: NotNegative
+    """Share of F_c that is fed forward [-]."""
+    friction_feedforward_width: Positive
+    """Width of the fed-forward friction [rad/s]."""
+    windup_feedforward: tuple[NotNegative, ...]
+    """c_w, share of the gears' wind-up that is fed forward [-]."""
+    gear_error_amplitude: NotNegative
+    """Kinematic error of the gear [rad]."""
+    gear_error_waves: Positive
+    """Waves of that error in a turn of the joint [-]."""
+    linear_friction: bool = False
+    """Take F_c/w times velocity, and feed all of it forward: the plant that the linear modes describe."""
+
+
+class LinkFlexibility(_Table):
+    """Links that bend: two virtual elastic joints, about y and z, in the middle of each."""
+
+    links: tuple[Annotated[int, Meta(ge=0, lt=MAX_JOINTS)], ...] = ()
+    """Numbers of the links, 0 the first."""
+    stiffness: tuple[Positive, ...] = ()
+    """One a link, for both axes [N m/rad]."""
+    damping_time: NotNegative = 0.0
+    """Damping over stiffness [s]."""
+
+
+class Sensors(_Table):
+    """What the arm feels."""
+
+    accelerometer_noise: NotNegative = 0.0
+    """rms per axis [m/s^2]."""
+
+
+class RobotDescription(_Table):
+    """Everything a robot file holds."""
+
+    robot: Robot
+    kinematics: Kinematics
+    links: Links
+    limits: Limits
+    payload: Payload
+    drives: Drives
+    link_flexibility: LinkFlexibility = LinkFlexibility()
+    sensors: Sensors = Sensors()
+    poses: dict[str, tuple[Number, ...]] = {}
+    """Named joint positions [rad]."""
+
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return len(self.robot.joints)
+
+    def clean(self) -> "RobotDescription":
+        """The same arm without noise, gear error and Coulomb friction (its linear equivalent stays)."""
+        replace = msgspec.structs.replace
+        return replace(
+            self,
+            drives=replace(self.drives, gear_error_amplitude=0.0, linear_friction=True),
+            sensors=replace(self.sensors, accelerometer_noise=0.0),
+        )
+
+
+def robots() -> tuple[str, ...]:
+    """Names of the robots that come with the package."""
+    folder = resources.files("tvist_plant") / "robots"
+    return tuple(sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")))
+
+
+def load(robot: str | Path) -> RobotDescription:
+    """Read and check a robot file.
+
+    Args:
+        robot: Name of a robot that comes with the package, or path of a TOML file.
+
+    Raises:
+        DescriptionError: There is no such robot, or the file is wrong; the message names the key.
+    """
+    shipped = resources.files("tvist_plant") / "robots" / f"{robot}.toml"
+    try:
+        if isinstance(robot, str) and robot in robots():
+            text = shipped.read_text(encoding="utf-8")
+        else:
+            text = Path(robot).read_text(encoding="utf-8")
+        description = msgspec.convert(tomllib.loads(text), RobotDescription)
+    except OSError as error:
+        known = ", ".join(robots())
+        raise DescriptionError(f"robot {str(robot)!r}: neither one of {known} nor a readable file ({error})") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, msgspec.ValidationError) as error:
+        raise DescriptionError(f"robot file {robot}: {error}") from error
+    _check(description, robot)
+    return description
+
+
+def _check(description: RobotDescription, source: str | Path) -> None:
+    """Check what a type cannot say: lengths that must agree, links that exist, inertias of real bodies."""
+    joints = description.joints
+    if not 1 <= joints <= MAX_JOINTS:
+        raise DescriptionError(f"robot file {source}: robot.joints has {joints} names; 1 to {MAX_JOINTS} are supported")
+    for table in ("kinematics", "links", "limits", "drives"):
+        values = getattr(description, table)
+        for key in values.__struct_fields__:
+            value = getattr(values, key)
+            if isinstance(value, tuple) and len(value) != joints:
+                raise DescriptionError(
+                    f"robot file {source}: {table}.{key} has {len(value)} entries; robot.joints has {joints}"
+                )
+    flexible = description.link_flexibility
+    if len(flexible.links) != len(flexible.stiffness):
+        raise DescriptionError(
+            f"robot file {source}: link_flexibility.stiffness has {len(flexible.stiffness)} entries; "
+            f"link_flexibility.links has {len(flexible.links)}"
+        )
+    if any(link >= joints or description.kinematics.a[link] == 0.0 for link in flexible.links):
+        raise DescriptionError(
+            f"robot file {source}: link_flexibility.links is {list(flexible.links)}; "
+            f"each must be below {joints} and have a length kinematics.a other than 0"
+        )
+    for name, pose in description.poses.items():
+        if len(pose) != joints:
+            raise DescriptionError(f"robot file {source}: poses.{name} has {len(pose)} entries; robot.joints has {joints}")

@@ -1,0 +1,104 @@
+"""The drives: what they are told each tick, and the linear part of arm and drives together.
+
+Equations (joint side, one joint j; y = (q, θ) are link-side and motor-side angles):
+
+    link    M(q) q̈ + b(q, q̇) = -K_g (q_j - θ - e(θ)) - D_g (q̇_j - θ̇)      and  -k_l q_f - d_l q̇_f  where a link bends
+    motor   B θ̈ = τ_m + K_g (q_j - θ - e(θ)) + D_g (q̇_j - θ̇) - F_c tanh(θ̇/w)
+    drive   τ_m = τ_ff + K_d [q̇_r - θ̇ + K_p (q_r - θ) + K_i (q_r - θ) + K_p K_i s],     ṡ = q_r - θ
+    gear    e(θ) = ε sin(n_w θ + φ)
+
+The drive's loop is a cascade, P on position over PI on velocity, on the motor side. Motor impedance in series with the
+gear spring is why damping falls where frequency rises, as the paper's Table 1 shows.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tvist_plant.description import Drives
+from tvist_plant.model import FlexibleModel, Floats
+
+
+@dataclass(frozen=True)
+class DriveCommand:
+    """Set-points of all drives for the end of a tick; the drives interpolate linearly from the last ones."""
+
+    q: Floats
+    """Position q_r, shape (n,) [rad]."""
+    qd: Floats
+    """Velocity q̇_r, shape (n,) [rad/s]."""
+    torque: Floats
+    """Feed-forward torque τ_ff, shape (n,) [N m]."""
+
+
+@dataclass(frozen=True)
+class LinearPart:
+    """Stiffness, damping and gains of arm and drives, constant over the workspace. Order: N link angles, n motors."""
+
+    stiffness: Floats
+    """Springs and position gains, shape (N+n, N+n) [N m/rad]."""
+    damping: Floats
+    """Dampers, velocity gains and the slope of friction at rest, shape (N+n, N+n) [N m s/rad]."""
+    rotor_inertia: Floats
+    """B, shape (n,) [kg m^2]."""
+    velocity_gain: Floats
+    """K_d, shape (n,) [N m s/rad]."""
+    position_gain: Floats
+    """K_d (K_p + K_i), shape (n,) [N m/rad]."""
+    integral_gain: Floats
+    """K_d K_p K_i, shape (n,) [N m/(rad s)]."""
+
+    @classmethod
+    def of(cls, flexible: FlexibleModel, drives: Drives) -> "LinearPart":
+        """Put the matrices together."""
+        links, joints = flexible.model.nv, len(flexible.joints)
+        gear, gear_damping = np.array(drives.gear_stiffness), np.array(drives.gear_damping)
+        K_d, K_p, K_i = (np.array(g) for g in (drives.velocity_gain, drives.position_gain, drives.integral_gain))
+        friction = np.array(drives.coulomb_friction) / drives.friction_width
+        stiffness, damping = np.zeros((2, links + joints, links + joints))
+        link, motor = flexible.joints, links + np.arange(joints)
+        for matrix, spring in ((stiffness, gear), (damping, gear_damping)):
+            matrix[link, link] += spring
+            matrix[motor, motor] += spring
+            matrix[link, motor] -= spring
+            matrix[motor, link] -= spring
+        stiffness[flexible.flexes, flexible.flexes] += flexible.flex_stiffness
+        damping[flexible.flexes, flexible.flexes] += flexible.flex_damping
+        stiffness[motor, motor] += K_d * (K_p + K_i)
+        damping[motor, motor] += K_d + friction
+        return cls(
+            stiffness=stiffness,
+            damping=damping,
+            rotor_inertia=np.array(drives.rotor_inertia),
+            velocity_gain=K_d,
+            position_gain=K_d * (K_p + K_i),
+            integral_gain=K_d * K_p * K_i,
+        )
+
+
+@dataclass(frozen=True)
+class Nonlinear:
+    """Friction and gear error, one entry a joint."""
+
+    friction: Floats
+    """F_c, shape (n,); zero where friction is taken as linear [N m]."""
+    friction_width: float
+    """w [rad/s]."""
+    gear_stiffness: Floats
+    """K_g, shape (n,) [N m/rad]."""
+    gear_error: float
+    """Amplitude ε [rad]."""
+    gear_waves: float
+    """n_w [-]."""
+
+    @classmethod
+    def of(cls, drives: Drives) -> "Nonlinear":
+        """Take them from the robot's description."""
+        friction = np.zeros(len(drives.coulomb_friction)) if drives.linear_friction else np.array(drives.coulomb_friction)
+        return cls(
+            friction=friction,
+            friction_width=drives.friction_width,
+            gear_stiffness=np.array(drives.gear_stiffness),
+            gear_error=drives.gear_error_amplitude,
+            gear_waves=drives.gear_error_waves,
+        )

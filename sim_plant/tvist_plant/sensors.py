@@ -1,0 +1,36 @@
+"""What the arm feels: a MEMS accelerometer in the flange."""
+
+import numpy as np
+
+from tvist_plant.model import Floats
+
+
+class Accelerometer:
+    """Three-axis specific force in the flange frame with white noise.
+
+    At rest it reads the reaction to gravity: 9.81 m/s² pointing up.
+
+    Args:
+        noise: rms per axis [m/s^2].
+        seed: Of the noise; equal seeds give equal noise.
+    """
+
+    def __init__(self, noise: float, seed: int) -> None:
+        self._noise = noise
+        self._random = np.random.default_rng([seed, 1])
+        self._drawn = iter(np.empty((0, 3)))
+
+    def read(self, specific_force: Floats) -> Floats:
+        """Noisy reading [m/s^2], shape (3,)."""
+        if self._noise == 0.0:
+            return specific_force.copy()
+        sample = next(self._drawn, None)
+        if sample is None:  # drawn by the block: one call of the generator costs as much as a hundred samples
+            self._drawn = iter(self._noise * self._random.standard_normal((512, 3)))
+            sample = next(self._drawn)
+        return np.asarray(specific_force + sample)
+
+
+def gear_phases(joints: int, seed: int) -> Floats:
+    """Phase of each gear's kinematic error, drawn anew with every seed, shape (joints,) [rad]."""
+    return np.random.default_rng([seed, 0]).uniform(0.0, 2.0 * np.pi, joints)
