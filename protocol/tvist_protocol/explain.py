@@ -1,0 +1,187 @@
+"""What is wrong with a message that came in, said to a program and to a person.
+
+msgspec finds the fault and says it in one text; here the text becomes code, field, sentence and limit. Only a
+message at fault pays for it: it is decoded a second time, untyped, to name the value.
+"""
+
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+from difflib import get_close_matches
+from typing import Any, Final, get_args, get_type_hints
+
+import msgspec
+
+from tvist_protocol.errors import SHOWN, ProtocolError, quoted, short
+from tvist_protocol.values import PATTERN_MEANINGS
+
+FAULTS = (ValueError, TypeError, OverflowError, RecursionError, MemoryError)
+"""What msgspec raises: its own errors and text that is not UTF-8 (ValueErrors), keys that cannot be hashed,
+numbers beyond 64 bits, nesting beyond the stack, lengths beyond memory."""
+
+Types = Mapping[str, type[msgspec.Struct]]
+"""The messages that were possible, by `type`."""
+
+_ABSENT: Final = object()
+
+
+class _Fault:
+    """Where msgspec found a fault, and what is there."""
+
+    def __init__(self, path: str, data: bytes, types: Types) -> None:
+        self.where = path.removeprefix(".")
+        self.whole = self.where or "the message"
+        self.message = _untyped(data)
+        self.value = _at(self.message, path)
+        self.types = types
+
+    @property
+    def expected(self) -> type[msgspec.Struct] | None:
+        """Type of the message, as far as it says."""
+        name = self.message.get("type") if isinstance(self.message, dict) else None
+        return self.types.get(name) if isinstance(name, str) else None
+
+    def out_of_range(self, wanted: str, limit: float | None = None) -> ProtocolError:
+        given = "" if self.value is _ABSENT else f" is {quoted(self.value)}:"
+        return ProtocolError("out_of_range", self.where, f"{self.where}{given} must be {wanted}", limit)
+
+
+def explain_refusal(error: msgspec.ValidationError, data: bytes, types: Types) -> ProtocolError:
+    """Error of a message that is MessagePack, and is none of the expected messages.
+
+    Args:
+        error: What msgspec said.
+        data: The message.
+        types: The messages that were expected.
+    """
+    said, at, path = str(error), "", ""
+    if found := _AT.fullmatch(said):
+        said, at, path = found.groups()
+    fault = _Fault(path, data, types)
+    if at.endswith("in"):
+        return ProtocolError("malformed", fault.where, f"{fault.whole} has a key that is no string")
+    for pattern, rule in _RULES:
+        if found := pattern.fullmatch(said):
+            return rule(fault, *found.groups())
+    return ProtocolError("malformed", fault.where, f"{fault.whole}: {short(said)}")
+
+
+def explain_unknown_type(name: object, types: Types) -> ProtocolError:
+    """Error of a message whose `type` is none of the expected ones; the nearest of them are named."""
+    near = list(types) if len(types) <= 3 else get_close_matches(str(name)[:SHOWN], types, n=3)
+    return ProtocolError("unknown_type", "type", f"type {quoted(name)} is not known here{_suggest(near)}")
+
+
+def explain_bytes(error: Exception) -> ProtocolError:
+    """Error of bytes that are no MessagePack."""
+    match error:
+        case RecursionError():
+            why = "the message is nested too deeply"
+        case UnicodeDecodeError():
+            why = "the message holds text that is not UTF-8"
+        case MemoryError():
+            why = "the message declares a length beyond memory"
+        case _:
+            said = str(error).removeprefix("MessagePack data is malformed: ")
+            why = f"the message is no MessagePack: {short(said)}"
+    return ProtocolError("malformed", "", why)
+
+
+def _unknown_field(fault: _Fault, name: str) -> ProtocolError:
+    known = fault.expected.__struct_fields__ if fault.expected and not fault.where else ()
+    why = f"{fault.whole} has no field {quoted(name)}{_suggest(get_close_matches(name[:SHOWN], known, n=1))}"
+    return ProtocolError("unknown_field", f"{fault.where}.{short(name)}".removeprefix("."), why)
+
+
+def _missing_field(fault: _Fault, name: str) -> ProtocolError:
+    where = f"{fault.where}.{name}".removeprefix(".")
+    return ProtocolError("missing_field", where, f"{where} is missing")
+
+
+def _length(fault: _Fault, kind: str, relation: str, limit: str) -> ProtocolError:
+    things = "characters" if kind == "str" else "entries"
+    has = f" has {len(fault.value)} {things}:" if isinstance(fault.value, str | list) else ""
+    why = f"{fault.where}{has} must have {_RELATIONS[relation]} {limit} {things}"
+    return ProtocolError("out_of_range", fault.where, why, int(limit))
+
+
+def _bound(fault: _Fault, relation: str, limit: str) -> ProtocolError:
+    if isinstance(fault.value, float) and math.isnan(fault.value):
+        return ProtocolError("out_of_range", fault.where, f"{fault.where} is NaN, not a number")
+    return fault.out_of_range(f"{_RELATIONS[relation]} {float(limit):.15g}", float(limit))
+
+
+def _pattern(fault: _Fault, said: str) -> ProtocolError:
+    return fault.out_of_range(next((text for p, text in PATTERN_MEANINGS.items() if repr(p) == said), said))
+
+
+def _choice(fault: _Fault) -> ProtocolError:
+    hint = get_type_hints(fault.expected).get(fault.where) if fault.expected else None
+    return fault.out_of_range(f"one of {', '.join(_literals(hint)) or 'those in the protocol'}")
+
+
+def _tag(fault: _Fault) -> ProtocolError:
+    return explain_unknown_type(fault.value, fault.types)
+
+
+def _kind(fault: _Fault, wanted: str, got: str) -> ProtocolError:
+    why = f"{fault.whole} must be {_kinds(wanted)}, not {_kinds(got)}"
+    return ProtocolError("malformed", fault.where, why)
+
+
+_AT = re.compile(r"(.*?)( - at `key` in| - at) `\$([^`]*)`", re.DOTALL)
+_RULES: tuple[tuple[re.Pattern[str], Callable[..., ProtocolError]], ...] = (
+    (re.compile(r"Object contains unknown field `(.*)`", re.DOTALL), _unknown_field),
+    (re.compile(r"Object missing required field `(.*)`", re.DOTALL), _missing_field),
+    (re.compile(r"Expected `(\w+)` of length (>= |<= |)(\d+)(?:, got \d+)?"), _length),
+    (re.compile(r"Expected `\w+` (>= |<= |> |< )(\S+)"), _bound),
+    (re.compile(r"Expected `str` matching regex (.*)", re.DOTALL), _pattern),
+    (re.compile(r"Invalid enum value .*", re.DOTALL), _choice),
+    (re.compile(r"Invalid value .*", re.DOTALL), _tag),
+    (re.compile(r"Expected `([^`]*)`, got `([^`]*)`"), _kind),
+)
+_RELATIONS = {">= ": "at least", "<= ": "at most", "> ": "more than", "< ": "less than", "": "exactly"}
+_KINDS = {
+    "float": "a number",
+    "int": "an integer",
+    "str": "a string",
+    "array": "a list",
+    "object": "a map",
+    "bool": "a boolean",
+    "None": "null",
+    "bytes": "a byte string",
+    "ext": "an extension value",
+}
+
+
+def _kinds(said: str) -> str:
+    return " or ".join(_KINDS.get(kind, kind) for kind in said.split(" | "))
+
+
+def _literals(hint: object) -> Iterable[str]:
+    for part in get_args(hint):
+        yield from [repr(part)] if isinstance(part, str) else _literals(part)
+
+
+def _suggest(near: Iterable[str]) -> str:
+    names = " or ".join(map(repr, near))
+    return f": did you mean {names}?" if names else ""
+
+
+def _untyped(data: bytes) -> Any:
+    try:
+        return msgspec.msgpack.decode(data)
+    except FAULTS:
+        return _ABSENT
+
+
+def _at(message: Any, path: str) -> Any:
+    value, end = message, 0
+    for step in re.finditer(r"\.([^.\[]+)|\[(\d+)\]", path):
+        name, index = step.groups()
+        try:
+            value = value[int(index) if name is None else name]
+        except (TypeError, LookupError):
+            return _ABSENT
+        end = step.end()
+    return value if end == len(path) else _ABSENT

@@ -1,0 +1,84 @@
+"""`python -m tvist_protocol.generate`: everything in `protocol/` that is made from the message types.
+
+The tables of README.md, `schemas/`, `asyncapi.json`, and the MessagePack beside each golden message. Runs in
+a checkout, and needs the `msgpack` package: golden bytes must not come from the codec they are to test.
+"""
+
+import json
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from tvist_protocol.asyncapi import asyncapi
+from tvist_protocol.channels import MESSAGES, tag
+from tvist_protocol.schema import json_schema
+from tvist_protocol.tables import tables
+
+FOLDER = Path(__file__).parents[1]
+"""`protocol/` in a checkout."""
+
+
+def generated(folder: Path) -> dict[Path, bytes]:
+    """What every generated file should hold.
+
+    Args:
+        folder: `protocol/`, whose README.md and golden JSON are read.
+
+    Raises:
+        ValueError: README.md and the tables do not have the same names.
+    """
+    files = {folder / "asyncapi.json": _json(asyncapi())}
+    files |= {folder / "schemas" / f"{tag(kind)}.json": _json(json_schema(kind)) for kind in MESSAGES}
+    files |= {source.with_suffix(".msgpack"): _msgpack(source) for source in golden(folder)}
+    readme = folder / "README.md"
+    files[readme] = filled(readme.read_text(encoding="utf-8"), tables()).encode()
+    return files
+
+
+def stray(folder: Path, files: Iterable[Path]) -> set[Path]:
+    """Files that look generated and are not: left over from a message that is gone."""
+    there = {*(folder / "schemas").iterdir(), *(folder / "fixtures" / "v1").glob("*.msgpack")}
+    return there - set(files)
+
+
+def golden(folder: Path) -> list[Path]:
+    """The golden messages, written by hand."""
+    return sorted((folder / "fixtures" / "v1").glob("*.json"))
+
+
+def filled(text: str, parts: dict[str, str]) -> str:
+    """Text with each part between its markers `<!-- generated: name -->` and `<!-- end -->`.
+
+    Raises:
+        ValueError: A part has no markers, or markers have no part.
+    """
+    marked = re.compile(r"(<!-- generated: (?P<name>\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+    names = [found["name"] for found in marked.finditer(text)]
+    if sorted(names) != sorted(parts):
+        raise ValueError(f"markers are {sorted(names)}, tables are {sorted(parts)}")
+    return marked.sub(lambda found: f"{found[1]}\n{parts[found['name']]}\n\n{found[3]}", text)
+
+
+def main() -> None:
+    """Write every generated file, and take away what is left over."""
+    files = generated(FOLDER)
+    for path in stray(FOLDER, files):
+        path.unlink()
+    for path, content in files.items():
+        path.write_bytes(content)
+
+
+def _json(document: dict[str, Any]) -> bytes:
+    return (json.dumps(document, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+def _msgpack(source: Path) -> bytes:
+    import msgpack
+
+    packed: bytes = msgpack.packb(json.loads(source.read_bytes()))
+    return packed
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,80 @@
+"""What a robot says of itself when asked. Whoever reads ignores fields it does not know."""
+
+from typing import Literal
+
+from msgspec import Struct
+
+from tvist_protocol.values import Payload
+
+Clock = Literal["realtime", "lockstep", "free"]
+
+
+class Limits(Struct, frozen=True, kw_only=True, gc=False):
+    """What the arm can do, one entry a joint."""
+
+    position: list[tuple[float, float]]
+    """Smallest and largest angle [rad]."""
+    velocity: list[float]
+    """Largest velocity [rad/s]."""
+    acceleration: list[float]
+    """Largest acceleration [rad/s²]."""
+    jerk: list[float]
+    """Largest jerk [rad/s³]."""
+    torque: list[float]
+    """Largest torque [N m]."""
+    payload: float
+    """Rated payload [kg]."""
+
+
+class CalibrationInfo(Struct, frozen=True, kw_only=True, gc=False):
+    """The calibration in use."""
+
+    name: str
+    """Its name."""
+    payload_mass: float
+    """Mass the arm carried when it was made [kg]."""
+    fits_payload: bool
+    """Whether that is the payload now declared."""
+    seed: int | None
+    """Seed of the simulation it was made in; null: a real arm's, or unknown."""
+    f_d_range: tuple[float, float]
+    """Smallest and largest damped frequency it gives [Hz]."""
+
+
+class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=False):
+    """The robot, its limits and how it is set up now."""
+
+    name: str
+    """Name of the robot, as in its keys."""
+    protocol: int
+    """Version of the protocol the server speaks."""
+    version: str
+    """Version of the server's package."""
+    model: str
+    """Model of the arm."""
+    joints: list[str]
+    """Names of its joints, from the base on."""
+    rate_hz: float
+    """Control periods a second of simulated time [Hz]."""
+    clock: Clock
+    """Who lets time pass: the wall clock, a client's steps, or a program it runs in."""
+    limits: Limits
+    """What the arm can do."""
+    payload: Payload
+    """Payload declared: what the controller believes."""
+    calibration: CalibrationInfo | None
+    """Calibration in use; null where the estimator needs none."""
+    shaper: str
+    """Shaper in use."""
+    modes: int
+    """How many modes it cancels."""
+    estimator: str
+    """Estimator in use."""
+    calibrations: list[str]
+    """Calibrations to choose from."""
+    shapers: list[str]
+    """Shapers to choose from."""
+    control: str | None
+    """Client that has control; null: nobody."""
+    tick: int
+    """Tick at which this was said."""

@@ -1,0 +1,103 @@
+"""Keys of a robot on the network, as strings.
+
+Each chunk is checked where a key is built, so no key built here holds a wildcard. Keys that arrive may:
+a server compares them with its own.
+"""
+
+import re
+
+from tvist_protocol.errors import ProtocolError
+from tvist_protocol.values import CLIENT_NAME_PATTERN, PATTERN_MEANINGS, ROBOT_NAME_PATTERN
+
+PREFIX = "tvist"
+ANY_ALIVE = f"{PREFIX}/*/alive"
+"""Selects the liveliness tokens of all robots: how a client finds them."""
+
+_ROBOT = re.compile(ROBOT_NAME_PATTERN)
+_CLIENT = re.compile(CLIENT_NAME_PATTERN)
+
+
+def check_robot_name(name: str) -> str:
+    """Give back a robot's name if it may stand in a key.
+
+    Raises:
+        ProtocolError: It is not `[a-z0-9][a-z0-9_-]{0,63}`; code `out_of_range`, where `robot`.
+    """
+    return _checked("robot", name, _ROBOT)
+
+
+def check_client_name(name: str) -> str:
+    """Give back a client's name if it may stand in a key.
+
+    Raises:
+        ProtocolError: It is not 1 to 64 printable ASCII characters without `/ * ? # $`, the first not `@`;
+            code `out_of_range`, where `client`.
+    """
+    return _checked("client", name, _CLIENT)
+
+
+def state(robot: str) -> str:
+    """Key the 500 Hz stream is put on."""
+    return _key(robot, "state")
+
+
+def truth(robot: str) -> str:
+    """Key what no robot can know is put on."""
+    return _key(robot, "truth")
+
+
+def event(robot: str) -> str:
+    """Key events are put on."""
+    return _key(robot, "event")
+
+
+def telemetry(robot: str) -> str:
+    """Key the server's own figures are put on, once a second."""
+    return _key(robot, "telemetry")
+
+
+def command(robot: str) -> str:
+    """Key of the queryable that takes commands."""
+    return _key(robot, "command")
+
+
+def setpoint(robot: str) -> str:
+    """Key a client puts its set-points on."""
+    return _key(robot, "setpoint")
+
+
+def info(robot: str) -> str:
+    """Key of the queryable that says what the robot is."""
+    return _key(robot, "info")
+
+
+def alive(robot: str) -> str:
+    """Liveliness token of the server."""
+    return _key(robot, "alive")
+
+
+def client(robot: str, name: str) -> str:
+    """Liveliness token of a client."""
+    return f"{_key(robot, 'client')}/{check_client_name(name)}"
+
+
+def any_client(robot: str) -> str:
+    """Selects the liveliness tokens of all clients of a robot."""
+    return f"{_key(robot, 'client')}/*"
+
+
+def client_name(robot: str, key: str) -> str | None:
+    """Name in a client's liveliness token, None where the key is not one of this robot's."""
+    name = key.removeprefix(f"{_key(robot, 'client')}/")
+    return name if name != key and _CLIENT.match(name) else None
+
+
+def _key(robot: str, leaf: str) -> str:
+    return f"{PREFIX}/{check_robot_name(robot)}/{leaf}"
+
+
+def _checked(what: str, name: str, pattern: re.Pattern[str]) -> str:
+    if not isinstance(name, str) or not pattern.match(name):
+        why = f"{what} is {name!r:.80}: must be {PATTERN_MEANINGS[pattern.pattern]}"
+        raise ProtocolError("out_of_range", what, why)
+    return name

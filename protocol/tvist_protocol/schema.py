@@ -1,0 +1,74 @@
+"""Message types as JSON Schema, with the docstring under each field as its description."""
+
+import ast
+import inspect
+from functools import cache
+from typing import Any
+
+import msgspec
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def json_schema(message: type[msgspec.Struct]) -> dict[str, Any]:
+    """JSON Schema of one message, complete in itself: for a recording, or a client in another language."""
+    (root,), parts = components((message,), "#/$defs/{name}")
+    name = root["$ref"].removeprefix("#/$defs/")
+    schema: dict[str, Any] = {"$schema": DIALECT} | parts.pop(name)
+    return schema | {"$defs": parts} if parts else schema
+
+
+def components(
+    messages: tuple[type[msgspec.Struct], ...], reference: str
+) -> tuple[tuple[dict[str, Any], ...], dict[str, Any]]:
+    """JSON Schemas of several messages, and of what they share.
+
+    Args:
+        messages: The message types.
+        reference: How one schema refers to another, with `{name}` in it.
+
+    Returns:
+        A reference to each message, and all schemas by the name of their type.
+    """
+    roots, parts = msgspec.json.schema_components(messages, ref_template=reference)
+    described = {kind.__name__: field_docs(kind) for kind in _structs(messages)}
+    for name, schema in parts.items():
+        for field, text in described[name].items():
+            schema["properties"][field]["description"] = text
+    return roots, dict(sorted(parts.items()))
+
+
+@cache
+def field_docs(struct: type[msgspec.Struct]) -> dict[str, str]:
+    """The docstring under each field of a struct, in the order of the fields."""
+    (body,) = ast.parse(inspect.getsource(struct)).body
+    assert isinstance(body, ast.ClassDef)
+    docs: dict[str, str] = {}
+    for field, below in zip(body.body, body.body[1:], strict=False):
+        match field, below:
+            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
+                docs[name] = " ".join(inspect.cleandoc(text).split())
+    return docs
+
+
+def _structs(messages: tuple[type[msgspec.Struct], ...]) -> set[type[msgspec.Struct]]:
+    found: set[type[msgspec.Struct]] = set()
+
+    def visit(part: object) -> None:
+        match part:
+            case msgspec.inspect.StructType(cls=struct):
+                if struct not in found:
+                    found.add(struct)
+                    visit(part.fields)
+            case msgspec.inspect.Field(type=inner):
+                visit(inner)
+            case msgspec.inspect.UnionType(types=inner) | msgspec.inspect.TupleType(item_types=inner):
+                visit(inner)
+            case msgspec.inspect.VarTupleType(item_type=inner) | msgspec.inspect.ListType(item_type=inner):
+                visit(inner)
+            case tuple():
+                for entry in part:
+                    visit(entry)
+
+    visit(msgspec.inspect.multi_type_info(messages))
+    return found

@@ -1,0 +1,126 @@
+"""The tables of the protocol's README, made from the message types."""
+
+from collections.abc import Iterable, Mapping
+from enum import IntEnum
+from typing import Any
+
+import msgspec
+
+from tvist_protocol.channels import CHANNELS, COMMANDS, REPLIES, Channel, tag
+from tvist_protocol.commands import Setpoint, StepSetpoint
+from tvist_protocol.info import CalibrationInfo, Info, Limits
+from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_protocol.replies import CODE_MEANINGS
+from tvist_protocol.schema import components
+from tvist_protocol.stream import EVENT_MEANINGS, Event, State, Telemetry, Truth
+from tvist_protocol.values import PATTERN_MEANINGS, Payload
+
+Schema = Mapping[str, Any]
+Struct = type[msgspec.Struct]
+
+_LISTS = {
+    frozenset(CODE_MEANINGS): "a [code](#codes)",
+    frozenset(EVENT_MEANINGS): "a [kind](#kinds-of-event)",
+}
+"""Choices that have a table of their own."""
+
+
+def tables() -> dict[str, str]:
+    """Markdown of every generated part of the README, by the name its markers carry."""
+    return {
+        "keys": _table(("key", "kind", "by", "carries", "what"), map(_channel_row, CHANNELS)),
+        "commands": _messages(COMMANDS),
+        "setpoint": _messages((Setpoint,)),
+        "parts": _messages((Payload, StepSetpoint)),
+        "replies": _messages(REPLIES),
+        "codes": _table(("code", "meaning"), ((f"`{code}`", text) for code, text in CODE_MEANINGS.items())),
+        "streams": _messages((State, Event, Truth, Telemetry)),
+        "events": _table(("kind", "meaning"), ((f"`{kind}`", text) for kind, text in EVENT_MEANINGS.items())),
+        "info": _messages((Info, Limits, CalibrationInfo)),
+        "modes": _table(("field", "numbers"), map(_mode_row, (RobotMode, SafetyMode, RuntimeState))),
+    }
+
+
+def _channel_row(channel: Channel) -> tuple[str, ...]:
+    many = len(channel.messages) > 4
+    carries = "a command" if many else ", ".join(f"`{tag(kind)}`" for kind in channel.messages)
+    answers = ", ".join(f"`{tag(kind)}`" for kind in channel.answers)
+    both = " → ".join(part for part in (carries, answers) if part) or "–"
+    key = channel.key.replace("{", "<").replace("}", ">")
+    return f"`{key}`", channel.kind, channel.by, both, channel.meaning
+
+
+def _mode_row(enum: type[IntEnum]) -> tuple[str, str]:
+    name = "".join(f"_{c.lower()}" if c.isupper() else c for c in enum.__name__).removeprefix("_")
+    return f"`{name}`", ", ".join(f"{mode.value} {mode.name}" for mode in enum)
+
+
+def _messages(kinds: tuple[Struct, ...]) -> str:
+    _, schemas = components(kinds, "{name}")
+    return "\n\n".join(_message(kind, schemas[kind.__name__]) for kind in kinds)
+
+
+def _message(kind: Struct, schema: Schema) -> str:
+    name = kind.__struct_config__.tag or kind.__name__
+    fields = {field: part for field, part in schema["properties"].items() if field != "type"}
+    text = " ".join((kind.__doc__ or "").split())
+    if list(fields) == ["token"]:
+        return f"#### `{name}`\n\n{text} Carries `token` alone."
+    rows = (
+        (f"`{field}`", _values(part), _default(field, part, schema), part["description"])
+        for field, part in fields.items()
+    )
+    return f"#### `{name}`\n\n{text}\n\n{_table(('field', 'values', 'default', 'meaning'), rows)}"
+
+
+def _default(field: str, part: Schema, schema: Schema) -> str:
+    if field in schema["required"]:
+        return "required"
+    return "null" if part["default"] is None else f"{part['default']}"
+
+
+def _values(part: Schema) -> str:
+    """What a value may be, in words."""
+    match part:
+        case {"anyOf": choices}:
+            words = " or ".join(map(_values, choices))
+        case {"$ref": name}:
+            words = f"`{name}`"
+        case {"enum": names}:
+            words = _LISTS.get(frozenset(names)) or ", ".join(f"`{name}`" for name in names)
+        case {"prefixItems": items}:
+            words = f"list of {len(items)} {_plural(items[0])}"
+        case {"type": "array", "items": item}:
+            words = f"list of {_count(part, 'minItems', 'maxItems')}{_plural(item)}"
+        case {"type": "string", "pattern": pattern}:
+            words = PATTERN_MEANINGS[pattern]
+        case {"type": "string", "maxLength": _}:
+            words = f"string of {_count(part, 'minLength', 'maxLength')}characters"
+        case _:
+            words = f"{part['type'].replace('object', 'map')}{_bounds(part)}"
+    return words
+
+
+def _plural(part: Schema) -> str:
+    kind, space, rest = _values(part).partition(" ")
+    return kind if kind.startswith("`") else f"{kind}s{space}{rest}"
+
+
+def _count(part: Schema, least: str, most: str) -> str:
+    return f"{part.get(least, 0)}–{part[most]} " if most in part else ""
+
+
+def _bounds(part: Schema) -> str:
+    signs = (("minimum", "≥"), ("exclusiveMinimum", ">"), ("maximum", "≤"), ("exclusiveMaximum", "<"))
+    bounds = [f"{sign} {_number(part[name])}" for name, sign in signs if name in part]
+    return f" {', '.join(bounds)}" if bounds else ""
+
+
+def _number(bound: float) -> str:
+    powers = {2**63 - 1: "2⁶³-1", 2**64 - 1: "2⁶⁴-1"}
+    return powers.get(int(bound)) or f"{bound:g}".replace("e+0", "e")
+
+
+def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    lines = [head, ("---",) * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

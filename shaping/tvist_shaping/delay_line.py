@@ -1,0 +1,160 @@
+"""A delay line with fractional delays: what lets an impulse stand between two ticks.
+
+A delay rounded to ticks lets the shaped reference jump when the delay moves on by one (Fig. 7 of the paper);
+an interpolated one moves through. The interpolation is Lagrange's through four samples: it has no state, so a
+delay may change every tick without a transient, and it reproduces cubics exactly (the paper's source for
+fractional delays is Laakso et al., 1996).
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from tvist_shaping._compiled import compiled
+from tvist_shaping._types import Floats
+from tvist_shaping.errors import DelayError, ShapingError
+
+_MARGIN = 3
+"""Samples a delay needs beyond itself: two older ones to interpolate, and the newest has delay 0."""
+
+
+@compiled
+def gather(buffer: Floats, newest: int, A: Floats, delays: Floats, first: Floats, out: Floats) -> int:
+    """Weighted sum of delayed samples; the formula is in `DelayLine.gather`.
+
+    Args:
+        buffer: Ring of samples, shape (capacity, joints).
+        newest: Row of the newest sample; older ones stand before it, modulo capacity.
+        A: Amplitudes [-], shape (N,).
+        delays: Delays [ticks], shape (N,).
+        first: Scratch, shape (joints,).
+        out: Result, shape (joints,).
+
+    Returns:
+        Index of the first delay the buffer does not hold; -1 if it holds all: only then is `out` written.
+    """
+    capacity, joints = buffer.shape
+    for j in range(A.shape[0]):
+        if not 0.0 <= delays[j] <= capacity - _MARGIN:
+            return j
+    for j in range(A.shape[0]):
+        delay = delays[j]
+        whole = int(delay)
+        # Four nodes at the delays start … start + 3, the delay between the second and the third of them;
+        # below one tick there is nothing newer to take, and it is between the first and the second.
+        start = max(whole - 1, 0)
+        s = delay - start
+        w0 = -(s - 1.0) * (s - 2.0) * (s - 3.0) / 6.0
+        w1 = s * (s - 2.0) * (s - 3.0) / 2.0
+        w2 = -s * (s - 1.0) * (s - 3.0) / 2.0
+        w3 = s * (s - 1.0) * (s - 2.0) / 6.0
+        near = (newest - whole) % capacity
+        n0 = (newest - start) % capacity
+        n1 = (newest - start - 1) % capacity
+        n2 = (newest - start - 2) % capacity
+        n3 = (newest - start - 3) % capacity
+        for k in range(joints):
+            x = buffer[near, k]
+            if delay != whole:
+                # The weights sum to 1: taken on differences, they leave a constant the same to the last bit.
+                x += (
+                    w0 * (buffer[n0, k] - x)
+                    + w1 * (buffer[n1, k] - x)
+                    + w2 * (buffer[n2, k] - x)
+                    + w3 * (buffer[n3, k] - x)
+                )
+            if j == 0:
+                first[k] = x
+                out[k] = x
+            else:
+                out[k] += A[j] * (x - first[k])
+    return -1
+
+
+class DelayLine:
+    """The last samples of a reference, readable at any delay between two of them.
+
+    Attributes:
+        joints: Entries of a sample.
+        capacity: Samples held.
+        max_delay: Longest delay that can be read [ticks].
+    """
+
+    joints: int
+    capacity: int
+    max_delay: int
+
+    def __init__(self, joints: int, capacity: int) -> None:
+        """A line filled with zeros.
+
+        Args:
+            joints: Entries of a sample, >= 1.
+            capacity: Samples held, >= 4; the longest delay is three ticks less.
+
+        Raises:
+            ShapingError: joints or capacity is below that.
+        """
+        if joints < 1 or capacity <= _MARGIN:
+            raise ShapingError(
+                f"a delay line needs joints >= 1 and capacity >= 4, not {joints=}, {capacity=}"
+            )
+        self.joints = joints
+        self.capacity = capacity
+        self.max_delay = capacity - _MARGIN
+        self._buffer: Floats = np.zeros((capacity, joints))
+        self._first: Floats = np.zeros(joints)
+        self._newest = 0
+
+    def __repr__(self) -> str:
+        return f"DelayLine(joints={self.joints}, capacity={self.capacity})"
+
+    def fill(self, q: npt.ArrayLike) -> None:
+        """Let the reference have been at q for ever.
+
+        Args:
+            q: Sample, shape (joints,), finite.
+
+        Raises:
+            ShapingError: q has another shape.
+        """
+        self._buffer[:] = self._sample(q)
+
+    def push(self, q: npt.ArrayLike) -> None:
+        """Append the newest sample; the oldest is forgotten.
+
+        Args:
+            q: Sample, shape (joints,), finite.
+
+        Raises:
+            ShapingError: q has another shape.
+        """
+        sample = self._sample(q)
+        self._newest = (self._newest + 1) % self.capacity
+        self._buffer[self._newest] = sample
+
+    def gather(self, A: Floats, delays: Floats, out: Floats) -> None:
+        """Convolve the reference with impulses, eq. (10) of the paper.
+
+            y = x(d_1) + Σ_{j>1} A_j (x(d_j) - x(d_1))
+
+        which is Σ A_j x(d_j) for ΣA = 1, written so that a constant reference comes out as the same floats. A
+        whole delay takes the sample itself; one between two samples the cubic through the four around it; one
+        below a tick the cubic through the newest four. (A cubic may pass the samples it joins: by at most 1/8
+        of what they span, 1/3 below one tick, and not noticeably where the reference is smooth.)
+
+        Args:
+            A: Amplitudes [-], shape (N,), sum 1.
+            delays: Delays d_j [ticks], shape (N,), each 0 to `max_delay`.
+            out: Where y goes, shape (joints,).
+
+        Raises:
+            DelayError: A delay is outside that range or not a number; `out` is left as it was.
+        """
+        refused = gather(self._buffer, self._newest, A, delays, self._first, out)
+        if refused >= 0:
+            raise DelayError(float(delays[refused]), self.max_delay)
+
+    def _sample(self, q: npt.ArrayLike) -> Floats:
+        sample = np.asarray(q, dtype=float)
+        if sample.shape != (self.joints,):
+            raise ShapingError(f"q has shape {sample.shape}, but this line holds ({self.joints},)")
+        return sample

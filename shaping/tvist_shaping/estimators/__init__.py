@@ -1,0 +1,8 @@
+"""Where the filter learns the modes from: a few ways to say f_d(q) and ζ(q)."""
+
+from tvist_shaping.estimators.base import Estimator
+from tvist_shaping.estimators.basis import terms
+from tvist_shaping.estimators.fixed import Fixed
+from tvist_shaping.estimators.polynomial import Polynomial
+
+__all__ = ["Estimator", "Fixed", "Polynomial", "terms"]

@@ -1,0 +1,38 @@
+"""What an estimator is: where the filter learns the modes of the arm from."""
+
+from abc import ABC, abstractmethod
+
+from tvist_shaping._types import Floats
+
+
+class Estimator(ABC):
+    """Damped frequency and damping ratio of each mode as functions of q, sec. 3.3 of the paper."""
+
+    @property
+    @abstractmethod
+    def modes(self) -> int:
+        """Number of modes estimated, >= 1."""
+
+    @property
+    @abstractmethod
+    def f_d_min(self) -> float:
+        """Lower bound of every mode's damped frequency over every q [Hz], > 0.
+
+        It says how long a delay can get.
+        """
+
+    @property
+    @abstractmethod
+    def zeta_max(self) -> float:
+        """Upper bound of every mode's damping ratio over every q [-], < 1."""
+
+    @abstractmethod
+    def estimate(self, q: Floats) -> tuple[Floats, Floats]:
+        """Estimate the modes at a configuration.
+
+        Args:
+            q: Joint angles [rad], shape (joints,), finite.
+
+        Returns:
+            f_d [Hz] and ζ [-], each of shape (modes,). The estimator will not change them afterwards.
+        """

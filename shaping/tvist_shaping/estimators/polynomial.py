@@ -1,0 +1,219 @@
+"""The paper's estimator: two multivariate polynomials f_d(q) and ζ(q), sec. 3.3."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from tvist_shaping._compiled import compiled
+from tvist_shaping._types import Floats
+from tvist_shaping.errors import EstimatorError
+from tvist_shaping.estimators.base import Estimator
+from tvist_shaping.estimators.basis import Basis, Kind
+from tvist_shaping.impulses import F_D_RANGE
+
+MARGIN = 0.1
+"""Part of a range at either end in which the saturation bends [-]."""
+
+
+@compiled
+def saturate(x: float, low: float, high: float) -> float:
+    """Hold x in [low, high] with three continuous derivatives.
+
+        y = low + w r((x - low)/w)        near low, w = MARGIN (high - low), and mirrored near high
+        r(t) = 2 (p⁶ - 3p⁵ + 5/2 p⁴),     p = (t + 1)/2,    -1 < t < 1
+
+    r is the integral of the quintic smooth step: r(t) = 0 below -1, t above 1. So y is x itself from low + w
+    to high - w, the bound itself from w beyond it, and its slope falls from 1 to 0 in between without a kink:
+    a kink in f_d(q) would be a jump in the velocity of the delay, and of the arm.
+    """
+    w = MARGIN * (high - low)
+    if x < low + w:
+        p = max(0.5 * ((x - low) / w + 1.0), 0.0)
+        return low + w * (((2.0 * p - 6.0) * p + 5.0) * p * p * p * p)
+    if x > high - w:
+        p = max(0.5 * ((high - x) / w + 1.0), 0.0)
+        return high - w * (((2.0 * p - 6.0) * p + 5.0) * p * p * p * p)
+    return x
+
+
+@compiled
+def evaluate(
+    q: Floats,
+    joints: npt.NDArray[np.int64],
+    trigonometric: bool,
+    centre: Floats,
+    scale: Floats,
+    multiples: npt.NDArray[np.int64],
+    coefficients: Floats,
+    ranges: Floats,
+) -> tuple[float, float, bool]:
+    """Both polynomials at one configuration.
+
+    Args:
+        q: Joint angles [rad], shape (n,).
+        joints: Indices of the joints used, shape (k,).
+        trigonometric: Which basis.
+        centre: Centre [rad], shape (k,).
+        scale: Scale [rad], shape (k,).
+        multiples: `Basis.multiples`, shape (rows, k).
+        coefficients: Of f_d and ζ, shape (2, terms).
+        ranges: Lowest and highest f_d and ζ, shape (2, 2).
+
+    Returns:
+        f_d [Hz], ζ [-], and whether one of them had to be held in its range.
+    """
+    f_d = 0.0
+    zeta = 0.0
+    term = 0
+    if trigonometric:
+        f_d = coefficients[0, 0]
+        zeta = coefficients[1, 0]
+        term = 1
+    for row in range(multiples.shape[0]):
+        if trigonometric:
+            phase = 0.0
+            for k in range(joints.shape[0]):
+                phase += multiples[row, k] * (q[joints[k]] - centre[k])
+            c = math.cos(phase)
+            s = math.sin(phase)
+            f_d += coefficients[0, term] * c + coefficients[0, term + 1] * s
+            zeta += coefficients[1, term] * c + coefficients[1, term + 1] * s
+            term += 2
+        else:
+            monomial = 1.0
+            for k in range(joints.shape[0]):
+                u = (q[joints[k]] - centre[k]) / scale[k]
+                for _ in range(multiples[row, k]):
+                    monomial *= u
+            f_d += coefficients[0, term] * monomial
+            zeta += coefficients[1, term] * monomial
+            term += 1
+    inside = ranges[0, 0] <= f_d <= ranges[0, 1] and ranges[1, 0] <= zeta <= ranges[1, 1]
+    return saturate(f_d, ranges[0, 0], ranges[0, 1]), saturate(zeta, ranges[1, 0], ranges[1, 1]), not inside
+
+
+class Polynomial(Estimator):
+    """One mode, whose f_d and ζ are polynomials in the joint angles, held in the range they were measured in.
+
+    f_d(q) = saturate(Σ_i a_i φ_i(q)), ζ(q) = saturate(Σ_i b_i φ_i(q)), the φ_i those of `basis.py`.
+
+    Attributes:
+        basis: The functions φ_i.
+        saturating: Whether the last estimate's f_d or ζ lay outside its range before it was held.
+    """
+
+    basis: Basis
+    saturating: bool
+
+    def __init__(
+        self,
+        *,
+        joints: Sequence[int],
+        basis: Kind,
+        degree: int,
+        f_d_coefficients: npt.ArrayLike,
+        zeta_coefficients: npt.ArrayLike,
+        f_d_range: tuple[float, float],
+        zeta_range: tuple[float, float],
+        centre: npt.ArrayLike | None = None,
+        scale: npt.ArrayLike | None = None,
+    ) -> None:
+        """Set the polynomials.
+
+        Args:
+            joints: Indices of the joints used, from 0.
+            basis: `trigonometric` or `angles`.
+            degree: Highest total degree.
+            f_d_coefficients: a [Hz], shape (terms,), in the order of `terms`.
+            zeta_coefficients: b [-], shape (terms,).
+            f_d_range: Lowest and highest f_d [Hz] that may come out, 1e-6 to 1e6.
+            zeta_range: Lowest and highest ζ [-] that may come out, 0 <= ζ < 1.
+            centre: Subtracted from the angles [rad], shape (len(joints),); None for zeros.
+            scale: Divides them [rad], shape (len(joints),); None for ones, which `trigonometric` needs.
+
+        Raises:
+            EstimatorError: A parameter is wrong; it names which.
+        """
+        self.basis = Basis(tuple(joints), basis, degree, centre, scale)
+        self.saturating = False
+        self._coefficients: Floats = np.stack(
+            (
+                self._row("f_d_coefficients", f_d_coefficients),
+                self._row("zeta_coefficients", zeta_coefficients),
+            )
+        )
+        f_low, f_high = self._range("f_d_range", f_d_range)
+        z_low, z_high = self._range("zeta_range", zeta_range)
+        if f_low < F_D_RANGE[0] or f_high > F_D_RANGE[1]:
+            raise EstimatorError("f_d_range", f_d_range, f"within {F_D_RANGE[0]:g} to {F_D_RANGE[1]:g} Hz")
+        if z_low < 0.0 or z_high >= 1.0:
+            raise EstimatorError("zeta_range", zeta_range, "within 0 <= ζ < 1")
+        self._ranges: Floats = np.array([[f_low, f_high], [z_low, z_high]])
+        self._joints = np.array(self.basis.joints, dtype=np.int64)
+        self._multiples = self.basis.multiples()
+        self._trigonometric = basis == "trigonometric"
+        self._joints_needed = max(self.basis.joints) + 1
+
+    def __repr__(self) -> str:
+        (f_low, f_high), (z_low, z_high) = self._ranges.tolist()
+        return (
+            f"Polynomial(joints={self.basis.joints}, basis={self.basis.kind!r}, degree={self.basis.degree}, "
+            f"{len(self.basis)} terms, f_d_range=({f_low}, {f_high}), zeta_range=({z_low}, {z_high}))"
+        )
+
+    @property
+    def modes(self) -> int:
+        """One."""
+        return 1
+
+    @property
+    def f_d_min(self) -> float:
+        """Lower end of f_d's range [Hz]."""
+        return float(self._ranges[0, 0])
+
+    @property
+    def zeta_max(self) -> float:
+        """Upper end of ζ's range [-]."""
+        return float(self._ranges[1, 1])
+
+    def estimate(self, q: Floats) -> tuple[Floats, Floats]:
+        """Evaluate both polynomials.
+
+        Args:
+            q: Joint angles [rad], shape (n,), n more than the largest index used.
+
+        Returns:
+            f_d [Hz] and ζ [-], each of shape (1,).
+
+        Raises:
+            EstimatorError: q has too few joints.
+        """
+        if q.shape[0] < self._joints_needed:
+            raise EstimatorError("q", q.shape, f"of at least {self._joints_needed} joints")
+        f_d, zeta, self.saturating = evaluate(
+            q,
+            self._joints,
+            self._trigonometric,
+            self.basis.centre,
+            self.basis.scale,
+            self._multiples,
+            self._coefficients,
+            self._ranges,
+        )
+        return np.array([f_d]), np.array([zeta])
+
+    def _row(self, name: str, coefficients: npt.ArrayLike) -> Floats:
+        row = np.array(coefficients, dtype=float)
+        if row.shape != (len(self.basis),) or not np.isfinite(row).all():
+            raise EstimatorError(
+                name, coefficients, f"{len(self.basis)} finite numbers, one a term of the basis"
+            )
+        return row
+
+    @staticmethod
+    def _range(name: str, ends: tuple[float, float]) -> tuple[float, float]:
+        if len(ends) != 2 or not all(map(math.isfinite, ends)) or not ends[0] < ends[1]:
+            raise EstimatorError(name, ends, "two finite numbers, the lower one first")
+        return float(ends[0]), float(ends[1])

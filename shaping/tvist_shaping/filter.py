@@ -1,0 +1,174 @@
+"""The TVIST filter: Figure 8 of the paper."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from tvist_shaping._types import Floats
+from tvist_shaping.catalogue import Shaper
+from tvist_shaping.delay_line import DelayLine
+from tvist_shaping.errors import FilterError
+from tvist_shaping.estimators.base import Estimator
+from tvist_shaping.impulses import Impulses, product
+
+
+class TvistFilter:
+    """Time-varying input shaping of a sampled reference, one filter for all joints.
+
+    At tick i, with h the period,
+
+        x*_i = Σ_j A_j(ζ) x(t_i - τ_j(f_d)),    (f_d, ζ) = estimator(x*_{i-1})
+
+    (eq. (10)): the impulses of *this* tick gather samples of the past. Their sum is 1 at every tick, so a
+    reference at rest passes unchanged whatever the parameters do, and the last value is the reference's own.
+    All joints get the same impulses: a straight line in joint space stays one.
+
+    Attributes:
+        shaper: The shaper.
+        estimator: The estimator.
+        joints: Entries of a sample.
+        period: h [s].
+        max_delay: Longest delay the filter keeps samples for [s].
+        f_d: Damped frequencies of the last tick [Hz], shape (modes,).
+        zeta: Damping ratios of the last tick [-], shape (modes,).
+        impulses: Impulses of the last tick.
+    """
+
+    shaper: Shaper
+    estimator: Estimator
+    joints: int
+    period: float
+    max_delay: float
+    f_d: Floats
+    zeta: Floats
+    impulses: Impulses
+
+    def __init__(
+        self,
+        shaper: Shaper,
+        estimator: Estimator,
+        *,
+        joints: int,
+        period: float = 0.002,
+        max_delay: float = 1.0,
+    ) -> None:
+        """A filter at rest at q = 0; `reset` puts it where the arm is.
+
+        Args:
+            shaper: Its impulses for one mode; those of several modes are convolved.
+            estimator: The modes as functions of q.
+            joints: Entries of a sample, >= 1.
+            period: Time between two samples h [s], > 0.
+            max_delay: Longest delay samples are kept for [s], > 0.
+
+        Raises:
+            FilterError: A number is out of range; or the shaper would last longer than max_delay at the
+                estimator's lowest frequency; or the estimator's highest damping is beyond the shaper's.
+            EstimatorError: The estimator needs more joints.
+        """
+        if joints < 1:
+            raise FilterError("joints", joints, "at least 1")
+        for name, value in (("period", period), ("max_delay", max_delay)):
+            if not 0.0 < value < math.inf:
+                raise FilterError(name, value, "a finite number of seconds above 0")
+        longest = estimator.modes * shaper.duration_periods / estimator.f_d_min
+        if longest > max_delay:
+            raise FilterError(
+                "duration",
+                longest,
+                f"at most max_delay = {max_delay:g} s",
+                f"shaper {shaper.name!r} lasts {shaper.duration_periods:g} periods a mode, and {estimator!r} "
+                f"has {estimator.modes} mode(s) that may go down to {estimator.f_d_min:g} Hz: take a larger "
+                "max_delay, a shorter shaper or an estimator with a higher lowest frequency",
+            )
+        if estimator.zeta_max >= shaper.zeta_max:
+            raise FilterError(
+                "zeta_max",
+                estimator.zeta_max,
+                f"less than {shaper.zeta_max:g}, as shaper {shaper.name!r} demands",
+                "take another shaper or an estimator with a lower highest damping",
+            )
+        self.shaper = shaper
+        self.estimator = estimator
+        self.joints = joints
+        self.period = period
+        self.max_delay = max_delay
+        # One tick more than max_delay, against rounding of τ/h; the rest is what interpolation wants.
+        self._line = DelayLine(joints, math.ceil(max_delay / period) + 5)
+        self._q_star: Floats = np.zeros(joints)
+        self.reset(self._q_star)
+
+    def __repr__(self) -> str:
+        return (
+            f"TvistFilter({self.shaper.name!r}, {self.estimator!r}, joints={self.joints}, "
+            f"period={self.period}, max_delay={self.max_delay})"
+        )
+
+    @property
+    def delay(self) -> float:
+        """Time of the last impulse of the last tick [s]: how much later the shaped reference ends."""
+        return self.impulses.duration
+
+    def reset(self, q: npt.ArrayLike) -> None:
+        """Start anew at rest: the reference has been at q for ever.
+
+        Args:
+            q: Joint angles [rad], shape (joints,), finite.
+
+        Raises:
+            ShapingError: q has another shape.
+        """
+        self._line.fill(q)
+        self._q_star[:] = q
+        self._update()
+
+    def filter(self, q_ref: npt.ArrayLike) -> Floats:
+        """Shape one sample.
+
+        Args:
+            q_ref: Reference x_i [rad], shape (joints,), finite.
+
+        Returns:
+            Shaped reference x*_i [rad], shape (joints,), the caller's own.
+
+        Raises:
+            ShapingError: q_ref has another shape.
+        """
+        self._line.push(q_ref)
+        self._update()
+        self._line.gather(self.impulses.A, self.impulses.tau / self.period, self._q_star)
+        return self._q_star.copy()
+
+    def replace(self, *, shaper: Shaper | None = None, estimator: Estimator | None = None) -> "TvistFilter":
+        """A filter with another shaper or estimator, at rest where this one is.
+
+        For a reference at rest only: what of a motion is still in the delay line is not handed over.
+
+        Args:
+            shaper: Another shaper; None for the same.
+            estimator: Another estimator; None for the same.
+
+        Returns:
+            The new filter; this one is left as it is.
+
+        Raises:
+            FilterError: The two do not fit, as in the constructor.
+        """
+        changed = TvistFilter(
+            self.shaper if shaper is None else shaper,
+            self.estimator if estimator is None else estimator,
+            joints=self.joints,
+            period=self.period,
+            max_delay=self.max_delay,
+        )
+        changed.reset(self._q_star)
+        return changed
+
+    def _update(self) -> None:
+        """Impulses for the modes at the last shaped reference: the z⁻¹ of Figure 8."""
+        self.f_d, self.zeta = self.estimator.estimate(self._q_star)
+        trains = [
+            self.shaper.function(f, z) for f, z in zip(self.f_d.tolist(), self.zeta.tolist(), strict=True)
+        ]
+        self.impulses = trains[0] if len(trains) == 1 else product(trains)

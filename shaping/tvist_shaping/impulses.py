@@ -1,0 +1,262 @@
+"""Impulse trains A, τ of the input shapers, as functions of a mode's damped frequency and damping ratio.
+
+Every shaper here has impulses at equal distances, amplitudes a_j without damping, and takes damping in by
+
+    A_j = a_j K^j / Σ_i a_i K^i,    τ_j = j s T_d,    K = exp(-2π s ζ/√(1-ζ²)),    T_d = 1/f_d,
+
+K being the factor by which the mode decays in the distance s T_d between two impulses. A zero of the residual
+vibration at f_d stays one under any damping. The shapers that want V instead of zero at f_d (ei, ei3) get
+less than V when ζ > 0: safe, if not the widest band their length could give.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tvist_shaping._types import Floats
+from tvist_shaping.errors import ImpulseError, ShaperRangeError
+
+V = 0.05
+"""Residual vibration the extra-insensitive shapers allow themselves [-]."""
+
+F_D_RANGE = (1e-6, 1e6)
+"""Damped frequencies a shaper is made for [Hz]: wide enough for anything that swings, no time overflows."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Impulses:
+    """A train of impulses: what the reference is convolved with, eqs. (1)-(3) of the paper.
+
+    Attributes:
+        A: Amplitudes [-], shape (N,), read-only, sum 1.
+        tau: Times [s], shape (N,), read-only, ascending from 0 (two modes may share a time).
+
+    Raises:
+        ImpulseError: Shapes differ, a value is not finite, times do not ascend from 0, or |ΣA - 1| >= 1e-9.
+    """
+
+    A: Floats
+    tau: Floats
+
+    def __post_init__(self) -> None:
+        A, tau = np.array(self.A, dtype=float), np.array(self.tau, dtype=float)
+        if A.ndim != 1 or A.shape != tau.shape or A.size == 0:
+            raise ImpulseError(f"A has shape {A.shape} and tau {tau.shape}, but both must be (N,), N >= 1")
+        for name, values in (("A", A), ("tau", tau)):
+            if not np.isfinite(values).all():
+                raise ImpulseError(f"{name} is {values.tolist()}, but must be finite")
+        if tau[0] != 0.0 or (np.diff(tau) < 0.0).any():
+            raise ImpulseError(f"tau is {tau.tolist()}, but must ascend from 0")
+        if abs(A.sum() - 1.0) >= 1e-9:
+            raise ImpulseError(f"A sums to {float(A.sum())!r}, but must sum to 1 within 1e-9")
+        self._hold(A, tau)
+
+    def _hold(self, A: Floats, tau: Floats) -> None:
+        A.setflags(write=False)
+        tau.setflags(write=False)
+        object.__setattr__(self, "A", A)
+        object.__setattr__(self, "tau", tau)
+
+    @classmethod
+    def _by_construction(cls, A: Floats, tau: Floats) -> "Impulses":
+        """Impulses whose maker guarantees what the constructor checks: one of these is made every tick."""
+        impulses = object.__new__(cls)
+        impulses._hold(A, tau)
+        return impulses
+
+    @property
+    def duration(self) -> float:
+        """Time of the last impulse [s]: how much later than its reference the shaped reference ends."""
+        return float(self.tau[-1])
+
+    @property
+    def mean_delay(self) -> float:
+        """Σ A_j τ_j [s]: how far the shaped reference lags behind a reference of constant velocity."""
+        return float(self.A @ self.tau)
+
+
+def _train(a: Sequence[float], distance: float, f_d: float, zeta: float) -> Impulses:
+    """Impulses a_j K^j, normalised, `distance` damped periods apart: the formula at the top."""
+    if not F_D_RANGE[0] <= f_d <= F_D_RANGE[1]:
+        raise ShaperRangeError("f_d", f_d, f"{F_D_RANGE[0]:g} to {F_D_RANGE[1]:g} Hz")
+    if not 0.0 <= zeta < 1.0:
+        raise ShaperRangeError("zeta", zeta, "at least 0 and less than 1")
+    K = math.exp(-2.0 * math.pi * distance * zeta / math.sqrt(1.0 - zeta * zeta))
+    damped = [a_j * K**j for j, a_j in enumerate(a)]
+    total = sum(damped)
+    return Impulses._by_construction(  # noqa: SLF001  this module makes the trains, checked above
+        np.array([A_j / total for A_j in damped]),
+        np.array([j * distance / f_d for j in range(len(damped))]),
+    )
+
+
+def none(f_d: float, zeta: float) -> Impulses:
+    """No shaping: the single impulse A = (1), τ = (0).
+
+    Args:
+        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6; checked, then ignored.
+        zeta: Damping ratio of the mode [-], 0 <= ζ < 1; checked, then ignored.
+
+    Returns:
+        A [-] and τ [s], each of shape (1,).
+
+    Raises:
+        ShaperRangeError: f_d or ζ is outside the range above.
+    """
+    return _train((1.0,), 0.0, f_d, zeta)
+
+
+def zv(f_d: float, zeta: float) -> Impulses:
+    """Zero-vibration shaper, eqs. (4)-(7) of the paper (Singer and Seering, 1990).
+
+    The second impulse starts an oscillation that meets the first one's in opposite phase half a damped period
+    later, when it has decayed by K = exp(-ζπ/√(1-ζ²)).
+
+    Args:
+        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
+        zeta: Damping ratio of the mode [-], 0 <= ζ < 1.
+
+    Returns:
+        A = (1, K)/(1+K) [-] and τ = (0, 1/(2 f_d)) [s], each of shape (2,).
+
+    Raises:
+        ShaperRangeError: f_d or ζ is outside the range above.
+    """
+    return _train((1.0, 1.0), 0.5, f_d, zeta)
+
+
+def zvd(f_d: float, zeta: float) -> Impulses:
+    """Zero-vibration-and-derivative shaper (Singer and Seering, 1990): zv convolved with itself.
+
+    The residual vibration and its derivative by frequency vanish at f_d.
+
+    Args:
+        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
+        zeta: Damping ratio of the mode [-], 0 <= ζ < 1.
+
+    Returns:
+        A = (1, 2K, K²)/(1+K)² [-] and τ = (0, 1/2, 1)/f_d [s], each of shape (3,); K as for `zv`.
+
+    Raises:
+        ShaperRangeError: f_d or ζ is outside the range above.
+    """
+    return _train((1.0, 2.0, 1.0), 0.5, f_d, zeta)
+
+
+def ei(f_d: float, zeta: float) -> Impulses:
+    """Extra-insensitive shaper with V = 5 % (Singhose, Seering, Singer, J. Mech. Design 116, 1994).
+
+    It leaves V at f_d and is zero at a frequency on either side, so that the band below V is as wide as three
+    impulses allow. |(1-V)/2 + (1+V)/2 cos(π f/f_d)| is what remains without damping.
+
+    Args:
+        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
+        zeta: Damping ratio of the mode [-], 0 <= ζ < 1.
+
+    Returns:
+        A ∝ ((1+V)/4, (1-V)/2 K, (1+V)/4 K²) [-] and τ = (0, 1/2, 1)/f_d [s], each of shape (3,);
+        K as for `zv`.
+
+    Raises:
+        ShaperRangeError: f_d or ζ is outside the range above.
+    """
+    return _train(((1.0 + V) / 4.0, (1.0 - V) / 2.0, (1.0 + V) / 4.0), 0.5, f_d, zeta)
+
+
+def mzv(f_d: float, zeta: float) -> Impulses:
+    """Modified zero-vibration shaper: three impulses in three quarters of a period (known from Klipper).
+
+    Shorter than zvd, and wider than zv, above f_d more than below it.
+
+    Args:
+        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
+        zeta: Damping ratio of the mode [-], 0 <= ζ < 1.
+
+    Returns:
+        A ∝ (1 - 1/√2, (√2 - 1) k, (1 - 1/√2) k²) [-] with k = exp(-3/4 ζπ/√(1-ζ²)), and
+        τ = (0, 3/8, 3/4)/f_d [s], each of shape (3,).
+
+    Raises:
+        ShaperRangeError: f_d or ζ is outside the range above.
+    """
+    return _train((1.0 - math.sqrt(0.5), math.sqrt(2.0) - 1.0, 1.0 - math.sqrt(0.5)), 0.375, f_d, zeta)
+
+
+def _ei2_amplitudes() -> tuple[float, ...]:
+    X = math.cbrt(V * V * (math.sqrt(1.0 - V * V) + 1.0))
+    a = (3.0 * X * X + 2.0 * X + 3.0 * V * V) / (16.0 * X)
+    return a, 0.5 - a, 0.5 - a, a
+
+
+def _ei3_amplitudes() -> tuple[float, ...]:
+    a = (1.0 + 3.0 * V + 2.0 * math.sqrt(2.0 * (V + V * V))) / 16.0
+    b = (1.0 - V) / 4.0
+    return a, b, 1.0 - 2.0 * (a + b), b, a
+
+
+_EI2 = _ei2_amplitudes()
+_EI3 = _ei3_amplitudes()
+
+
+def ei2(f_d: float, zeta: float) -> Impulses:
+    """Two-hump extra-insensitive shaper with V = 5 %.
+
+    Zero at f_d and once on either side, humps of height V between them (Singhose, Porter, Tuttle, Singer,
+    J. Dyn. Sys. Meas. Control 119, 1997).
+
+    Args:
+        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
+        zeta: Damping ratio of the mode [-], 0 <= ζ < 1.
+
+    Returns:
+        A ∝ (a, bK, bK², aK³) [-] with a = (3X²+2X+3V²)/(16X), X = ∛(V²(√(1-V²)+1)), b = 1/2 - a, and
+        τ = (0, 1/2, 1, 3/2)/f_d [s], each of shape (4,); K as for `zv`.
+
+    Raises:
+        ShaperRangeError: f_d or ζ is outside the range above.
+    """
+    return _train(_EI2, 0.5, f_d, zeta)
+
+
+def ei3(f_d: float, zeta: float) -> Impulses:
+    """Three-hump extra-insensitive shaper, V = 5 % (source as for `ei2`).
+
+    V at f_d, zero twice on either side, humps of height V between them.
+
+    Args:
+        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
+        zeta: Damping ratio of the mode [-], 0 <= ζ < 1.
+
+    Returns:
+        A ∝ (a, bK, cK², bK³, aK⁴) [-] with a = (1+3V+2√(2(V+V²)))/16, b = (1-V)/4, c = 1 - 2(a+b), and
+        τ = (0, 1/2, 1, 3/2, 2)/f_d [s], each of shape (5,); K as for `zv`.
+
+    Raises:
+        ShaperRangeError: f_d or ζ is outside the range above.
+    """
+    return _train(_EI3, 0.5, f_d, zeta)
+
+
+def product(trains: Sequence[Impulses]) -> Impulses:
+    """Convolution of the impulse trains of several modes: it suppresses each of them.
+
+    Args:
+        trains: One train a mode, at least one.
+
+    Returns:
+        Amplitudes A_i B_j … [-] at the times τ_i + σ_j + … [s], sorted by time, shape (Π N,).
+
+    Raises:
+        ImpulseError: There is no train.
+    """
+    if not trains:
+        raise ImpulseError("a product needs at least one impulse train")
+    A, tau = trains[0].A, trains[0].tau
+    for train in trains[1:]:
+        A = np.multiply.outer(A, train.A).ravel()
+        tau = np.add.outer(tau, train.tau).ravel()
+        order = np.argsort(tau, kind="stable")
+        A, tau = A[order], tau[order]
+    return Impulses._by_construction(A, tau)  # noqa: SLF001  sums of 1 multiply to 1, times from 0 add from 0

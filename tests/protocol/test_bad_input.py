@@ -1,0 +1,267 @@
+"""Every way a message can be wrong: code, field, sentence and limit of the refusal."""
+
+import math
+import struct
+
+import msgpack
+import msgspec
+import pytest
+
+from tvist_protocol import (
+    MAX_BYTES,
+    ProtocolError,
+    Refused,
+    decode_command,
+    decode_info,
+    decode_reply,
+    decode_setpoint,
+    decode_state,
+    encode,
+    refusal,
+)
+from tvist_protocol.generate import FOLDER
+
+MOVE = {"type": "move_j", "token": "t", "q": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]}
+STREAM = {"type": "setpoint", "token": "t", "sequence": 3, "q": [0.1, 0.2]}
+LOAD = {"type": "set_payload", "token": "t", "mass": 5, "com": [0, 0, 0.04], "inertia": [1, 0, 0, 1, 0, 1]}
+RESET = {"type": "simulation.reset", "token": "t"}
+STEP = {"type": "simulation.step", "token": "t", "ticks": 1}
+FIXED = {"type": "set_estimator", "token": "t", "name": "fixed"}
+TAKE = {"type": "take_control", "client": "me"}
+
+
+def refused(decode, message):
+    data = message if isinstance(message, bytes) else msgpack.packb(message)
+    with pytest.raises(ProtocolError) as caught:
+        decode(data)
+    return caught.value
+
+
+WRONG = [
+    # message, code, where, a part of the sentence, limit
+    (MOVE | {"q": [0.1, "0.2"]}, "malformed", "q[1]", "a number, not a string", None),
+    (MOVE | {"q": [0.1, True]}, "malformed", "q[1]", "a number, not a boolean", None),
+    (MOVE | {"q": [0.1, None]}, "malformed", "q[1]", "not null", None),
+    (MOVE | {"q": 0.1}, "malformed", "q", "a list, not a number", None),
+    (MOVE | {"q": {"0": 1.0}}, "malformed", "q", "a list, not a map", None),
+    (MOVE | {"token": 7}, "malformed", "token", "a string, not an integer", None),
+    (MOVE | {"token": b"t"}, "malformed", "token", "not a byte string", None),
+    (MOVE | {"velocity": msgpack.ExtType(5, b"x")}, "malformed", "velocity", "an extension value", None),
+    (MOVE | {"type": 7}, "malformed", "type", "must be a string", None),
+    (MOVE | {"type": None}, "malformed", "type", "must be a string", None),
+    (MOVE | {1: 2}, "malformed", "", "the message has a key that is no string", None),
+    (RESET | {"payload": {1: 2}}, "malformed", "payload", "payload has a key that is no string", None),
+    (RESET | {"payload": 5}, "malformed", "payload", "a map or null, not an integer", None),
+    (STEP | {"ticks": 1.0}, "malformed", "ticks", "an integer, not a number", None),
+    (STEP | {"ticks": True}, "malformed", "ticks", "not a boolean", None),
+    ([MOVE], "malformed", "", "the message must be a map, not a list", None),
+    (3, "malformed", "", "not an integer", None),
+    (None, "malformed", "", "not null", None),
+    ("move_j", "malformed", "", "not a string", None),
+    (MOVE | {"type": "movej"}, "unknown_type", "type", "did you mean 'move_j'", None),
+    (MOVE | {"type": ""}, "unknown_type", "type", "''", None),
+    (MOVE | {"type": "x" * 10_000}, "unknown_type", "type", "…", None),
+    (MOVE | {"velocty": 1.0}, "unknown_field", "velocty", "did you mean 'velocity'", None),
+    (MOVE | {"$.q": 1.0}, "unknown_field", "$.q", "no field '$.q'", None),
+    (MOVE | {"": 1.0}, "unknown_field", "", "no field ''", None),
+    (MOVE | {"a`b\n - at `$.q`": 1.0}, "unknown_field", "a`b� - at `$.q`", "has no field", None),
+    (RESET | {"payload": LOAD}, "unknown_field", "payload.type", "payload has no field 'type'", None),
+    ({"token": "t"}, "missing_field", "type", "type is missing", None),
+    ({}, "missing_field", "type", "type is missing", None),
+    ({"type": "move_j", "q": [0.1]}, "missing_field", "token", "token is missing", None),
+    (RESET | {"payload": {"mass": 1, "com": [0, 0, 0]}}, "missing_field", "payload.inertia", "missing", None),
+    (STEP | {"setpoints": [{"sequence": 0}]}, "missing_field", "setpoints[0].q", "missing", None),
+    (MOVE | {"q": [0.1, math.nan]}, "out_of_range", "q[1]", "q[1] is NaN", None),
+    (MOVE | {"velocity": math.nan}, "out_of_range", "velocity", "NaN", None),
+    (MOVE | {"q": [math.inf]}, "out_of_range", "q[0]", "is inf: must be at most 1000", 1e3),
+    (MOVE | {"q": [-math.inf]}, "out_of_range", "q[0]", "is -inf: must be at least -1000", -1e3),
+    (MOVE | {"q": []}, "out_of_range", "q", "0 entries: must have at least 1", 1),
+    (MOVE | {"q": [0.0] * 8}, "out_of_range", "q", "8 entries: must have at most 7", 7),
+    (MOVE | {"velocity": 0}, "out_of_range", "velocity", "is 0: must be more than 0", 0),
+    (MOVE | {"velocity": -1.5}, "out_of_range", "velocity", "-1.5", 0),
+    (MOVE | {"jerk": 10**18}, "out_of_range", "jerk", "at most 10000000", 1e7),
+    (MOVE | {"token": "t" * 129}, "out_of_range", "token", "129 characters: must have at most 128", 128),
+    (LOAD | {"com": [0, 0]}, "out_of_range", "com", "2 entries: must have exactly 3", 3),
+    (LOAD | {"inertia": [0] * 7}, "out_of_range", "inertia", "exactly 6", 6),
+    (LOAD | {"mass": -0.001}, "out_of_range", "mass", "at least 0", 0),
+    (RESET | {"seed": -1}, "out_of_range", "seed", "at least 0", 0),
+    (RESET | {"seed": 2**63}, "out_of_range", "seed", "at most", 2.0**63),
+    (RESET | {"mode": "running"}, "out_of_range", "mode", "one of 'RUNNING', 'IDLE', 'POWER_OFF'", None),
+    (RESET | {"shaper": ""}, "out_of_range", "shaper", "at least 1", 1),
+    (STEP | {"ticks": 0}, "out_of_range", "ticks", "at least 1", 1),
+    (STEP | {"ticks": 1001}, "out_of_range", "ticks", "at most 1000", 1000),
+    (STEP | {"setpoints": [{"sequence": -1, "q": [0]}]}, "out_of_range", "setpoints[0].sequence", "-1", 0),
+    (STEP | {"setpoints": [{"sequence": 0, "q": [9e9]}]}, "out_of_range", "setpoints[0].q[0]", "1000", 1e3),
+    (STEP | {"setpoints": [{"sequence": 0, "q": [0]}] * 1001}, "out_of_range", "setpoints", "1000", 1000),
+    (FIXED | {"f_d": [0.05], "zeta": [0.1]}, "out_of_range", "f_d[0]", "at least 0.1", 0.1),
+    (FIXED | {"f_d": [5.0], "zeta": [1.0]}, "out_of_range", "zeta[0]", "less than 1", 1),
+    (FIXED | {"f_d": [5.0] * 9}, "out_of_range", "f_d", "at most 8", 8),
+    (FIXED | {"calibration": {"a": [0.0, math.nan]}}, "out_of_range", "calibration.a[1]", "nan", None),
+    (FIXED | {"calibration": {"a": {"b": math.inf}}}, "out_of_range", "calibration.a.b", "inf", None),
+    (FIXED | {"calibration": {"a": b"x"}}, "malformed", "calibration.a", "bytes", None),
+    (FIXED | {"calibration": {"a": {1: 2}}}, "malformed", "calibration.a", "no string", None),
+    (FIXED | {"calibration": {"a": msgpack.ExtType(9, b"x")}}, "malformed", "calibration.a", "Ext", None),
+    (FIXED | {"calibration": {"a": msgpack.Timestamp(1)}}, "malformed", "calibration.a", "datetime", None),
+    (TAKE | {"client": ""}, "out_of_range", "client", "1 to 64 printable", None),
+    (TAKE | {"client": "a" * 65}, "out_of_range", "client", "1 to 64 printable", None),
+    (TAKE | {"client": "a\n"}, "out_of_range", "client", "printable", None),
+    (TAKE | {"client": "a/b"}, "out_of_range", "client", "printable", None),
+    (TAKE | {"client": "**"}, "out_of_range", "client", "printable", None),
+    (TAKE | {"client": "@me"}, "out_of_range", "client", "the first not @", None),
+    (TAKE | {"lease_s": 0.05}, "out_of_range", "lease_s", "0.1", 0.1),
+    (TAKE | {"lease_s": 3601}, "out_of_range", "lease_s", "3600", 3600),
+]
+
+
+@pytest.mark.parametrize(("message", "code", "where", "why", "limit"), WRONG)
+def test_a_wrong_command_is_refused_with_code_field_sentence_and_limit(message, code, where, why, limit):
+    error = refused(decode_command, message)
+    assert (error.code, error.where, error.limit) == (code, where, limit)
+    assert why in error.why
+    assert len(error.why) < 250
+
+
+@pytest.mark.parametrize(
+    ("message", "code", "where"),
+    [
+        (STREAM | {"type": "set_point"}, "unknown_type", "type"),
+        ({name: value for name, value in STREAM.items() if name != "type"}, "missing_field", "type"),
+        (STREAM | {"sequence": -1}, "out_of_range", "sequence"),
+        (STREAM | {"sequence": 3.0}, "malformed", "sequence"),
+        (STREAM | {"q": [math.nan]}, "out_of_range", "q[0]"),
+        (STREAM | {"velocity": 1.0}, "unknown_field", "velocity"),
+    ],
+)
+def test_a_wrong_setpoint_is_refused(message, code, where):
+    error = refused(decode_setpoint, message)
+    assert (error.code, error.where) == (code, where)
+
+
+def test_the_largest_sequence_is_a_uint64():
+    assert decode_setpoint(msgpack.packb(STREAM | {"sequence": 2**64 - 1})).sequence == 2**64 - 1
+
+
+def test_an_integer_may_stand_for_a_number():
+    q = decode_command(msgpack.packb(MOVE | {"q": [1, -2]})).q
+    assert q == (1.0, -2.0)
+    assert all(type(angle) is float for angle in q)
+
+
+@pytest.mark.parametrize("length", range(len(msgpack.packb(MOVE))))
+def test_a_truncated_message_is_malformed_wherever_it_ends(length):
+    error = refused(decode_command, msgpack.packb(MOVE)[:length])
+    assert error.code == "malformed"
+    assert "truncated" in error.why
+
+
+def test_trailing_bytes_are_malformed():
+    error = refused(decode_command, msgpack.packb(MOVE) + b"\x00")
+    assert (error.code, error.where) == ("malformed", "")
+    assert "trailing" in error.why
+
+
+def test_two_messages_in_one_are_malformed():
+    assert refused(decode_command, msgpack.packb(MOVE) * 2).code == "malformed"
+
+
+@pytest.mark.parametrize("decode", [decode_command, decode_setpoint, decode_reply, decode_state, decode_info])
+def test_five_megabytes_are_refused_unread(decode):
+    error = refused(decode, b"\xc1" * 5_000_000)
+    assert (error.code, error.where, error.limit) == ("malformed", "", MAX_BYTES)
+    assert "5000000" in error.why
+
+
+def test_the_largest_useful_message_fits():
+    setpoints = [{"sequence": 2**64 - 1 - n, "q": [math.pi] * 7} for n in range(1000)]
+    data = msgpack.packb(STEP | {"ticks": 1000, "setpoints": setpoints})
+    assert len(data) < MAX_BYTES / 2
+    assert len(decode_command(data).setpoints) == 1000
+
+
+def with_calibration(tail):
+    packed = msgpack.packb(FIXED | {"calibration": {"a": None}})
+    assert packed.endswith(b"\xc0")
+    return packed[:-1] + tail
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        with_calibration(b"\x91" * 200_000),  # nested beyond the stack
+        with_calibration(b"\x81\xa1a" * 60_000),
+        with_calibration(b"\x91" * 20 + b"\xc0"),  # nested beyond what a calibration may be
+        with_calibration(b"\xdd\xff\xff\xff\xff"),  # a list that says it has 2^32 - 1 entries
+        with_calibration(b"\xdf\xff\xff\xff\xff"),  # a map
+        with_calibration(b"\xdb\xff\xff\xff\xff"),  # a string
+        with_calibration(b"\xc9\xff\xff\xff\xff\x01"),  # an extension value
+        with_calibration(b"\xa2\xff\xfe"),  # text that is not UTF-8
+        with_calibration(b"\x81\x80\x01"),  # a map as a key
+        with_calibration(b"\xc7\x0c\xff" + b"\xff" * 12),  # a timestamp with 2^32 - 1 nanoseconds
+        with_calibration(b"\xc1"),  # the byte MessagePack never uses
+        b"\x82\xa4type\xa5pause\xa2\xff\xfe\x01",  # a key that is not UTF-8
+        b"\x81\xa4type" + b"\x91" * 200_000,
+        b"\x91" * 200_000,
+        b"",
+        b"\xc1",
+        b"GET / HTTP/1.1\r\n\r\n",
+    ],
+)
+def test_bytes_made_to_hurt_are_refused(data):
+    assert refused(decode_command, data).code in {"malformed", "out_of_range"}
+
+
+def test_a_receiver_survives_nesting_in_a_field_it_does_not_know():
+    assert refused(decode_reply, b"\x82\xa4type\xa4done\xa1x" + b"\x91" * 200_000).code == "malformed"
+
+
+def test_nan_bits_of_every_kind_are_refused():
+    for bits in (0x7FF8000000000000, 0xFFF8000000000001, 0x7FF0000000000001):
+        packed = msgpack.packb(STREAM | {"q": [1.5]})
+        data = packed.replace(struct.pack(">d", 1.5), struct.pack(">Q", bits))
+        assert refused(decode_setpoint, data).where == "q[0]"
+
+
+@pytest.mark.parametrize(
+    "name", ["state", "event", "truth", "telemetry", "info", "done", "accepted", "refused"]
+)
+def test_what_a_client_receives_may_have_more_fields(name):
+    from tvist_protocol import decode_event, decode_telemetry, decode_truth
+
+    decode = {
+        "state": decode_state,
+        "event": decode_event,
+        "truth": decode_truth,
+        "telemetry": decode_telemetry,
+        "info": decode_info,
+    }.get(name, decode_reply)
+    data = (FOLDER / "fixtures" / "v1" / f"{name}.msgpack").read_bytes()
+    more = msgpack.unpackb(data) | {"of_tomorrow": {"a": [1, None]}}
+    assert decode(msgpack.packb(more)) == decode(data)
+
+
+def test_a_refusal_says_what_the_error_says():
+    error = refused(decode_command, MOVE | {"q": [0.0, 2e3]})
+    reply = refusal(error)
+    assert reply == Refused(
+        code="out_of_range", where="q[1]", why="q[1] is 2000.0: must be at most 1000", limit=1000.0
+    )
+    assert decode_reply(encode(reply)) == reply
+    assert str(error) == "out_of_range: q[1] is 2000.0: must be at most 1000"
+
+
+def test_every_refusal_can_be_sent():
+    for message, *_ in WRONG:
+        reply = refusal(refused(decode_command, message))
+        assert decode_reply(encode(reply)) == reply
+
+
+def test_the_order_of_fields_does_not_matter():
+    backwards = dict(reversed(MOVE.items()))
+    assert decode_command(msgpack.packb(backwards)) == decode_command(msgpack.packb(MOVE))
+
+
+def test_msgspec_still_speaks_as_the_translation_expects():
+    """A sentence of msgspec's that is not understood comes out as `malformed` with msgspec's own words."""
+    for message, *_ in WRONG:
+        assert "Expected" not in refused(decode_command, message).why
+    assert msgspec.ValidationError.__mro__[1] is msgspec.DecodeError

@@ -1,0 +1,145 @@
+"""What is made from the types is up to date, valid, and complete."""
+
+import doctest
+import json
+import subprocess
+import sys
+from typing import get_args
+
+import jsonschema
+import msgspec
+import pytest
+
+from tvist_protocol import CODE_MEANINGS, EVENT_MEANINGS, Code, EventKind
+from tvist_protocol.asyncapi import asyncapi
+from tvist_protocol.channels import COMMANDS, MESSAGES, tag
+from tvist_protocol.commands import Setpoint, StepSetpoint
+from tvist_protocol.generate import FOLDER, filled, generated, golden, stray
+from tvist_protocol.info import CalibrationInfo, Limits
+from tvist_protocol.schema import field_docs, json_schema
+from tvist_protocol.values import Payload
+
+STRUCTS = (*MESSAGES, Payload, StepSetpoint, Limits, CalibrationInfo)
+INPUT = (*COMMANDS, Setpoint, Payload, StepSetpoint)
+
+
+def test_every_generated_file_is_up_to_date():
+    files = generated(FOLDER)
+    stale = [
+        path.name for path, content in files.items() if not path.exists() or path.read_bytes() != content
+    ]
+    assert not stale, f"run `python -m tvist_protocol.generate`: {stale}"
+    assert not stray(FOLDER, files)
+
+
+def test_a_part_without_markers_is_an_error():
+    with pytest.raises(ValueError, match="markers"):
+        filled("no markers", {"keys": "table"})
+
+
+def test_a_part_is_filled_in_between_its_markers():
+    text = "a\n<!-- generated: keys -->\nold\n<!-- end -->\nb\n"
+    once = filled(text, {"keys": "new"})
+    assert once == "a\n<!-- generated: keys -->\n\nnew\n\n<!-- end -->\nb\n"
+    assert filled(once, {"keys": "new"}) == once
+
+
+@pytest.mark.parametrize("kind", STRUCTS, ids=lambda kind: kind.__name__)
+def test_every_field_says_what_it_means(kind):
+    docs = field_docs(kind)
+    assert tuple(docs) == kind.__struct_fields__
+    assert all(text.endswith(".") for text in docs.values())
+    assert kind.__doc__
+
+
+def numbers(part):
+    match part:
+        case msgspec.inspect.FloatType() | msgspec.inspect.IntType():
+            yield part
+        case msgspec.inspect.Field(type=inner) | msgspec.inspect.VarTupleType(item_type=inner):
+            yield from numbers(inner)
+        case msgspec.inspect.UnionType(types=inner) | msgspec.inspect.TupleType(item_types=inner):
+            for entry in inner:
+                yield from numbers(entry)
+
+
+@pytest.mark.parametrize("kind", INPUT, ids=lambda kind: kind.__name__)
+def test_every_number_a_client_sends_is_bounded(kind):
+    for field in msgspec.inspect.type_info(kind).fields:
+        for number in numbers(field):
+            assert (number.ge, number.gt) != (None, None), field.name
+            is_uint64 = isinstance(number, msgspec.inspect.IntType) and field.name == "sequence"
+            assert is_uint64 or (number.le, number.lt) != (None, None), field.name
+
+
+@pytest.mark.parametrize("kind", INPUT, ids=lambda kind: kind.__name__)
+def test_every_text_and_list_a_client_sends_is_bounded(kind):
+    for field in msgspec.inspect.type_info(kind).fields:
+        parts = getattr(field.type, "types", (field.type,))
+        for part in parts:
+            match part:
+                case msgspec.inspect.StrType():
+                    assert part.max_length or part.pattern, field.name
+                case msgspec.inspect.VarTupleType():
+                    assert part.max_length, field.name
+
+
+@pytest.mark.parametrize("kind", INPUT, ids=lambda kind: kind.__name__)
+def test_what_a_client_sends_has_no_unknown_fields_and_what_it_receives_may(kind):
+    assert kind.__struct_config__.forbid_unknown_fields
+    assert kind.__struct_config__.frozen
+
+
+def test_every_code_and_every_kind_of_event_has_a_meaning():
+    assert tuple(CODE_MEANINGS) == get_args(Code)
+    assert tuple(EVENT_MEANINGS) == get_args(EventKind)
+
+
+@pytest.mark.parametrize("kind", MESSAGES, ids=tag)
+def test_a_schema_is_valid_and_its_golden_messages_fit(kind):
+    schema = json_schema(kind)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    validator = jsonschema.Draft202012Validator(schema)
+    values = [json.loads(path.read_bytes()) for path in golden(FOLDER)]
+    fitting = [value for value in values if value["type"] == tag(kind)]
+    assert fitting
+    for value in fitting:
+        validator.validate(value)
+
+
+def test_every_reference_in_the_asyncapi_document_leads_somewhere():
+    document = asyncapi()
+    for reference in references(document):
+        place = document
+        for step in reference.removeprefix("#/").split("/"):
+            place = place[step]
+        assert place
+    messages = document["components"]["messages"]
+    assert {tag(kind) for kind in MESSAGES} <= messages.keys()
+    used = {name for channel in document["channels"].values() for name in channel["messages"]}
+    assert used == messages.keys()
+
+
+def references(part):
+    if isinstance(part, dict):
+        if "$ref" in part:
+            yield part["$ref"]
+        for inner in part.values():
+            yield from references(inner)
+    elif isinstance(part, list):
+        for inner in part:
+            yield from references(inner)
+
+
+def test_the_readmes_examples_run():
+    results = doctest.testfile(str(FOLDER / "README.md"), module_relative=False)
+    assert results.attempted > 3
+    assert results.failed == 0
+
+
+def test_the_package_loads_no_network_clock_or_numbers():
+    program = "import sys, tvist_protocol; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert not {"numpy", "zenoh", "asyncio", "socket", "logging", "msgpack", "tvist_server"} & set(loaded)

@@ -1,0 +1,80 @@
+"""Keys: a name is one chunk, and never a wildcard."""
+
+import pytest
+
+from tvist_protocol import ProtocolError, keys
+from tvist_protocol.channels import CHANNELS
+
+LEAVES = ["state", "truth", "event", "telemetry", "command", "setpoint", "info", "alive"]
+
+
+@pytest.mark.parametrize("leaf", LEAVES)
+def test_a_robots_keys(leaf):
+    assert getattr(keys, leaf)("ur5e") == f"tvist/ur5e/{leaf}"
+
+
+def test_a_clients_key_and_its_name_back():
+    key = keys.client("ur5e", "palletizer 2")
+    assert key == "tvist/ur5e/client/palletizer 2"
+    assert keys.client_name("ur5e", key) == "palletizer 2"
+    assert keys.any_client("ur5e") == "tvist/ur5e/client/*"
+    assert keys.ANY_ALIVE == "tvist/*/alive"
+
+
+@pytest.mark.parametrize(
+    "key",
+    ["tvist/ur5e/client/*", "tvist/ur5e/client/a/b", "tvist/ur10/client/a", "tvist/ur5e/client/", "x", ""],
+)
+def test_a_key_that_is_no_clients_has_no_name(key):
+    assert keys.client_name("ur5e", key) is None
+
+
+@pytest.mark.parametrize("name", ["a", "0", "ur5e", "cell-3_left", "a" * 64])
+def test_robot_names(name):
+    assert keys.check_robot_name(name) == name
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "",
+        "*",
+        "**",
+        "a*",
+        "$*",
+        "a/b",
+        "UR5e",
+        "_a",
+        "-a",
+        "a" * 65,
+        "a b",
+        "a\n",
+        "ä",
+        "a#",
+        "a?",
+        "@a",
+        None,
+        5,
+        b"a",
+    ],
+)
+def test_what_is_no_robot_name_is_refused_by_every_key(name):
+    for leaf in (*LEAVES, "any_client", "check_robot_name"):
+        with pytest.raises(ProtocolError) as caught:
+            getattr(keys, leaf)(name)
+        assert (caught.value.code, caught.value.where) == ("out_of_range", "robot")
+        assert "a-z 0-9" in caught.value.why
+
+
+@pytest.mark.parametrize(
+    "name", ["", "*", "a*", "a/b", "a$", "a?", "a#", "@a", "a\n", "a\x00", "ä", "a" * 65]
+)
+def test_what_is_no_client_name_is_refused(name):
+    with pytest.raises(ProtocolError) as caught:
+        keys.client("ur5e", name)
+    assert (caught.value.code, caught.value.where) == ("out_of_range", "client")
+
+
+def test_the_table_of_keys_is_what_the_functions_build():
+    built = {channel.key.format(robot="r", client="c") for channel in CHANNELS}
+    assert built == {getattr(keys, leaf)("r") for leaf in LEAVES} | {keys.client("r", "c")}

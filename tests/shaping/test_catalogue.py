@@ -1,0 +1,34 @@
+import pytest
+
+from tvist_shaping import SHAPERS, UnknownShaperError, shaper
+
+
+def test_a_shaper_is_found_by_its_name():
+    for name in ("none", "zv", "zvd", "ei", "mzv", "ei2", "ei3"):
+        assert shaper(name).name == name
+
+
+def test_the_catalogue_stands_shortest_first():
+    durations = [entry.duration_periods for entry in SHAPERS.values()]
+    assert durations == sorted(durations)
+
+
+def test_an_unknown_name_lists_those_there_are_and_the_nearest():
+    with pytest.raises(
+        UnknownShaperError, match=r"did you mean 'zvd'.*there are none, zv, mzv, zvd"
+    ) as error:
+        shaper("zvdd")
+    assert error.value.name == "zvdd"
+    assert error.value.known == tuple(SHAPERS)
+    assert error.value.nearest == "zvd"
+
+
+def test_a_name_like_no_other_gets_no_suggestion():
+    with pytest.raises(UnknownShaperError) as error:
+        shaper("qqqqqq")
+    assert error.value.nearest is None
+
+
+def test_the_catalogue_cannot_be_changed():
+    with pytest.raises(TypeError):
+        SHAPERS["mine"] = SHAPERS["zv"]

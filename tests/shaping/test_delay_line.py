@@ -1,0 +1,151 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tvist_shaping import DelayError, DelayLine, ShapingError, shaper
+from tvist_shaping.delay_line import gather
+
+ONE = np.array([1.0])
+samples = st.lists(st.floats(-10.0, 10.0), min_size=25, max_size=60)
+
+
+def filled(values, capacity=20):
+    """A line of two joints, the second the first's negative, with the values pushed in order."""
+    line = DelayLine(2, capacity)
+    for x in values:
+        line.push([x, -x])
+    return line
+
+
+def read(line, delay):
+    out = np.zeros(2)
+    line.gather(ONE, np.array([float(delay)]), out)
+    return out
+
+
+@given(samples, st.integers(0, 17))
+def test_a_whole_delay_gives_the_sample_itself(values, delay):
+    x, minus_x = read(filled(values), delay)
+    assert x == values[-1 - delay]
+    assert minus_x == -x
+
+
+@given(st.lists(st.floats(-2.0, 2.0), min_size=4, max_size=4), st.floats(0.0, 17.0))
+def test_a_cubic_comes_through_exactly_at_any_delay(coefficients, delay):
+    t = np.arange(-30.0, 1.0) / 10.0
+    line = filled(np.polyval(coefficients, t))
+    assert read(line, delay)[0] == pytest.approx(np.polyval(coefficients, -delay / 10.0), abs=1e-12)
+
+
+@given(
+    st.floats(-1e3, 1e3),
+    st.sampled_from(["zv", "zvd", "ei", "mzv", "ei2", "ei3"]),
+    st.floats(0.0, 0.99),
+    st.floats(0.01, 8.0),
+)
+def test_a_constant_comes_out_bit_for_bit_at_any_delay(value, name, zeta, spacing):
+    line = DelayLine(1, 20)
+    line.fill([value])
+    impulses = shaper(name).function(1.0, zeta)
+    out = np.zeros(1)
+    line.gather(impulses.A, impulses.tau * spacing, out)
+    assert out[0] == value
+
+
+@given(samples, st.integers(1, 17), st.floats(0.0, 0.99))
+def test_whole_delays_with_positive_amplitudes_stay_between_the_samples(values, delay, zeta):
+    line = filled(values)
+    A = shaper("zv").function(1.0, zeta).A
+    out = np.zeros(2)
+    line.gather(A, np.array([0.0, float(delay)]), out)
+    low, high = sorted((values[-1], values[-1 - delay]))
+    assert low - 1e-14 <= out[0] <= high + 1e-14
+
+
+@given(samples, st.floats(0.0, 17.0), st.floats(0.0, 0.99))
+def test_fractional_delays_pass_the_samples_by_no_more_than_a_cubic_can(values, delay, zeta):
+    line = filled(values)
+    A = shaper("zv").function(1.0, zeta).A
+    out = np.zeros(2)
+    line.gather(A, np.array([0.0, delay]), out)
+    held = values[-20:]
+    allowed = (1.0 / 8.0 if delay >= 1.0 else 1.0 / 3.0) * (max(held) - min(held)) + 1e-12
+    assert min(held) - allowed <= out[0] <= max(held) + allowed
+
+
+@given(samples, st.integers(0, 16))
+def test_the_delayed_value_is_continuous_in_the_delay(values, delay):
+    line = filled(values)
+    step = 1e-9
+    assert read(line, delay)[0] == pytest.approx(read(line, delay + step)[0], abs=1e-6)
+    assert read(line, delay + 1)[0] == pytest.approx(read(line, delay + 1 - step)[0], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("f", "loss_percent"),
+    # Half a sample late at 500 Hz, from the cubic's frequency response.
+    [(6.7, 0.0001), (15.0, 0.003), (33.0, 0.068), (62.5, 0.85)],
+)
+def test_a_tone_loses_as_much_as_the_cubic_must(f, loss_percent):
+    h = 0.002
+    omega = 2.0 * np.pi * f
+    t = h * np.arange(-40, 1)
+    line = filled(np.cos(omega * (t + 10.5 * h)), capacity=41)
+    amplitude = read(line, 10.5)[0]
+    analytic = 9.0 / 8.0 * np.cos(0.5 * omega * h) - 1.0 / 8.0 * np.cos(1.5 * omega * h)
+    assert amplitude == pytest.approx(analytic, abs=1e-13)
+    assert 100.0 * (1.0 - amplitude) == pytest.approx(loss_percent, rel=0.2)
+
+
+def test_a_tone_is_delayed_by_the_delay_asked_for():
+    h, f = 0.002, 15.0
+    t = h * np.arange(-60, 1)
+    for delay in (0.3, 1.0, 1.7, 16.66666, 37.31, 50.99):
+        line = filled(np.sin(2.0 * np.pi * f * t), capacity=60)
+        assert read(line, delay)[0] == pytest.approx(np.sin(-2.0 * np.pi * f * h * delay), abs=1.5e-4)
+
+
+@pytest.mark.parametrize("delay", [-1e-9, 17.0000001, 1e300, math.nan, math.inf])
+def test_a_delay_the_line_does_not_hold_is_refused_and_nothing_written(delay):
+    line = filled(np.arange(30.0))
+    out = np.full(2, 5.0)
+    with pytest.raises(DelayError, match="holds 0 to 17 ticks") as error:
+        line.gather(np.array([0.5, 0.5]), np.array([0.0, delay]), out)
+    assert error.value.delay == pytest.approx(delay, nan_ok=True)
+    assert error.value.limit == line.max_delay == 17
+    assert (out == 5.0).all()
+
+
+def test_the_longest_delay_is_the_capacity_less_three():
+    assert read(filled(range(30)), 17)[0] == 29 - 17
+    assert read(filled(range(30)), 16.5)[0] == pytest.approx(29 - 16.5)
+
+
+def test_a_sample_of_another_size_is_refused():
+    line = DelayLine(2, 10)
+    for wrong in (1.0, [1.0], [1.0, 2.0, 3.0], [[1.0, 2.0]]):
+        with pytest.raises(ShapingError, match="shape"):
+            line.push(wrong)
+        with pytest.raises(ShapingError, match="shape"):
+            line.fill(wrong)
+
+
+@pytest.mark.parametrize(("joints", "capacity"), [(0, 10), (1, 3)])
+def test_a_line_that_could_not_interpolate_is_refused(joints, capacity):
+    with pytest.raises(ShapingError, match="joints >= 1 and capacity >= 4"):
+        DelayLine(joints, capacity)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_compiled_kernel_equals_its_python_source(seed):
+    random = np.random.default_rng(seed)
+    buffer, newest = random.normal(size=(16, 6)), int(random.integers(16))
+    delays = np.concatenate(([0.0], random.uniform(0.0, 13.0, 3), [5.0]))
+    A = random.dirichlet(np.ones(5))
+    compiled, plain = np.zeros(6), np.zeros(6)
+    assert gather(buffer, newest, A, delays, np.zeros(6), compiled) == -1
+    assert gather.py_func(buffer, newest, A, delays, np.zeros(6), plain) == -1
+    np.testing.assert_array_equal(compiled, plain)

@@ -1,0 +1,245 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tvist_shaping import EstimatorError, Fixed, Polynomial, terms
+from tvist_shaping.estimators.basis import Basis
+from tvist_shaping.estimators.polynomial import MARGIN, evaluate, saturate
+
+WIDE = {"f_d_range": (1e-3, 1e3), "zeta_range": (0.0, 0.99)}
+configurations = st.lists(st.floats(-6.3, 6.3), min_size=6, max_size=6)
+
+
+def polynomial(basis="trigonometric", degree=2, joints=(1, 2, 3), seed=0, **changes):
+    """Random coefficients around 100 Hz and 0.5, well inside wide ranges."""
+    random = np.random.default_rng(seed)
+    n = len(Basis(joints, basis, degree))
+    parameters = {
+        "joints": joints,
+        "basis": basis,
+        "degree": degree,
+        "f_d_coefficients": np.append(500.0, random.uniform(-50.0, 50.0, n - 1) / n),
+        "zeta_coefficients": np.append(0.5, random.uniform(-0.2, 0.2, n - 1) / n),
+        **WIDE,
+    }
+    return Polynomial(**(parameters | changes)), parameters
+
+
+def test_a_fixed_estimator_says_the_same_everywhere():
+    estimator = Fixed([6.7, 15.0], [0.34, 0.14])
+    for q in (np.zeros(6), np.ones(6)):
+        f_d, zeta = estimator.estimate(q)
+        np.testing.assert_array_equal(f_d, [6.7, 15.0])
+        np.testing.assert_array_equal(zeta, [0.34, 0.14])
+    assert (estimator.modes, estimator.f_d_min, estimator.zeta_max) == (2, 6.7, 0.34)
+
+
+@pytest.mark.parametrize(
+    ("f_d", "zeta", "field"),
+    [
+        ([], [], "f_d"),
+        (7.0, 0.1, "f_d"),
+        ([0.0], [0.1], "f_d"),
+        ([math.nan], [0.1], "f_d"),
+        ([math.inf], [0.1], "f_d"),
+        ([7.0], [0.1, 0.1], "zeta"),
+        ([7.0], [-0.1], "zeta"),
+        ([7.0], [1.0], "zeta"),
+        ([7.0], [math.nan], "zeta"),
+    ],
+)
+def test_bad_fixed_modes_are_refused_by_name(f_d, zeta, field):
+    with pytest.raises(EstimatorError, match=f"{field} is") as error:
+        Fixed(f_d, zeta)
+    assert error.value.field == field
+
+
+@given(st.floats(-3.0, 3.0), st.integers(0, 5))
+def test_angles_of_one_joint_are_numpys_polynomial(q, degree):
+    coefficients = np.arange(1.0, degree + 2.0) / 1000.0
+    coefficients[0] = 400.0
+    estimator = Polynomial(
+        joints=[0],
+        basis="angles",
+        degree=degree,
+        centre=[0.3],
+        scale=[1.7],
+        f_d_coefficients=coefficients,
+        zeta_coefficients=coefficients / 1000.0,
+        **WIDE,
+    )
+    expected = np.polynomial.polynomial.polyval((q - 0.3) / 1.7, coefficients)
+    f_d, zeta = estimator.estimate(np.array([q]))
+    assert f_d[0] == pytest.approx(expected, rel=1e-13)
+    assert zeta[0] == pytest.approx(expected / 1000.0, rel=1e-13)
+
+
+def test_angles_are_all_monomials_up_to_the_degree():
+    q = np.random.default_rng(1).normal(size=(5, 4))
+    u, v = (q[:, 1] - 0.1) / 2.0, (q[:, 3] + 0.2) / 3.0
+    direct = [np.ones(5), u, v, u * u, u * v, v * v]
+    made = terms(q, joints=(1, 3), basis="angles", degree=2, centre=[0.1, -0.2], scale=[2.0, 3.0])
+    np.testing.assert_allclose(made, np.stack(direct, axis=1), rtol=1e-13)
+
+
+def test_trigonometric_terms_are_all_combinations_up_to_the_degree_once():
+    q = np.random.default_rng(1).normal(size=(9, 3))
+    a, b = q[:, 0], q[:, 2]
+    phases = [a, b, 2 * a, a + b, a - b, 2 * b]
+    direct = [np.ones(9), *(f(p) for p in phases for f in (np.cos, np.sin))]
+    made = terms(q, joints=(0, 2), basis="trigonometric", degree=2)
+    np.testing.assert_allclose(made, np.stack(direct, axis=1), atol=1e-14)
+
+
+def test_no_two_terms_are_the_same_function():
+    q = np.random.default_rng(2).uniform(-3.0, 3.0, size=(400, 6))
+    for basis in ("trigonometric", "angles"):
+        for joints in ((1,), (1, 2), (1, 2, 3)):
+            for degree in range(5):
+                made = terms(q, joints=joints, basis=basis, degree=degree)
+                assert made.shape[1] == len(Basis(joints, basis, degree))
+                assert np.linalg.matrix_rank(made) == made.shape[1]
+
+
+@given(configurations, st.sampled_from(["trigonometric", "angles"]), st.integers(0, 4))
+def test_the_fast_evaluation_equals_the_design_matrix_times_the_coefficients(q, basis, degree):
+    estimator, p = polynomial(basis, degree, centre=[0.1, -0.2, 0.3])
+    row = terms([q], joints=p["joints"], basis=basis, degree=degree, centre=[0.1, -0.2, 0.3])[0]
+    f_d, zeta = row @ p["f_d_coefficients"], row @ p["zeta_coefficients"]
+    if 150.0 < f_d < 850.0 and 0.1 < zeta < 0.89:
+        made = estimator.estimate(np.array(q))
+        assert made[0][0] == pytest.approx(f_d, rel=1e-11)
+        assert made[1][0] == pytest.approx(zeta, rel=1e-11)
+        assert not estimator.saturating
+
+
+@given(configurations, st.sampled_from([1, 2, 3]))
+def test_a_trigonometric_estimate_is_periodic_in_every_joint(q, joint):
+    estimator, _ = polynomial(degree=3, centre=[0.1, -0.2, 0.3])
+    turned = np.array(q)
+    turned[joint] += 2.0 * np.pi
+    for here, there in zip(estimator.estimate(np.array(q)), estimator.estimate(turned), strict=True):
+        np.testing.assert_allclose(here, there, rtol=1e-12)
+
+
+def test_a_fit_with_the_terms_gives_back_the_estimator():
+    estimator, p = polynomial(degree=2)
+    q = np.random.default_rng(3).uniform(-3.0, 3.0, size=(60, 6))
+    measured = np.array([np.concatenate(estimator.estimate(row)) for row in q])
+    matrix = terms(q, joints=p["joints"], basis="trigonometric", degree=2)
+    fitted = np.linalg.lstsq(matrix, measured)[0]
+    np.testing.assert_allclose(fitted[:, 0], p["f_d_coefficients"], atol=1e-9)
+    np.testing.assert_allclose(fitted[:, 1], p["zeta_coefficients"], atol=1e-12)
+
+
+def ramp(**changes):
+    """f_d = q in [Hz], ζ = 0.3, held in 6 to 15 Hz."""
+    parameters = {"f_d_range": (6.0, 15.0), "zeta_range": (0.05, 0.5)} | changes
+    return Polynomial(
+        joints=[0],
+        basis="angles",
+        degree=1,
+        f_d_coefficients=[0, 1],
+        zeta_coefficients=[0.3, 0],
+        **parameters,
+    )
+
+
+@given(st.floats(-1e6, 1e6))
+def test_an_estimate_never_leaves_its_range_and_says_when_it_would_have(q):
+    estimator = ramp()
+    f_d, _ = estimator.estimate(np.array([q]))
+    assert estimator.f_d_min == 6.0 <= f_d[0] <= 15.0
+    assert estimator.zeta_max == 0.5
+    assert estimator.saturating == (not 6.0 <= q <= 15.0)
+
+
+@given(st.floats(6.0, 15.0))
+def test_well_inside_the_range_an_estimate_is_left_alone(q):
+    bent = 9.0 * MARGIN
+    f_d = ramp().estimate(np.array([q]))[0][0]
+    assert (f_d == q) == (6.0 + bent <= q <= 15.0 - bent)
+
+
+def test_the_saturation_has_two_derivatives_without_a_jump():
+    x = np.linspace(4.0, 17.0, 130001)
+    step = x[1] - x[0]
+    y = np.array([saturate(value, 6.0, 15.0) for value in x])
+    slope = np.diff(y) / step
+    curvature = np.diff(slope) / step
+    width = 9.0 * MARGIN
+    assert np.abs(np.diff(slope)).max() < 2.0 * step / width
+    assert np.abs(np.diff(curvature)).max() < 10.0 * step / width**2 + 1e-6
+    assert slope.min() >= -1e-9
+    assert slope.max() <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("changes", "field"),
+    [
+        ({"joints": ()}, "joints"),
+        ({"joints": (1, 1)}, "joints"),
+        ({"joints": (-1,)}, "joints"),
+        ({"joints": (7,)}, "joints"),
+        ({"basis": "splines"}, "basis"),
+        ({"degree": -1}, "degree"),
+        ({"degree": 1.5}, "degree"),
+        ({"degree": 10**9}, "degree"),
+        ({"degree": 30}, "degree"),
+        ({"centre": [0.0]}, "centre"),
+        ({"centre": [0.0, math.nan, 0.0]}, "centre"),
+        ({"scale": [1.0, 1.0, 0.0], "basis": "angles"}, "scale"),
+        ({"scale": [1.0, 1.0, 2.0]}, "scale"),
+        ({"f_d_coefficients": [10.0]}, "f_d_coefficients"),
+        ({"zeta_coefficients": [math.nan] * 25}, "zeta_coefficients"),
+        ({"f_d_range": (6.0,)}, "f_d_range"),
+        ({"f_d_range": (15.0, 6.0)}, "f_d_range"),
+        ({"f_d_range": (0.0, 6.0)}, "f_d_range"),
+        ({"f_d_range": (6.0, math.inf)}, "f_d_range"),
+        ({"zeta_range": (-0.1, 0.3)}, "zeta_range"),
+        ({"zeta_range": (0.1, 1.0)}, "zeta_range"),
+    ],
+)
+def test_bad_parameters_are_refused_by_name(changes, field):
+    with pytest.raises(EstimatorError, match=f"^{field} is") as error:
+        polynomial(**changes) if not changes.keys() & {"joints", "basis", "degree"} else Polynomial(
+            **polynomial()[1] | changes
+        )
+    assert error.value.field == field
+
+
+def test_a_configuration_with_too_few_joints_is_refused():
+    estimator, p = polynomial()
+    with pytest.raises(EstimatorError, match="q is"):
+        estimator.estimate(np.zeros(3))
+    for q in (np.zeros((2, 3)), np.zeros(6)):
+        with pytest.raises(EstimatorError, match="q is"):
+            terms(q, joints=p["joints"], basis="trigonometric", degree=2)
+
+
+@given(configurations, st.sampled_from(["trigonometric", "angles"]))
+def test_the_compiled_kernels_equal_their_python_source(q, basis):
+    random = np.random.default_rng(5)
+    b = Basis((1, 2, 3), basis, 3)
+    arguments = (
+        np.array(q),
+        np.array(b.joints),
+        basis == "trigonometric",
+        random.normal(size=3),
+        np.ones(3),
+        b.multiples(),
+        random.normal(size=(2, len(b))),
+        np.array([[-5.0, 5.0], [-1.0, 1.0]]),
+    )
+    compiled, plain = evaluate(*arguments), evaluate.py_func(*arguments)
+    assert compiled[:2] == pytest.approx(plain[:2], rel=0, abs=1e-13)
+    assert compiled[2] == plain[2]
+    assert saturate(q[0], -5.0, 5.0) == saturate.py_func(q[0], -5.0, 5.0)
+
+
+def test_an_estimator_prints_its_parameters():
+    assert repr(Fixed([6.7], [0.34])) == "Fixed(f_d=[6.7], zeta=[0.34])"
+    assert "f_d_range=(6.0, 15.0)" in repr(ramp())
