@@ -38,7 +38,9 @@ class CalibrationInfo(Struct, frozen=True, kw_only=True, gc=False):
     seed: int | None
     """Seed of the simulation it was made in; null: a real arm's, or unknown."""
     f_d_range: tuple[float, float]
-    """Smallest and largest damped frequency it gives [Hz]."""
+    """Smallest and largest damped frequency measured over the workspace [Hz]."""
+    zeta_range: tuple[float, float]
+    """Smallest and largest damping ratio measured over the workspace [-]."""
 
 
 class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=False):

@@ -1,0 +1,39 @@
+"""Gather what a robot publishes, from a client."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from tvist_client.robot import Robot
+from tvist_protocol.stream import Event, State, Truth
+
+from tvist_lab.recordings import Recording
+
+
+@dataclass
+class Collected:
+    """States, events and truths in the order of their arrival."""
+
+    states: list[State] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    truths: list[Truth] = field(default_factory=list)
+
+    def recording(self) -> Recording:
+        """As columns."""
+        return Recording.from_states(self.states, self.events, self.truths)
+
+
+@contextmanager
+def collect(robot: Robot) -> Iterator[Collected]:
+    """Everything the robot publishes while the block runs."""
+    collected = Collected()
+    ends = [
+        robot.on_state(collected.states.append),
+        robot.on_event(collected.events.append),
+        robot.on_truth(collected.truths.append),
+    ]
+    try:
+        yield collected
+    finally:
+        for end in ends:
+            end()

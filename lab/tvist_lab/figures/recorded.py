@@ -1,0 +1,127 @@
+"""Figures 12 to 14: everything recorded of a motion, unshaped and shaped on one clock."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
+
+from tvist_lab.figures.style import FAINT, MUTED, SHAPED, UNSHAPED, legend, note, panels, title
+from tvist_lab.metrics.motion import Motion
+from tvist_lab.metrics.settling import REPEATABILITY, distance
+from tvist_lab.metrics.vibration import amplitude, tool_acceleration
+from tvist_lab.recordings import Floats, Recording
+
+LEAD = 0.1
+"""Time shown before the reference starts [s]."""
+REST = 1.0
+"""Time shown after the shaped reference has stopped [s]."""
+NEAR = 0.15
+"""Largest distance to the attained position on the axis [mm]: five times the repeatability."""
+
+Recorded = tuple[Recording, Motion]
+"""A recording and one of its motions."""
+
+
+def motion_figure(name: str, unshaped: Recorded, shaped: Recorded) -> Figure:
+    """Accelerations of the reference, E, |α|, and the mode the shaper works with, against time.
+
+    Time is zero where the reference starts.
+
+    Args:
+        name: Of the motion, as heading.
+        unshaped: The motion without shaping.
+        shaped: The same with shaping.
+
+    Raises:
+        NotMeasurableError: The attained position cannot be told: too little rest was recorded.
+    """
+    figure, axes = panels(5, 8.6, ratios=(1.25, 1, 1.25, 0.85, 0.85))
+    for recorded, color, label in ((unshaped, UNSHAPED, "Unshaped"), (shaped, SHAPED, "Shaped")):
+        _draw(axes, recorded, color, label)
+    accelerations, errors, alphas, frequencies, dampings = axes
+    _name_joints(accelerations, unshaped)
+    title(accelerations, name)
+    errors.axhline(1e3 * REPEATABILITY, color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)))
+    note(
+        errors,
+        "repeatability",
+        (1.0, 1e3 * REPEATABILITY),
+        xycoords=("axes fraction", "data"),
+        xytext=(-2, 2),
+        textcoords="offset points",
+        ha="right",
+        color=MUTED,
+    )
+    accelerations.set_ylabel(r"$\ddot q^*$ (rad/s$^2$)")
+    errors.set(ylabel=r"$E$ (mm)", ylim=(0.0, NEAR), yticks=np.linspace(0.0, NEAR, 4))
+    alphas.set_ylabel(r"$|\alpha|$ (m/s$^2$)")
+    alphas.set_ylim(bottom=0.0)
+    frequencies.set_ylabel(r"Estimated $f_d$ (Hz)")
+    _grow(frequencies, 5.0, 16.0)
+    frequencies.yaxis.set_major_locator(MultipleLocator(5.0))
+    dampings.set_ylabel(r"Estimated $\zeta$ (–)")
+    _grow(dampings, 0.1, 0.4)
+    dampings.set_xlabel("Time (s)")
+    ends = [recording.time[m.shaped_stop] - recording.time[m.start] for recording, m in (unshaped, shaped)]
+    dampings.set_xlim(-LEAD, max(ends) + REST)
+    legend(figure, accelerations)
+    return figure
+
+
+def _draw(axes: list[Axes], recorded: Recorded, color: str, label: str) -> None:
+    """One recording into the five panels."""
+    recording, motion = recorded
+    start = recording.time[motion.start]
+    first = int(np.searchsorted(recording.time, start - LEAD))
+    past = min(
+        int(np.searchsorted(recording.time, recording.time[motion.shaped_stop] + REST)) + 1, motion.end
+    )
+    rows = slice(first, past)
+    time = recording.time[rows] - start
+    accelerations, errors, alphas, frequencies, dampings = axes
+    how: dict[str, Any] = {"color": color, "linewidth": 1.1, "alpha": 0.9}
+    for joint, qdd in enumerate(recording["target_qdd"][rows].T):
+        accelerations.plot(time, qdd, label=label if joint == 0 else None, **how)
+    E = distance(recording, motion)
+    errors.plot(recording.time[motion.start : motion.end] - start, 1e3 * E, **how)
+    alphas.plot(time, amplitude(tool_acceleration(recording))[rows], **{**how, "linewidth": 0.8})
+    for panel, column in ((frequencies, "estimated_f_d"), (dampings, "estimated_zeta")):
+        for values in recording[column][rows].T:
+            panel.plot(time, values, **{**how, "linewidth": 1.5})
+
+
+def _name_joints(panel: Axes, recorded: Recorded) -> None:
+    """Names of joints beside their accelerations; joints that move alike share a line and its words."""
+    recording, motion = recorded
+    qdd = recording["target_qdd"][motion.start : motion.shaped_stop + 2]
+    largest = float(np.max(np.abs(qdd)))
+    groups: list[tuple[Floats, list[int]]] = []
+    for joint, values in enumerate(qdd.T):
+        for other, joints in groups:
+            if np.max(np.abs(values - other)) < 0.02 * largest:
+                joints.append(joint)
+                break
+        else:
+            groups.append((values, [joint]))
+    plateau = int(np.argmax(np.max(np.abs(qdd), axis=1) > 0.98 * largest))
+    length = float(recording.time[motion.shaped_stop] - recording.time[motion.start])
+    at = float(recording.time[motion.start + plateau] - recording.time[motion.start]) + 0.05 * length
+    for values, joints in groups:
+        words = ", ".join(rf"$\ddot q^*_{joint}$" for joint in joints)
+        height = float(values[plateau])
+        note(
+            panel,
+            words,
+            (at, height),
+            xytext=(0, -3 if height > 0 else 3),
+            textcoords="offset points",
+            va="top" if height > 0.0 else "bottom",
+        )
+
+
+def _grow(panel: Axes, low: float, high: float) -> None:
+    """An axis that holds a range and all that is drawn."""
+    bottom, top = panel.get_ylim()
+    panel.set_ylim(min(bottom, low), max(top, high))

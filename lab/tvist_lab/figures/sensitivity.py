@@ -1,0 +1,67 @@
+"""Figure 4: why one fixed shaper cannot serve the whole workspace."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import tvist_shaping
+from tvist_lab.figures.style import FAINT, INK, MUTED, SHAPED, THIRD, UNSHAPED, legend, note, panels
+
+DESIGN = 10.5
+"""Middle of the workspace's span [Hz]."""
+SPAN = (6.0, 15.0)
+"""Of the first mode's damped frequency over the UR5e's workspace with 5 kg [Hz]."""
+SHOWN = (5.5, 16.0)
+"""Frequencies on the axis [Hz]."""
+
+
+def figure_4(
+    design: float = DESIGN,
+    span: tuple[float, float] = SPAN,
+    shapers: Mapping[str, tvist_shaping.Impulses] | None = None,
+) -> Figure:
+    """Residual vibration of ZV, ZVD and EI, undamped, over the true frequency.
+
+    Args:
+        design: Frequency the shapers are made for [Hz].
+        span: Frequencies of the mode over the workspace [Hz].
+        shapers: Name to impulses; None shows the paper's three.
+    """
+    if shapers is None:
+        shapers = {
+            "ZV": tvist_shaping.zv(design, 0.0),
+            "ZVD": tvist_shaping.zvd(design, 0.0),
+            "EI 5 %": tvist_shaping.ei(design, 0.0),
+        }
+    figure, (panel,) = panels(1, 3.4)
+    f = np.linspace(*SHOWN, 1051)
+    styles = [(UNSHAPED, "-"), (THIRD, "--"), (SHAPED, "-"), (FAINT, "-."), (INK, ":")]
+    worst = np.inf
+    panel.axvspan(*span, color=FAINT, alpha=0.12, linewidth=0.0)
+    for index, (name, impulses) in enumerate(shapers.items()):
+        color, dashes = styles[index % len(styles)]
+        residual = 100.0 * tvist_shaping.residual(f, 0.0, impulses)
+        panel.plot(f, residual, color=color, linestyle=dashes, linewidth=1.8, label=name)
+        worst = min(worst, 100.0 * float(np.max(tvist_shaping.residual(np.array(span), 0.0, impulses))))
+    panel.axhline(worst, color=INK, linewidth=0.8, linestyle=(0, (4, 3)))
+    note(
+        panel,
+        f"{worst:.1f} %: what the least sensitive leaves at the ends of the span",
+        (design, worst),
+        xytext=(0, 6),
+        textcoords="offset points",
+        ha="center",
+        va="bottom",
+    )
+    note(
+        panel,
+        f"first mode over the workspace, {span[0]:g} to {span[1]:g} Hz",
+        (design, 71.0),
+        ha="center",
+        va="top",
+        color=MUTED,
+    )
+    panel.set(xlim=SHOWN, ylim=(0.0, 72.0), xlabel="Frequency (Hz)", ylabel="Residual vibration (%)")
+    legend(figure, panel)
+    return figure

@@ -1,0 +1,96 @@
+"""Two multivariate polynomials through measured (f_d, ζ)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from tvist_protocol.calibration import PolynomialModel, Spread
+from tvist_shaping import terms
+
+from tvist_lab.recordings import Floats
+
+BASIS = "trigonometric"
+"""Polynomials in the sines and cosines of the joint angles: they repeat with every turn and never run away."""
+FOLDS = 10
+"""Parts the measurements are cut into for cross-validation."""
+
+
+class FitError(ValueError):
+    """The measurements do not carry a model; the sentence says what to do."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model and how far measurements lie from it."""
+
+    model: PolynomialModel
+    residual_f_d: Spread
+    residual_zeta: Spread
+    cross_validated_f_d: Spread
+    """Each measurement judged by a fit that did not see it."""
+    cross_validated_zeta: Spread
+    unseen_f_d: Floats
+    """What fits that did not see a measurement say of it, shape (N,) [Hz]."""
+    unseen_zeta: Floats
+    """[-]."""
+
+
+def fit_polynomials(
+    q: Floats, f_d: Floats, zeta: Floats, weights: Floats, *, joints: tuple[int, ...], degree: int
+) -> Fit:
+    """Weighted least squares of the relative deviation.
+
+    Args:
+        q: Configurations, shape (N, n) [rad].
+        f_d: Measured there, shape (N,) [Hz].
+        zeta: Measured there, shape (N,) [-].
+        weights: Of each, shape (N,) [-].
+        joints: Joints the modes depend on.
+        degree: Highest total degree.
+
+    Raises:
+        FitError: There are fewer measurements than one and a half times the coefficients.
+    """
+    design = terms(q, joints=joints, basis=BASIS, degree=degree)
+    count, size = design.shape
+    if count < 1.5 * size:
+        raise FitError(
+            f"{count} usable ring-downs for {size} coefficients: at least {int(1.5 * size) + 1} are needed; "
+            "measure more configurations or lower the degree"
+        )
+    coefficients = [_solve(design, y, weights) for y in (f_d, zeta)]
+    fold = np.arange(count) % FOLDS
+    unseen = np.empty((2, count))
+    for part in range(FOLDS):
+        seen = fold != part
+        for row, y in zip(unseen, (f_d, zeta), strict=True):
+            row[~seen] = design[~seen] @ _solve(design[seen], y[seen], weights[seen])
+    model = PolynomialModel(
+        joints=joints,
+        basis=BASIS,
+        degree=degree,
+        f_d_coefficients=tuple(coefficients[0].tolist()),
+        zeta_coefficients=tuple(coefficients[1].tolist()),
+        f_d_range=(0.7 * float(f_d.min()), 1.25 * float(f_d.max())),
+        zeta_range=(0.3 * float(zeta.min()), min(1.4 * float(zeta.max()), 0.95)),
+    )
+    return Fit(
+        model=model,
+        residual_f_d=spread(design @ coefficients[0], f_d),
+        residual_zeta=spread(design @ coefficients[1], zeta),
+        cross_validated_f_d=spread(unseen[0], f_d),
+        cross_validated_zeta=spread(unseen[1], zeta),
+        unseen_f_d=unseen[0],
+        unseen_zeta=unseen[1],
+    )
+
+
+def spread(estimated: Floats, true: Floats) -> Spread:
+    """Median and 90th percentile of the relative deviation [%]."""
+    median, p90 = np.percentile(100.0 * np.abs(estimated / true - 1.0), (50, 90))
+    return Spread(median=float(median), p90=float(p90))
+
+
+def _solve(design: Floats, y: Floats, weights: Floats) -> Floats:
+    scale = np.sqrt(weights) / y
+    solution, *_ = np.linalg.lstsq(design * scale[:, None], y * scale)
+    return np.asarray(solution)

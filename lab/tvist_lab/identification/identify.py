@@ -1,0 +1,166 @@
+"""From ring-downs all over the workspace to a calibration."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+
+import numpy as np
+from tvist_client.errors import ClientError
+from tvist_client.robot import Arm, Robot
+from tvist_protocol.calibration import Calibration, Provenance, Spread
+from tvist_protocol.errors import RefusedError
+from tvist_protocol.info import Info
+
+from tvist_lab.collect import collect
+from tvist_lab.identification.fit import Fit, fit_polynomials, spread
+from tvist_lab.identification.ring_downs import Jog, measure
+from tvist_lab.recordings import Floats
+from tvist_lab.workspace import IDENTIFIED
+
+CONFIGURATIONS = 160
+REPEATS = 3
+DEGREE = 2
+ANCHOR_WEIGHT = 6.0
+"""Weight of a pose the user names, against one of a configuration spread over the workspace [-]."""
+
+Progress = Callable[[int, int], None]
+
+
+class IdentificationError(ClientError):
+    """The robot could not be identified; the sentence says what to do."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to measure."""
+
+    configurations: int = CONFIGURATIONS
+    """Configurations spread over the workspace."""
+    anchors: tuple[tuple[float, ...], ...] = ()
+    """Further ones that matter more, where the robot is going to work [rad]."""
+    repeats: int = REPEATS
+    """Jogs averaged at each."""
+    degree: int = DEGREE
+    """Of the polynomials."""
+    seed: int = 0
+    """Of the spread."""
+    jog: Jog = Jog()
+
+
+@dataclass(frozen=True)
+class Identification:
+    """A calibration and what it was checked against."""
+
+    calibration: Calibration
+    q: Floats
+    """Configurations measured, shape (N, n) [rad]."""
+    f_d: Floats
+    """Measured, shape (N,) [Hz]."""
+    zeta: Floats
+    """Measured, shape (N,) [-]."""
+    true_f_d: Floats | None
+    """Lowest true mode at each, where the robot tells the truth, shape (N,) [Hz]."""
+    true_zeta: Floats | None
+    """[-]."""
+    against: str
+    """What the errors below are against: the truth, or measurements that a fit did not see."""
+    error_f_d: Spread
+    """Of the calibration [%]."""
+    error_zeta: Spread
+    """Of the calibration [%]."""
+
+
+async def identify(
+    robot: Robot, arm: Arm, plan: Plan, *, name: str, command: str, progress: Progress = lambda done, all_: None
+) -> Identification:
+    """Identify a robot as section 3.3 of the paper does, as a client.
+
+    Args:
+        robot: The robot, on a network or in process.
+        arm: Control of it.
+        plan: What to measure.
+        name: Of the calibration.
+        command: What the user typed, for the calibration's provenance.
+        progress: Told of each configuration done.
+
+    Raises:
+        IdentificationError: Too few ring-downs could be used.
+    """
+    info = await robot.info()
+    await arm.set_shaper("none")
+    q, weights = _configurations(plan, len(info.joints))
+    kept, values, truths = [], [], []
+    rejected = 0
+    for number, configuration in enumerate(q):
+        try:
+            ring = await measure(robot, arm, configuration, plan.jog, plan.repeats)
+        except RefusedError as error:
+            if error.reply.code != "collision":
+                raise
+            ring = None
+        if ring is not None and ring.ok:
+            kept.append(number)
+            values.append((ring.f_d, ring.zeta))
+            truths.append(await _true_mode(robot))
+        else:
+            rejected += 1
+        progress(number + 1, len(q))
+    if not kept:
+        raise IdentificationError("no ring-down could be fitted: does the arm move, and is its accelerometer read?")
+    f_d, zeta = np.array(values).T
+    q, weights = q[kept], weights[kept]
+    joints = tuple(j for j in (1, 2, 3) if j < len(info.joints)) or (0,)
+    fit = fit_polynomials(q, f_d, zeta, weights, joints=joints, degree=plan.degree)
+    calibration = _calibration(info, plan, fit, f_d, zeta, rejected, name=name, command=command)
+    if any(truth is None for truth in truths):
+        return Identification(
+            calibration, q, f_d, zeta, None, None,
+            "measurements that a fit did not see", fit.cross_validated_f_d, fit.cross_validated_zeta,
+        )  # fmt: skip
+    true_f_d, true_zeta = np.array(truths, dtype=float).T
+    return Identification(
+        calibration, q, f_d, zeta, true_f_d, true_zeta,
+        "the arm's true lowest mode, by fits that did not see the configuration",
+        spread(fit.unseen_f_d, true_f_d), spread(fit.unseen_zeta, true_zeta),
+    )  # fmt: skip
+
+
+def _configurations(plan: Plan, joints: int) -> tuple[Floats, Floats]:
+    spread_out = IDENTIFIED.spread(plan.configurations, joints, plan.seed)
+    if not plan.anchors:
+        return spread_out, np.ones(len(spread_out))
+    anchors = np.array(plan.anchors, dtype=float)
+    weights = np.concatenate([np.full(len(anchors), ANCHOR_WEIGHT), np.ones(len(spread_out))])
+    return np.concatenate([anchors, spread_out]), weights
+
+
+async def _true_mode(robot: Robot) -> tuple[float, float] | None:
+    """The lowest true mode, where the robot tells it: at rest for longer than it takes to be computed anew."""
+    with collect(robot) as collected:
+        await robot.advance(60)
+    return (collected.truths[-1].f_d[0], collected.truths[-1].zeta[0]) if collected.truths else None
+
+
+def _calibration(
+    info: Info, plan: Plan, fit: Fit, f_d: Floats, zeta: Floats, rejected: int, *, name: str, command: str
+) -> Calibration:
+    return Calibration(
+        name=name,
+        robot=info.model,
+        payload=info.payload,
+        polynomial=fit.model,
+        provenance=Provenance(
+            command=command,
+            version=version("tvist"),
+            seed=plan.seed,
+            configurations=len(f_d),
+            ring_downs=len(f_d) * plan.repeats,
+            rejected=rejected,
+            measured_f_d_range=(float(f_d.min()), float(f_d.max())),
+            measured_zeta_range=(float(zeta.min()), float(zeta.max())),
+            residual_f_d_percent=fit.residual_f_d,
+            residual_zeta_percent=fit.residual_zeta,
+            cross_validated_f_d_percent=fit.cross_validated_f_d,
+            cross_validated_zeta_percent=fit.cross_validated_zeta,
+        ),
+    )

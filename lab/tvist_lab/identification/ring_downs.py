@@ -1,0 +1,63 @@
+"""Make the arm ring at a configuration and listen."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from tvist_client.robot import Arm, Robot
+
+from tvist_lab.collect import collect
+from tvist_lab.metrics import RingDown, fit_ring_down, motions, tool_acceleration
+from tvist_lab.recordings import Floats
+
+LISTEN = 0.6
+"""Time the arm is listened to after a jog [s]."""
+PAUSE = 0.3
+"""Time it rests before the next [s]."""
+MODES = 2
+"""Modes that are fitted together; the strongest is taken."""
+
+
+@dataclass(frozen=True)
+class Jog:
+    """A short move that ends where the arm is to ring, with all big joints at once: it stirs every mode there is."""
+
+    length: float = 0.06
+    """Of the fastest joint [rad]."""
+    shares: tuple[float, ...] = (0.6, 0.6, 1.0)
+    """Of the joints from the base on [-]."""
+
+    def of(self, joints: int) -> Floats:
+        """Joint displacement, shape (joints,) [rad]."""
+        jog = np.zeros(joints)
+        used = min(joints, len(self.shares))
+        jog[:used] = self.length * np.array(self.shares[:used])
+        return jog
+
+
+async def measure(robot: Robot, arm: Arm, q: Floats, jog: Jog, repeats: int) -> RingDown:
+    """(f_d, ζ) of the mode that rings most after a jog to a configuration.
+
+    Equal jogs ring alike, so their accelerations are averaged before the fit.
+
+    Args:
+        robot: The robot.
+        arm: Control of it; its shaper must be `none`.
+        q: Configuration, shape (n,) [rad].
+        jog: The move that makes it ring.
+        repeats: Jogs to average.
+    """
+    start = q - jog.of(len(q))
+    period = 1.0 / (await robot.info()).rate_hz
+    rings = []
+    for _ in range(repeats):
+        await arm.move_j(start)
+        await robot.advance(round(PAUSE / period))
+        with collect(robot) as collected:
+            await robot.advance(1)
+            await arm.move_j(q)
+            await robot.advance(round(LISTEN / period))
+        recording = collected.recording()
+        stop = motions(recording)[0].shaped_stop
+        rings.append(tool_acceleration(recording)[stop : stop + round(LISTEN / period)])
+    length = min(map(len, rings))
+    return fit_ring_down(np.mean([ring[:length] for ring in rings], axis=0), period, modes=MODES)

@@ -1,0 +1,30 @@
+"""A robot in this process, as fast as it computes, behind the same client as one on the network."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from tvist_client.robot import Robot
+from tvist_client.transports.loopback import LoopbackTransport
+from tvist_server.config import ServeConfig
+from tvist_server.gateways.loopback import LoopbackHost
+from tvist_server.setup import Setup
+
+
+def free_setup(config: ServeConfig | None = None, **changes: object) -> Setup:
+    """The default robot with a free clock and its truth told, or another one.
+
+    Args:
+        config: How it would be served.
+        changes: Fields of `ServeConfig` to change.
+    """
+    from tvist_server.config import from_mapping
+
+    base = config or from_mapping({"clock": "free", "truth": True, **changes}, "setup")
+    return base.setup()
+
+
+@asynccontextmanager
+async def robot_in_process(setup: Setup) -> AsyncIterator[Robot]:
+    """A client of a robot in this process."""
+    async with Robot.over(LoopbackTransport(LoopbackHost(setup))) as robot:
+        yield robot

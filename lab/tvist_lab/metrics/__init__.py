@@ -1,0 +1,56 @@
+"""What is measured of a recording: the paper's metrics, and those on a common clock."""
+
+from tvist_lab.metrics.common_clock import (
+    CommonClock,
+    common_clock,
+    envelope,
+    in_motion_rms,
+    peak_acceleration,
+    peak_after_stop,
+    peak_velocity,
+    rigid_acceleration,
+    still_after,
+)
+from tvist_lab.metrics.errors import NotMeasurableError
+from tvist_lab.metrics.motion import Motion, motions
+from tvist_lab.metrics.residual import ModalResidual, Residual, residual, residual_by_modes
+from tvist_lab.metrics.ring_down import SLOW_POLE, RingDown, fit_ring_down
+from tvist_lab.metrics.settling import Settling, attained_position, distance, settling
+from tvist_lab.metrics.table import MotionResult, Runs, Table, analyze, measure, table_2, table_notes
+from tvist_lab.metrics.vibration import amplitude, best_tool_acceleration, tool_acceleration
+
+__all__ = [
+    "SLOW_POLE",
+    "CommonClock",
+    "ModalResidual",
+    "Motion",
+    "MotionResult",
+    "NotMeasurableError",
+    "Residual",
+    "RingDown",
+    "Runs",
+    "Settling",
+    "Table",
+    "amplitude",
+    "analyze",
+    "attained_position",
+    "best_tool_acceleration",
+    "common_clock",
+    "distance",
+    "envelope",
+    "fit_ring_down",
+    "in_motion_rms",
+    "measure",
+    "motions",
+    "peak_acceleration",
+    "peak_after_stop",
+    "peak_velocity",
+    "residual",
+    "residual_by_modes",
+    "rigid_acceleration",
+    "settling",
+    "still_after",
+    "table_2",
+    "table_notes",
+    "tool_acceleration",
+]

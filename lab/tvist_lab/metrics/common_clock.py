@@ -1,0 +1,160 @@
+"""Metrics on a common clock: every shaper is judged from the start of the reference before shaping."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import hilbert
+
+from tvist_lab.metrics.errors import NotMeasurableError
+from tvist_lab.metrics.motion import DIFFERENTIATOR_TICKS, Motion
+from tvist_lab.metrics.vibration import amplitude, band_pass, best_tool_acceleration, tool_acceleration
+from tvist_lab.recordings import Floats, Recording
+
+STILL = 0.1
+"""An arm whose |α| stays below this is still [m/s²]."""
+AFTER_STOP = 0.010
+"""From this long after the stop on, `evaluate` takes the peak [s]: the last ramp has passed."""
+
+Kinematics = Callable[[Floats], tuple[Floats, Floats]]
+"""Joint angles of shape (n,) [rad] to the flange's position, shape (3,) [m], and rotation, shape (3, 3)."""
+
+
+@dataclass(frozen=True)
+class CommonClock:
+    """One motion on the common clock."""
+
+    still_after: float
+    """Last time |α| exceeds 0.1 m/s², from the start of the reference before shaping [s]."""
+    peak: float
+    """Largest |α| after that reference's stop plus the declared delay [m/s²]."""
+    envelope: float
+    """Largest envelope of α within 3 to 60 Hz after the same moment [m/s²]."""
+    in_motion: float
+    """Vibration during the motion: rms of |α - rigid motion| [m/s²]; NaN where no kinematics were given."""
+    peak_acceleration: float
+    """Largest |q̈*| of any joint [rad/s²]."""
+
+
+def common_clock(recording: Recording, motion: Motion, kinematics: Kinematics | None = None) -> CommonClock:
+    """All metrics of a motion on the common clock, from the truth channel where there is one.
+
+    Raises:
+        NotMeasurableError: The arm was not still when the rest ended.
+    """
+    after = _after_declared_stop(recording, motion)
+    alpha = best_tool_acceleration(recording)
+    return CommonClock(
+        still_after=still_after(recording, motion),
+        peak=float(np.max(amplitude(alpha[after]))),
+        envelope=float(np.max(envelope(alpha[after], recording.period))),
+        in_motion=float("nan") if kinematics is None else in_motion_rms(recording, motion, kinematics),
+        peak_acceleration=peak_acceleration(recording, motion),
+    )
+
+
+def still_after(recording: Recording, motion: Motion, threshold: float = STILL) -> float:
+    """Last time |α| exceeds a threshold [m/s²], from the start of the reference before shaping [s].
+
+    Taken on the truth channel; where there is none, on the sensor below 60 Hz.
+
+    Raises:
+        NotMeasurableError: |α| still exceeds it when the recording ends or the next motion starts.
+    """
+    alpha = amplitude(best_tool_acceleration(recording)[motion.start : motion.end])
+    loud = np.flatnonzero(alpha > threshold)
+    if not loud.size:
+        return 0.0
+    if loud[-1] == len(alpha) - 1:
+        raise NotMeasurableError(f"|α| still exceeded {threshold:g} m/s² when the rest ended")
+    return float(recording.time[motion.start + loud[-1]] - recording.time[motion.start])
+
+
+def peak_after_stop(recording: Recording, motion: Motion, after: float = AFTER_STOP) -> float:
+    """`evaluate`'s peak: largest |α| later than 10 ms after the shaped reference stops [m/s²], true.
+
+    Raises:
+        RecordingError: Truth was not recorded.
+        NotMeasurableError: Nothing was recorded after that moment.
+    """
+    rows = _later_than(recording, motion, recording.time[motion.shaped_stop] + after)
+    return float(np.max(amplitude(tool_acceleration(recording, truth=True)[rows])))
+
+
+def peak_acceleration(recording: Recording, motion: Motion) -> float:
+    """Largest |q̈*| of any joint during the motion [rad/s²]."""
+    return float(np.max(np.abs(recording["target_qdd"][motion.start : motion.shaped_stop + 2])))
+
+
+def peak_velocity(recording: Recording, motion: Motion) -> float:
+    """Largest |q̇*| of any joint during the motion [rad/s]."""
+    return float(np.max(np.abs(recording["target_qd"][motion.start : motion.shaped_stop + 2])))
+
+
+def envelope(alpha: Floats, period: float) -> Floats:
+    """Envelope of a ring-down within 3 to 60 Hz [m/s²]: the length of its three axes' analytic signals.
+
+    The ring-down is mirrored at both ends before it is filtered, so that nothing of the motion before it
+    leaks in. A filter needs cycles to judge by: at ζ = 0.03 the peak is 90 to 100 % of the amplitude, at ζ =
+    0.34 it is 40 to 85 %, by phase.
+
+    Args:
+        alpha: Acceleration of the tool from the moment in question on, shape (T, 3) [m/s²].
+        period: Between samples [s].
+
+    Returns:
+        Shape (T,).
+    """
+    rows = len(alpha)
+    mirrored = np.concatenate([alpha[:0:-1], alpha, alpha[-2::-1]])
+    analytic = hilbert(band_pass(mirrored, period), axis=0)
+    return np.asarray(np.linalg.norm(np.abs(analytic), axis=1)[rows - 1 : 2 * rows - 1], dtype=np.float64)
+
+
+def rigid_acceleration(recording: Recording, motion: Motion, kinematics: Kinematics) -> Floats:
+    """Acceleration a rigid arm's flange would have along the shaped reference, in its own frame [m/s²].
+
+    Second central difference of the position at `target_q`.
+
+    Returns:
+        Shape (N, 3), for the rows from the motion's start to its shaped stop.
+
+    Raises:
+        NotMeasurableError: Ticks are missing in the motion.
+    """
+    first, past = max(motion.start, 1), min(motion.shaped_stop + 1, len(recording) - 1)
+    ticks = recording["tick"][first - 1 : past + 1]
+    if np.any(np.diff(ticks) != 1.0):
+        raise NotMeasurableError("ticks are missing in the motion")
+    poses = [kinematics(q) for q in recording["target_q"][first - 1 : past + 1]]
+    position = np.array([pose[0] for pose in poses])
+    rotation = np.array([pose[1] for pose in poses])[1:-1]
+    world = (position[2:] - 2.0 * position[1:-1] + position[:-2]) / recording.period**2
+    return np.asarray(np.einsum("tji,tj->ti", rotation, world), dtype=np.float64)
+
+
+def in_motion_rms(recording: Recording, motion: Motion, kinematics: Kinematics) -> float:
+    """Vibration during the motion: rms of |α - α of the rigid arm| until the shaped reference stops [m/s²].
+
+    Raises:
+        NotMeasurableError: Ticks are missing in the motion.
+    """
+    rigid = rigid_acceleration(recording, motion, kinematics)
+    first = max(motion.start, 1)
+    alpha = best_tool_acceleration(recording)[first : first + len(rigid)]
+    return float(np.sqrt(np.mean(np.sum((alpha - rigid) ** 2, axis=1))))
+
+
+def _after_declared_stop(recording: Recording, motion: Motion) -> slice:
+    """Rows after the stop of the reference before shaping plus the delay its shaper declares then."""
+    delay = float(np.nan_to_num(recording["shaper_delay"][motion.reference_stop]))
+    published = DIFFERENTIATOR_TICKS * recording.period
+    return _later_than(recording, motion, recording.time[motion.reference_stop] + delay + published)
+
+
+def _later_than(recording: Recording, motion: Motion, moment: float) -> slice:
+    """The motion's rows later than a moment."""
+    first = int(np.searchsorted(recording.time, moment + 1e-9))
+    if first >= motion.end:
+        raise NotMeasurableError("nothing was recorded after the stop")
+    return slice(first, motion.end)

@@ -1,0 +1,116 @@
+"""Where the motions of a recording begin and end."""
+
+from dataclasses import dataclass, replace
+from itertools import zip_longest
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tvist_lab.recordings import Floats, Recording
+
+MOVING = 1e-7
+"""A reference that changes by more than this from one tick to the next moves [rad]."""
+JUMP = 0.05
+"""A reference that changes by more than this in a tick was put elsewhere, as by a reset [rad]: 25 rad/s."""
+REST = 0.02
+"""A reference at rest for less than this, as in a reversal, is still in the same motion [s]."""
+DIFFERENTIATOR_TICKS = 1
+"""The published target of tick i is the shaped reference of tick i-1: a central difference costs a tick."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One motion of the reference, as indices of rows of its recording."""
+
+    start: int
+    """Last row in which the reference is still where it starts."""
+    reference_stop: int
+    """Last row in which the reference before shaping moves by more than 1e-7 rad."""
+    shaped_stop: int
+    """Last row in which the published target, the shaped reference, moves by more than 1e-7 rad."""
+    end: int
+    """First row that is no longer this motion's: the next one's start, or the end of the recording."""
+    id: Any = None
+    """The motion's id, where events told of it."""
+    stopped: bool = False
+    """It was stopped before its target."""
+
+    def duration(self, recording: Recording) -> float:
+        """Duration of the reference before shaping [s]."""
+        return float(recording.time[self.reference_stop] - recording.time[self.start])
+
+    def shaped_duration(self, recording: Recording) -> float:
+        """Duration of the shaped reference [s].
+
+        A shaper's first impulse has no delay, so both begin together; the tick between shaper and publication
+        is none of the shaper's and is taken off.
+        """
+        published = recording.time[self.shaped_stop] - recording.time[self.start]
+        return float(published - DIFFERENTIATOR_TICKS * recording.period)
+
+    def delay(self, recording: Recording) -> float:
+        """Δ of the paper: shaped minus unshaped duration of the reference [s], never below zero."""
+        return max(self.shaped_duration(recording) - self.duration(recording), 0.0)
+
+
+def motions(recording: Recording) -> list[Motion]:
+    """The motions of a recording in order.
+
+    They come from the events `motion_started`, `motion_done` and `motion_stopped` where there are any, else
+    from the reference itself. A motion that goes nowhere is none.
+    """
+    if len(recording) < 2:
+        return []
+    step = _step_per_tick(recording, "reference_q")
+    moving = (step > MOVING) & (step <= JUMP)
+    spans = _spans_of_events(recording) or _spans_of_reference(recording, moving)
+    found: list[Motion] = []
+    for lo, hi, identifier, stopped in spans:
+        rows = lo + np.flatnonzero(moving[lo:hi])
+        if rows.size:
+            found.append(Motion(int(rows[0]) - 1, int(rows[-1]), 0, 0, identifier, stopped))
+    jumps = np.flatnonzero(step > JUMP)
+    target_moving = _step_per_tick(recording, "target_q") > MOVING
+    for index, motion in enumerate(found):
+        end = found[index + 1].start + 1 if index + 1 < len(found) else len(recording)
+        end = min([end, *jumps[jumps > motion.start]])
+        rows = motion.start + 1 + np.flatnonzero(target_moving[motion.start + 1 : end])
+        shaped_stop = int(rows[-1]) if rows.size else motion.reference_stop
+        found[index] = replace(motion, shaped_stop=shaped_stop, end=int(end))
+    return found
+
+
+def _step_per_tick(recording: Recording, name: str) -> Floats:
+    """How far the joint that moves most moves into each row, a tick [rad], shape (T,); zero for the first."""
+    step = np.max(np.abs(np.diff(recording[name], axis=0)), axis=1, initial=0.0)
+    return np.concatenate([[0.0], step / np.diff(recording["tick"])])
+
+
+def _spans_of_events(recording: Recording) -> list[tuple[int, int, Any, bool]]:
+    """Rows in which each started motion's reference can move, its id and whether it was stopped."""
+    started = [event for event in recording.events if event.kind == "motion_started"]
+    ended = {event.id: event for event in recording.events if event.kind in ("motion_done", "motion_stopped")}
+    spans = []
+    for event, following in zip_longest(started, started[1:]):
+        end = ended.get(event.id)
+        # The first tick that moves may be the event's own or the one after it; so may the last.
+        lo = max(recording.index(event.tick), 1)
+        hi = len(recording) if end is None else recording.index(end.tick + 2)
+        if following is not None:
+            hi = min(hi, max(recording.index(following.tick), lo))
+        spans.append((lo, hi, event.id, end is not None and end.kind == "motion_stopped"))
+    return spans
+
+
+def _spans_of_reference(recording: Recording, moving: NDArray[np.bool_]) -> list[tuple[int, int, Any, bool]]:
+    """Runs of rows in which the reference moves, joined where it rests only for a moment."""
+    rows = np.flatnonzero(moving)
+    if not rows.size:
+        return []
+    # Between two rows that move, the rows at rest count, not the time: ticks may be missing in a motion.
+    at_rest = recording.time[rows[1:] - 1] - recording.time[rows[:-1]]
+    breaks = np.flatnonzero(at_rest > REST - 0.5 * recording.period)
+    firsts = rows[np.concatenate([[0], breaks + 1])]
+    lasts = rows[np.concatenate([breaks, [rows.size - 1]])]
+    return [(int(first), int(last) + 1, None, False) for first, last in zip(firsts, lasts, strict=True)]

@@ -1,0 +1,234 @@
+"""(f_d, ζ) of the mode that rings after a stop, from the three axes of the tool's accelerometer."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from tvist_lab.recordings import Floats
+
+FREQUENCIES = (3.0, 45.0)
+"""Damped frequencies a mode is looked for in [Hz]."""
+DAMPING = (0.002, 0.7)
+"""Damping ratios a mode is looked for in [-]."""
+SLOW_POLE = 17.5
+"""Rate of the non-oscillatory tail a position loop adds [1/s]."""
+SKIP = 0.006
+"""Time after the stop that is left out [s]: the end of the deceleration ramp is no ring-down."""
+WINDOW = 0.5
+"""Time looked at first [s]."""
+LEAST_R_SQUARED = 0.2
+"""A fit that explains less of the signal's energy may be one of noise, of which it explains a tenth [-]."""
+WINDOWS = (0.2, 1.0)
+"""Shortest and longest time looked at in the end [s]."""
+
+
+@dataclass(frozen=True)
+class RingDown:
+    """A damped sine fitted to a ring-down; where `ok` is false, its figures are not to be used."""
+
+    f_d: float
+    """Damped frequency of the strongest mode [Hz]."""
+    zeta: float
+    """Its damping ratio [-]."""
+    amplitude: float
+    """Its largest |α| at the stop [m/s²]."""
+    f_d_error: float
+    """Standard error of f_d [Hz]."""
+    zeta_error: float
+    """Standard error of ζ [-]."""
+    rms: float
+    """Of what the fit leaves, over all axes [m/s²]."""
+    r_squared: float
+    """Share of the signal's energy that the fit explains [-]."""
+    window: float
+    """Time that was fitted [s]."""
+    modes: int
+    """Modes that were fitted together."""
+    ok: bool
+    """The mode is measurable."""
+    reason: str = ""
+    """Why it is not, in words for a person."""
+
+
+def fit_ring_down(
+    alpha: Floats,
+    period: float,
+    *,
+    modes: int = 1,
+    slow_poles: tuple[float, ...] = (),
+    skip: float = SKIP,
+    window: float | None = None,
+) -> RingDown:
+    """Fit damped sines to a ring-down by vector nonlinear least squares.
+
+        α(t) = Σ_k e^(-σ_k t) (c_k cos ω_k t + s_k sin ω_k t) + Σ_l e^(-p_l t) d_l,    σ = ω ζ/√(1-ζ²)
+
+    with vectors c, s, d of three axes. They enter linearly and are eliminated (variable projection; Golub and
+    Pereyra, 1973); f_d and ζ are searched from the best points of a grid, so that no first guess is needed.
+    The fit is done twice: over 0.5 s, and then over the time that the mode found so takes to sink into the
+    noise.
+
+    Args:
+        alpha: Acceleration of the tool without gravity from the stop on, shape (T, 3) [m/s²].
+        period: Between samples [s].
+        modes: Most modes to fit; one more is kept only where it explains more than noise would.
+        slow_poles: Rates of non-oscillatory tails to allow for [1/s].
+        skip: Time after the stop that is left out [s].
+        window: Time to fit [s]; None chooses.
+
+    Returns:
+        The mode with the largest amplitude. `ok` is false with a `reason` where none is measurable.
+    """
+    first = round(skip / period)
+    ring = _Ring(alpha[first:], period, skip, slow_poles)
+    if window is not None:
+        return ring.cut(window).fit(modes)
+    if ring.length < WINDOWS[0]:
+        return _not_measurable(
+            f"only {ring.length:.3f} s were recorded after the stop, {WINDOWS[0]} s are needed"
+        )
+    fit = ring.cut(WINDOW).fit(modes)
+    sigma = _sigma(fit.f_d, fit.zeta)
+    audible = math.log(max(fit.amplitude / max(fit.rms, 1e-12), 2.0)) / sigma
+    chosen = min(max(audible, WINDOWS[0]), WINDOWS[1])
+    return ring.cut(chosen).fit(modes) if chosen != fit.window else fit
+
+
+class _Ring:
+    """A ring-down and the projection that eliminates its amplitudes."""
+
+    def __init__(self, alpha: Floats, period: float, skip: float, slow_poles: tuple[float, ...]) -> None:
+        self.alpha = alpha
+        self.period = period
+        self.skip = skip
+        self.slow_poles = slow_poles
+        self.time = skip + period * np.arange(len(alpha))
+        self.length = len(alpha) * period
+        self._slow = [np.exp(-pole * self.time) for pole in slow_poles]
+
+    def cut(self, window: float) -> "_Ring":
+        """The ring-down's first part."""
+        return _Ring(self.alpha[: round(window / self.period)], self.period, self.skip, self.slow_poles)
+
+    def basis(self, parameters: Floats) -> Floats:
+        """Columns of the linear part for (f_d, ζ) of each mode, shape (T, 2 modes + slow poles)."""
+        columns = []
+        for f_d, zeta in parameters.reshape(-1, 2):
+            decay = np.exp(-_sigma(f_d, zeta) * self.time)
+            phase = 2.0 * np.pi * f_d * self.time
+            columns += [decay * np.cos(phase), decay * np.sin(phase)]
+        return np.column_stack(columns + self._slow)
+
+    def unexplained(self, parameters: Floats) -> Floats:
+        """What is left of the signal without its projection on the basis, flat."""
+        orthonormal, _ = np.linalg.qr(self.basis(parameters))
+        return np.asarray((self.alpha - orthonormal @ (orthonormal.T @ self.alpha)).ravel())
+
+    def fit(self, modes: int) -> RingDown:
+        """Fit one mode, then one more as long as that pays and is allowed."""
+        parameters = self._add_mode(np.empty(0))
+        for _ in range(1, modes):
+            more = self._add_mode(parameters)
+            if not self._pays(parameters, more):
+                break
+            parameters = more
+        return self._judge(parameters)
+
+    def _add_mode(self, parameters: Floats) -> Floats:
+        """The parameters with one mode more, all of them refined; the new one is searched on a grid."""
+        grid = [
+            (float(np.sum(self.unexplained(np.append(parameters, [f_d, zeta])) ** 2)), f_d, zeta)
+            for f_d in np.geomspace(1.1 * FREQUENCIES[0], 0.9 * FREQUENCIES[1], 28)
+            for zeta in (0.04, 0.12, 0.3)
+        ]
+        starts = sorted(grid)[:3]
+        fits = [self._refine(np.append(parameters, [f_d, zeta])) for _, f_d, zeta in starts]
+        return min(fits, key=lambda fit: fit[0])[1]
+
+    def _refine(self, start: Floats) -> tuple[float, Floats]:
+        count = start.size // 2
+        lower = np.tile([FREQUENCIES[0], DAMPING[0]], count)
+        upper = np.tile([FREQUENCIES[1], DAMPING[1]], count)
+        fit = least_squares(
+            self.unexplained, start, bounds=(lower, upper), x_scale=np.tile([1.0, 0.03], count), max_nfev=60
+        )
+        return float(fit.cost), np.asarray(fit.x)
+
+    def _pays(self, fewer: Floats, more: Floats) -> bool:
+        """Whether one more mode lowers the Bayesian information criterion."""
+        samples = self.alpha.size
+        added = 2 + 2 * self.alpha.shape[1]
+        before, after = (float(np.sum(self.unexplained(p) ** 2)) + 1e-300 for p in (fewer, more))
+        return bool(samples * math.log(before / after) > added * math.log(samples))
+
+    def _judge(self, parameters: Floats) -> RingDown:
+        """The strongest mode, its standard errors, and whether they are small enough."""
+        weights, *_ = np.linalg.lstsq(self.basis(parameters), self.alpha)
+        left = self.unexplained(parameters)
+        count = parameters.size // 2
+        amplitudes = [float(np.linalg.norm(weights[2 * k : 2 * k + 2], ord=2)) for k in range(count)]
+        strongest = int(np.argmax(amplitudes))
+        f_d, zeta = parameters.reshape(-1, 2)[strongest]
+        errors = self._standard_errors(parameters, left, weights.size)[2 * strongest : 2 * strongest + 2]
+        energy = float(np.sum(self.alpha**2))
+        rms = float(np.sqrt(np.mean(left**2)))
+        fit = RingDown(
+            f_d=float(f_d),
+            zeta=float(zeta),
+            amplitude=amplitudes[strongest],
+            f_d_error=float(errors[0]),
+            zeta_error=float(errors[1]),
+            rms=rms,
+            r_squared=1.0 - float(np.sum(left**2)) / energy if energy > 0.0 else 0.0,
+            window=self.length,
+            modes=count,
+            ok=True,
+        )
+        reason = _objection(fit)
+        return RingDown(**{**vars(fit), "ok": not reason, "reason": reason})
+
+    def _standard_errors(self, parameters: Floats, left: Floats, linear: int) -> Floats:
+        """Of f_d and ζ of each mode, from the Jacobian without what the amplitudes can follow."""
+        step = np.tile([1e-4, 1e-5], parameters.size // 2)
+        jacobian = np.column_stack(
+            [
+                (self.unexplained(parameters + d) - self.unexplained(parameters - d)) / (2.0 * np.sum(d))
+                for d in np.diag(step)
+            ]
+        )
+        freedom = max(left.size - parameters.size - linear, 1)
+        information = jacobian.T @ jacobian
+        if not np.linalg.cond(information) < 1e14:
+            return np.full(parameters.size, np.inf)
+        covariance = np.linalg.inv(information) * float(left @ left) / freedom
+        return np.asarray(np.sqrt(np.diag(covariance)))
+
+
+def _sigma(f_d: float, zeta: float) -> float:
+    """Decay rate [1/s] of a mode."""
+    return float(2.0 * np.pi * f_d * zeta / np.sqrt(1.0 - zeta * zeta))
+
+
+def _objection(fit: RingDown) -> str:
+    """Why a fit is not to be used; empty where it is."""
+    if fit.amplitude < 3.0 * fit.rms:
+        return (
+            f"the vibration of {fit.amplitude:.3f} m/s² does not stand out of {fit.rms:.3f} m/s² rms of noise"
+        )
+    if fit.r_squared < LEAST_R_SQUARED:
+        return f"damped sines explain only {100.0 * fit.r_squared:.0f} % of the signal"
+    for name, value, bounds in (("f_d", fit.f_d, FREQUENCIES), ("zeta", fit.zeta, DAMPING)):
+        if not bounds[0] * 1.001 < value < bounds[1] * 0.999:
+            return (
+                f"{name} = {value:.4g} is at the end of the range looked in, {bounds[0]:g} to {bounds[1]:g}"
+            )
+    if fit.f_d_error > 0.1 * fit.f_d or fit.zeta_error > max(0.3 * fit.zeta, 0.01):
+        return f"noise leaves f_d ± {fit.f_d_error:.2g} Hz and zeta ± {fit.zeta_error:.2g}"
+    return ""
+
+
+def _not_measurable(reason: str) -> RingDown:
+    nan = math.nan
+    return RingDown(nan, nan, nan, nan, nan, nan, nan, nan, 0, ok=False, reason=reason)

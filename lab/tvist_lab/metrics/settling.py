@@ -1,0 +1,102 @@
+"""E, the distance to the attained position, and what the paper reads off it (after ISO 9283)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tvist_lab.metrics.errors import NotMeasurableError
+from tvist_lab.metrics.motion import Motion
+from tvist_lab.recordings import Floats, Recording
+
+REPEATABILITY = 3.0e-5
+"""Of the UR5e, half-width of the band around the attained position [m]."""
+TAIL = 0.2
+"""Time at the end of the recorded rest over which the attained position is the mean [s]."""
+
+
+@dataclass(frozen=True)
+class Settling:
+    """How a motion comes to rest. Times count from the start of the reference before shaping."""
+
+    attained: Floats
+    """Attained position of the tool [m], shape (3,)."""
+    enter: float
+    """t_enter: E falls below the repeatability for the first time [s]."""
+    cycle: float
+    """t_cycle: E is above the repeatability for the last time [s]."""
+    stabilisation: float
+    """t_stb = t_cycle - t_enter [s]; zero where E never leaves the band again."""
+    overshoot: float
+    """e_os: largest E after t_enter, zero where that is within the repeatability [m]."""
+
+
+def attained_position(recording: Recording, motion: Motion) -> Floats:
+    """Mean position of the tool over the last 0.2 s before the next motion [m], shape (3,).
+
+    The tool's position is the forward kinematics of the joint angles, as in the paper: what the links bend is
+    not in it.
+
+    Raises:
+        NotMeasurableError: The tool was recorded at rest for less than that.
+    """
+    rows = _tail(recording, motion)
+    return np.asarray(np.mean(recording["actual_TCP_pose"][rows, :3], axis=0), dtype=np.float64)
+
+
+def distance(recording: Recording, motion: Motion) -> Floats:
+    """E: distance of the tool to its attained position [m], for the rows from the motion's start to its end.
+
+    Raises:
+        NotMeasurableError: As in `attained_position`.
+    """
+    position = recording["actual_TCP_pose"][motion.start : motion.end, :3]
+    return np.asarray(
+        np.linalg.norm(position - attained_position(recording, motion), axis=1), dtype=np.float64
+    )
+
+
+def settling(recording: Recording, motion: Motion, band: float = REPEATABILITY) -> Settling:
+    """t_enter, t_stb, t_cycle and e_os of the paper, section 4.2; crossings are interpolated between ticks.
+
+    Args:
+        recording: The recording.
+        motion: One of its motions; it should be followed by a second of rest or more, as integrators creep.
+        band: Repeatability [m].
+
+    Raises:
+        NotMeasurableError: The tool never leaves the band, or had not settled when the rest ended.
+    """
+    E = distance(recording, motion)
+    time = recording.time[motion.start : motion.end] - recording.time[motion.start]
+    outside = np.greater(E, band)
+    if not outside.any():
+        raise NotMeasurableError(f"the tool moved by less than the {1e3 * band:g} mm band")
+    last = int(np.flatnonzero(outside)[-1])
+    if last >= _tail(recording, motion).start - motion.start:
+        raise NotMeasurableError(f"the tool had not settled within {1e3 * band:g} mm when the rest ended")
+    departed = int(np.argmax(outside))
+    first = departed + int(np.argmin(outside[departed:]))
+    enter = _crossing(time, E, first - 1, band)
+    cycle = _crossing(time, E, last, band)
+    overshoot = float(np.max(E[first:]))
+    return Settling(
+        attained=attained_position(recording, motion),
+        enter=enter,
+        cycle=cycle,
+        stabilisation=cycle - enter,
+        overshoot=overshoot if overshoot > band else 0.0,
+    )
+
+
+def _crossing(time: Floats, E: Floats, row: int, band: float) -> float:
+    """Time at which E crosses the band between a row and the next."""
+    share = (E[row] - band) / (E[row] - E[row + 1])
+    return float(time[row] + share * (time[row + 1] - time[row]))
+
+
+def _tail(recording: Recording, motion: Motion) -> slice:
+    """Rows over which the attained position is the mean."""
+    first = int(np.searchsorted(recording.time, recording.time[motion.end - 1] - TAIL + 1e-9))
+    if first <= motion.shaped_stop:
+        raise NotMeasurableError(f"the tool was recorded at rest for less than {TAIL} s")
+    return slice(first, motion.end)

@@ -1,0 +1,169 @@
+"""Table 2 of the paper: what is measured of a motion, its mean over runs, and the impact of shaping."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, TypeAlias, TypeVar
+
+import numpy as np
+
+from tvist_lab.metrics.common_clock import still_after
+from tvist_lab.metrics.errors import NotMeasurableError
+from tvist_lab.metrics.motion import Motion, motions
+from tvist_lab.metrics.residual import Residual, residual
+from tvist_lab.metrics.ring_down import SLOW_POLE, RingDown, fit_ring_down
+from tvist_lab.metrics.settling import Settling, settling
+from tvist_lab.metrics.vibration import tool_acceleration
+from tvist_lab.recordings import Recording
+
+COLUMNS = ("delay_ms", "stabilisation_ms", "cycle_ms", "overshoot_m", "residual_vibration_m_s2")
+"""Of Table 2, in the paper's order."""
+IMPACTS = {
+    "stabilisation": "stabilisation_ms",
+    "cycle": "cycle_ms",
+    "overshoot": "overshoot_m",
+    "residual_vibration": "residual_vibration_m_s2",
+}
+"""The impacts the paper lists, and the columns they are of."""
+
+Row: TypeAlias = dict[str, float | None]
+Table: TypeAlias = dict[str, dict[str, Row]]
+"""Motion to `unshaped`, `shaped` and `impact_percent`, nested and named as `table_2` of the paper's data."""
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class MotionResult:
+    """What is measured of one motion; None is not measurable, with the reason in `notes`."""
+
+    start_s: float
+    """Time at which the reference starts [s]."""
+    stop_s: float
+    """Time at which the shaped reference stops [s]."""
+    delay_ms: float
+    """Δ: shaped minus unshaped duration of the reference [ms]."""
+    stabilisation_ms: float | None = None
+    """t_stb [ms]."""
+    cycle_ms: float | None = None
+    """t_cycle [ms]."""
+    overshoot_m: float | None = None
+    """e_os [m]."""
+    residual_vibration_m_s2: float | None = None
+    """RV [m/s²]; noted where it is the largest |α|, not a fitted decay."""
+    still_after_ms: float | None = None
+    """Last time |α| exceeds 0.1 m/s², from the start of the reference [ms]."""
+    f_d_hz: float | None = None
+    """Damped frequency of the ring-down after the stop [Hz]."""
+    zeta: float | None = None
+    """Damping ratio of the ring-down after the stop [-]."""
+    notes: Mapping[str, str] = field(default_factory=dict)
+    """Field to what must be known of its value."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Names to plain values, as `tvist analyze` prints them."""
+        return {**asdict(self), "notes": dict(self.notes)}
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Repetitions of one motion."""
+
+    unshaped: Sequence[MotionResult]
+    """At least one."""
+    shaped: Sequence[MotionResult]
+    """At least one."""
+
+
+def analyze(recording: Recording) -> list[MotionResult]:
+    """Measure every motion of a recording."""
+    return [measure(recording, motion) for motion in motions(recording)]
+
+
+def measure(recording: Recording, motion: Motion) -> MotionResult:
+    """Measure one motion; what cannot be measured is None with a note."""
+    notes: dict[str, str] = {}
+    if motion.stopped:
+        notes["stop_s"] = "the motion was stopped before its target"
+
+    def attempt(take: Callable[[Recording, Motion], T], *fields: str) -> T | None:
+        try:
+            return take(recording, motion)
+        except NotMeasurableError as error:
+            notes.update(dict.fromkeys(fields, str(error)))
+            return None
+
+    settled: Settling | None = attempt(settling, "stabilisation_ms", "cycle_ms", "overshoot_m")
+    vibration: Residual | None = attempt(residual, "residual_vibration_m_s2")
+    still = attempt(still_after, "still_after_ms")
+    ringing = attempt(_ring_down, "f_d_hz", "zeta")
+    if vibration is not None and not vibration.fitted:
+        notes["residual_vibration_m_s2"] = "fewer than two peaks: the largest |α| after the stop"
+    return MotionResult(
+        start_s=float(recording.time[motion.start]),
+        stop_s=float(recording.time[motion.shaped_stop]),
+        delay_ms=1e3 * motion.delay(recording),
+        stabilisation_ms=None if settled is None else 1e3 * settled.stabilisation,
+        cycle_ms=None if settled is None else 1e3 * settled.cycle,
+        overshoot_m=None if settled is None else settled.overshoot,
+        residual_vibration_m_s2=None if vibration is None else vibration.value,
+        still_after_ms=None if still is None else 1e3 * still,
+        f_d_hz=None if ringing is None else ringing.f_d,
+        zeta=None if ringing is None else ringing.zeta,
+        notes=notes,
+    )
+
+
+def _ring_down(recording: Recording, motion: Motion) -> RingDown:
+    """The mode that rings after the stop."""
+    alpha = tool_acceleration(recording)[motion.shaped_stop : motion.end]
+    fit = fit_ring_down(alpha, recording.period, modes=2, slow_poles=(SLOW_POLE,))
+    if not fit.ok:
+        raise NotMeasurableError(fit.reason)
+    return fit
+
+
+def table_2(runs: Mapping[str, Runs]) -> Table:
+    """Means over the runs and the impact of shaping, in percent: 100 (mean shaped / mean unshaped - 1).
+
+    Args:
+        runs: Name of a motion (`Q1-Q2`) to its repetitions.
+
+    Returns:
+        Nested and named as in the paper's data. A mean leaves out runs in which the figure was not measurable
+        and is None where that is all of them; an impact is None where its means do not give one.
+    """
+    table: Table = {}
+    for name, repeated in runs.items():
+        unshaped, shaped = _means(repeated.unshaped), _means(repeated.shaped)
+        impact = {key: _impact_percent(unshaped[column], shaped[column]) for key, column in IMPACTS.items()}
+        table[name] = {"unshaped": unshaped, "shaped": shaped, "impact_percent": impact}
+    return table
+
+
+def table_notes(runs: Mapping[str, Runs]) -> list[str]:
+    """What must be known of the means in the table: each note with how many runs it holds for."""
+    found = []
+    for name, repeated in runs.items():
+        for kind, results in (("unshaped", repeated.unshaped), ("shaped", repeated.shaped)):
+            for column in COLUMNS:
+                notes = [result.notes[column] for result in results if column in result.notes]
+                found += [
+                    f"{name} {kind} {column}: {note} ({notes.count(note)} of {len(results)} runs)"
+                    for note in dict.fromkeys(notes)
+                ]
+    return found
+
+
+def _means(results: Sequence[MotionResult]) -> Row:
+    """Mean of each column over the runs in which it was measurable."""
+    row: Row = {}
+    for column in COLUMNS:
+        values = [value for result in results if (value := getattr(result, column)) is not None]
+        row[column] = float(np.mean(values)) if values else None
+    return row
+
+
+def _impact_percent(unshaped: float | None, shaped: float | None) -> float | None:
+    """Change by shaping in percent of the unshaped mean."""
+    if unshaped is None or shaped is None or unshaped == 0.0:
+        return None
+    return 100.0 * (shaped / unshaped - 1.0)

@@ -1,0 +1,74 @@
+"""α, the acceleration of the tool as its accelerometer shows it, without gravity."""
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+from scipy.spatial.transform import Rotation
+
+from tvist_lab.metrics.errors import NotMeasurableError
+from tvist_lab.recordings import Floats, Recording
+
+GRAVITY = 9.81
+"""Of the simulated world [m/s²]."""
+BAND = (3.0, 60.0)
+"""Frequencies in which an arm vibrates [Hz]."""
+SENSOR = "actual_tool_accelerometer"
+TRUTH = "truth_tool_acceleration"
+TRUE_POSE = "truth_flange_pose"
+
+
+def tool_acceleration(recording: Recording, *, truth: bool = False) -> Floats:
+    """Acceleration of the flange in its own frame, α [m/s²].
+
+    The sensor feels the specific force; at rest that is the reaction to gravity, which the orientation of the
+    tool tells: α = f - Rᵀ (0, 0, g).
+
+    Args:
+        recording: With the sensor's column and `actual_TCP_pose`.
+        truth: From the truth channel, free of noise, with the flexible arm's orientation if recorded.
+
+    Returns:
+        Shape (T, 3).
+
+    Raises:
+        RecordingError: The column is missing.
+        NotMeasurableError: The channel has holes.
+    """
+    name = TRUTH if truth else SENSOR
+    force = recording[name]
+    if not np.isfinite(force).all():
+        raise NotMeasurableError(f"{name} is missing at some ticks")
+    pose = recording[TRUE_POSE if truth and TRUE_POSE in recording else "actual_TCP_pose"]
+    orientation = Rotation.from_rotvec(pose[:, 3:6])
+    up = orientation.inv().apply([0.0, 0.0, GRAVITY])
+    return np.asarray(force - up, dtype=np.float64)
+
+
+def best_tool_acceleration(recording: Recording) -> Floats:
+    """α from the truth channel where it was recorded, else from the sensor below 60 Hz [m/s²], shape (T, 3).
+
+    White noise of 0.03 m/s² an axis alone exceeds 0.1 m/s² in one tick of a hundred, so that no last time
+    above a threshold could be told from the raw sensor.
+    """
+    if TRUTH in recording:
+        return tool_acceleration(recording, truth=True)
+    return low_pass(tool_acceleration(recording), recording.period)
+
+
+def amplitude(alpha: Floats) -> Floats:
+    """|α| [m/s²], shape (T,)."""
+    return np.asarray(np.linalg.norm(alpha, axis=1), dtype=np.float64)
+
+
+def low_pass(signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
+    """Signal below a frequency, in phase with itself (Butterworth, forth and back)."""
+    return _both_ways(butter(4, cut_off, "lowpass", fs=1.0 / period, output="sos"), signal)
+
+
+def band_pass(signal: Floats, period: float, band: tuple[float, float] = BAND) -> Floats:
+    """Signal within a band of frequencies, in phase with itself (Butterworth, forth and back)."""
+    return _both_ways(butter(2, band, "bandpass", fs=1.0 / period, output="sos"), signal)
+
+
+def _both_ways(sos: Floats, signal: Floats) -> Floats:
+    padding = min(3 * (2 * len(sos) + 1), len(signal) - 1)
+    return np.asarray(sosfiltfilt(sos, signal, axis=0, padlen=padding), dtype=np.float64)

@@ -1,0 +1,132 @@
+"""Ways to make a motion: unshaped, the paper's, and the baselines it has to be compared with."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from tvist_client.robot import Arm, Robot
+from tvist_shaping import residual, shaper
+
+from tvist_lab.recordings import Floats
+
+ACCELERATION, JERK = 2.0, 100.0
+"""The paper's limits [rad/s^2, rad/s^3]."""
+
+
+class Method(ABC):
+    """A way to make a motion."""
+
+    name: str
+    """In tables and JSON."""
+    label: str
+    """For people."""
+
+    @abstractmethod
+    async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> float:
+        """Set the robot up at rest for a motion that ends there; the jerk limit to move with [rad/s^3]."""
+
+
+class Unshaped(Method):
+    """The reference as it is."""
+
+    name, label = "unshaped", "unshaped"
+
+    async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> float:  # noqa: ARG002
+        """No shaper."""
+        await arm.set_shaper("none")
+        return JERK
+
+
+@dataclass(frozen=True)
+class TimeVarying(Method):
+    """TVIST with the calibration's polynomials."""
+
+    shaper: str = "zv"
+    name: str = "shaped"
+    label: str = "TVIST-ZV, the paper's"
+
+    async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> float:  # noqa: ARG002
+        """The polynomial estimator of the robot's own calibration."""
+        await arm.set_estimator("polynomial")
+        await arm.set_shaper(self.shaper)
+        return JERK
+
+
+class FrozenAtEnd(Method):
+    """ZV for the end pose all along: needs the target in advance."""
+
+    name, label = "zv_frozen_at_end", "ZV frozen at the end pose"
+
+    async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> float:
+        """Ask the robot for its estimate at the end, then hold it."""
+        start = (await robot.state()).target_q
+        await arm.set_estimator("polynomial")
+        await arm.reset(q=end)
+        await robot.advance(2)
+        state = await robot.state()
+        await arm.reset(q=start)
+        await arm.set_estimator("fixed", f_d=[state.estimated_f_d[0]], zeta=[state.estimated_zeta[0]])
+        await arm.set_shaper("zv")
+        return JERK
+
+
+@dataclass(frozen=True)
+class Fixed(Method):
+    """One robust shaper for the whole workspace."""
+
+    shaper: str
+    f_d: float
+    """Frequency it is designed for [Hz]."""
+    zeta: float
+    """Damping it is designed for [-]."""
+    name: str
+    label: str
+
+    async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> float:  # noqa: ARG002
+        """The fixed estimator."""
+        await arm.set_estimator("fixed", f_d=[self.f_d], zeta=[self.zeta])
+        await arm.set_shaper(self.shaper)
+        return JERK
+
+
+@dataclass(frozen=True)
+class EqualDuration(Method):
+    """No shaper and no model at all: a longer jerk time, so that the motion takes as long as the shaped one."""
+
+    delay: float
+    """Of the shaped motion [s]."""
+    name: str = "equal_duration_double_s"
+    label: str = "double S of equal duration"
+
+    async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> float:  # noqa: ARG002
+        """A double S that reaches its limits lasts way/v + v/a + a/j: what a/j gains the motion lasts longer."""
+        await arm.set_shaper("none")
+        return ACCELERATION / (ACCELERATION / JERK + self.delay)
+
+
+def robust_over(name: str, f_d: tuple[float, float], zeta: tuple[float, float]) -> tuple[float, float]:
+    """Design of a fixed shaper that leaves least at worst over the workspace.
+
+    Damping is taken to fall linearly from its highest value at the lowest frequency to its lowest at the highest.
+
+    Args:
+        name: Of the shaper.
+        f_d: Lowest and highest damped frequency of the workspace [Hz].
+        zeta: Lowest and highest damping ratio [-].
+
+    Returns:
+        Design frequency [Hz] and damping [-].
+    """
+    frequencies = np.linspace(*f_d, 60)
+    damping = _damping(frequencies, f_d, zeta)
+
+    def worst(design: float) -> float:
+        impulses = shaper(name).function(design, float(_damping(np.array(design), f_d, zeta)))
+        return max(float(residual(f, z, impulses)) for f, z in zip(frequencies, damping, strict=True))
+
+    best = min(np.linspace(*f_d, 90).tolist(), key=worst)
+    return best, float(_damping(np.array(best), f_d, zeta))
+
+
+def _damping(f: Floats, f_d: tuple[float, float], zeta: tuple[float, float]) -> Floats:
+    return np.asarray(np.interp(f, f_d, zeta[::-1]))

@@ -1,0 +1,21 @@
+"""What the paper reports: Thomsen, Søe-Knudsen, Brandt, Zhang, ICINCO 2019, doi 10.5220/0007834504880498."""
+
+import json
+from functools import cache
+from importlib import resources
+from typing import Any
+
+
+@cache
+def published() -> dict[str, Any]:
+    """Tables, configurations and figures' captions, as numbers."""
+    return dict(json.loads((resources.files(__package__) / "published.json").read_text(encoding="utf-8")))
+
+
+def pose(name: str) -> tuple[float, ...]:
+    """Joint angles of Q1, Q2 or Q3 [rad]."""
+    return tuple(published()["configurations"][name]["q"])
+
+
+MOTIONS = {"Q1-Q2": ("Q1", "Q2"), "Q1-Q3": ("Q1", "Q3"), "Q3-Q1": ("Q3", "Q1")}
+"""The three motions: name to start and end."""

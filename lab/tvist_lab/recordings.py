@@ -1,0 +1,202 @@
+"""Recordings in memory: what a robot published, as one array a column, ready to be measured."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+STATE_COLUMNS = (
+    "tick",
+    "timestamp",
+    "robot_mode",
+    "safety_mode",
+    "runtime_state",
+    "setpoint_sequence",
+    "reference_q",
+    "target_q",
+    "target_qd",
+    "target_qdd",
+    "target_moment",
+    "actual_q",
+    "actual_qd",
+    "actual_moment",
+    "actual_TCP_pose",
+    "actual_TCP_speed",
+    "actual_tool_accelerometer",
+    "speed_scaling",
+    "estimated_f_d",
+    "estimated_zeta",
+    "shaper_delay",
+    "missed_ticks",
+)
+"""Fields of a `state`, each of which becomes a column of the same name."""
+TRUTH_PREFIX = "truth_"
+"""Before the name of a field of `truth`, where it is a column."""
+
+
+class RecordingError(ValueError):
+    """A recording lacks what is asked of it, or what it is made of does not fit together."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """States of one robot over increasing ticks, with the events between them.
+
+    Ticks may be missing (a slow reader loses states); the time of a row is `time`, never its index times the
+    period.
+    """
+
+    columns: Mapping[str, Floats]
+    """Name to values, shape (T,) or (T, k); units as in the messages (SI, rad); NaN where a field was null or
+    shorter than in other rows. A column `truth_*` is what no robot can know."""
+    events: tuple[Any, ...] = ()
+    """Events in order of tick; each has `tick`, `kind`, `id`, `code`, `why`."""
+    info: Any = None
+    """The robot's `info` message, where there is one."""
+
+    def __post_init__(self) -> None:
+        lengths = {name: len(column) for name, column in self.columns.items()}
+        if "tick" not in lengths:
+            raise RecordingError("a recording needs the column tick")
+        length = lengths["tick"]
+        for name, other in lengths.items():
+            if other != length:
+                raise RecordingError(f"column {name} has {other} rows, column tick {length}")
+        if np.any(np.diff(self.columns["tick"]) <= 0):
+            raise RecordingError("tick must increase from row to row")
+        object.__setattr__(self, "columns", MappingProxyType(dict(self.columns)))
+
+    @classmethod
+    def from_states(
+        cls,
+        states: Iterable[Any],
+        events: Iterable[Any] = (),
+        truths: Iterable[Any] = (),
+        info: Any = None,
+    ) -> "Recording":
+        """Turn messages into columns.
+
+        A state that is put again (a robot in lockstep repeats its last one) counts once. A tick without truth
+        has NaN in the truth columns.
+
+        Args:
+            states: With the fields of `STATE_COLUMNS` as attributes, in any order.
+            events: With `tick` as attribute.
+            truths: With `tick` and other fields as attributes; each field becomes a column `truth_<field>`.
+            info: Kept as it is.
+
+        Raises:
+            RecordingError: There is no state.
+        """
+        by_tick = {int(state.tick): state for state in states}
+        if not by_tick:
+            raise RecordingError("a recording needs at least one state")
+        ticks = sorted(by_tick)
+        rows = [by_tick[tick] for tick in ticks]
+        columns = {name: _column([getattr(row, name) for row in rows]) for name in STATE_COLUMNS}
+        true_by_tick = {int(truth.tick): truth for truth in truths}
+        if true_by_tick:
+            for name in _fields(next(iter(true_by_tick.values()))):
+                values = [getattr(true_by_tick.get(tick), name, None) for tick in ticks]
+                columns[TRUTH_PREFIX + name] = _column(values)
+        return cls(columns, tuple(sorted(events, key=lambda event: int(event.tick))), info)
+
+    def __len__(self) -> int:
+        return len(self.columns["tick"])
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.columns
+
+    def __getitem__(self, name: str) -> Floats:
+        """Values of a column, shape (T,) or (T, k).
+
+        Raises:
+            RecordingError: There is no column of that name.
+        """
+        try:
+            return self.columns[name]
+        except KeyError:
+            hint = " (was truth recorded?)" if name.startswith(TRUTH_PREFIX) else ""
+            raise RecordingError(
+                f"the recording has no column {name}{hint}; it has {', '.join(sorted(self.columns))}"
+            ) from None
+
+    @property
+    def time(self) -> Floats:
+        """Time of each row [s], shape (T,)."""
+        return self["timestamp"]
+
+    @property
+    def joints(self) -> int:
+        """Number of joints of the arm."""
+        return int(self["reference_q"].shape[1])
+
+    @cached_property
+    def period(self) -> float:
+        """Time between ticks [s].
+
+        Raises:
+            RecordingError: Fewer than two states.
+        """
+        if len(self) < 2:
+            raise RecordingError("the period of a recording shows from two states on")
+        tick, time = self["tick"], self.time
+        return float((time[-1] - time[0]) / (tick[-1] - tick[0]))
+
+    @property
+    def missing_ticks(self) -> int:
+        """Ticks between the first and the last row that have no row."""
+        tick = self["tick"]
+        return int(tick[-1] - tick[0]) + 1 - len(self) if len(self) else 0
+
+    def between(self, first_tick: int, last_tick: int) -> "Recording":
+        """The rows and events of a range of ticks, both ends included.
+
+        Raises:
+            RecordingError: No row lies in it.
+        """
+        tick = self["tick"]
+        first, past = np.searchsorted(tick, [first_tick, last_tick + 1])
+        if past <= first:
+            raise RecordingError(f"no state between ticks {first_tick} and {last_tick}")
+        columns = {name: column[first:past] for name, column in self.columns.items()}
+        events = tuple(event for event in self.events if first_tick <= event.tick <= last_tick)
+        return replace(self, columns=columns, events=events)
+
+    def index(self, tick: int) -> int:
+        """Index of the first row at or after a tick; the length of the recording where there is none."""
+        return int(np.searchsorted(self["tick"], tick))
+
+
+def _fields(message: Any) -> list[str]:
+    """Names of a message's numeric fields but its time, from a msgspec struct or a plain object."""
+    names = getattr(message, "__struct_fields__", None)
+    names = list(vars(message)) if names is None else list(names)
+    return [
+        name
+        for name in names
+        if name not in ("tick", "timestamp") and not isinstance(getattr(message, name), str)
+    ]
+
+
+def _column(values: list[Any]) -> Floats:
+    """Numbers or lists of numbers, one a row; null and what a shorter list lacks become NaN."""
+    width = max(
+        (len(value) for value in values if isinstance(value, (list, tuple, np.ndarray))), default=None
+    )
+    if width is None:
+        return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+    lengths = {-1 if value is None else len(value) for value in values}
+    if lengths == {width}:
+        return np.array(values, dtype=np.float64).reshape(len(values), width)
+    column = np.full((len(values), width), np.nan)
+    for row, value in zip(column, values, strict=True):
+        if value is not None:
+            row[: len(value)] = value
+    return column

@@ -1,0 +1,82 @@
+"""Run a recording's commands again, free of any clock, and compare what comes out bit by bit."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from tvist_protocol.commands import Setpoint
+from tvist_protocol.errors import TvistError
+from tvist_protocol.journal import Entry, message_of
+from tvist_protocol.stream import Event, State, Truth
+from tvist_server.controller import Controller
+from tvist_server.setup import Setup
+
+
+class ReplayError(TvistError):
+    """A recording cannot be replayed; the sentence says why."""
+
+
+@dataclass
+class Replay:
+    """States, events and truths of the second run."""
+
+    states: list[State] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    truths: list[Truth] = field(default_factory=list)
+    first_difference: str | None = None
+    """Where it leaves the first run; None: nowhere."""
+
+
+def replay(setup: Setup, journal: Sequence[Entry], states: Sequence[State]) -> Replay:
+    """Give a new controller the same messages at the same ticks.
+
+    Args:
+        setup: How the recorded controller started.
+        journal: What reached it.
+        states: What it put out, from its first tick on; only their number and values are used.
+    """
+    controller, done = Controller(setup), Replay()
+    entries = iter(journal)
+    entry = next(entries, None)
+    for recorded in states:
+        while entry is not None and entry.tick <= recorded.tick:
+            while controller.tick_number + 1 < entry.tick:
+                _tick(controller, setup, done)
+            _give(controller, entry)
+            entry = next(entries, None)
+        while controller.tick_number < recorded.tick:
+            _tick(controller, setup, done)
+        if done.first_difference is None:
+            done.first_difference = _difference(recorded, done.states[-1])
+    return done
+
+
+def _tick(controller: Controller, setup: Setup, done: Replay) -> None:
+    state, events = controller.tick()
+    done.states.append(state)
+    done.events += events
+    if setup.truth:
+        done.truths.append(controller.truth())
+
+
+def _give(controller: Controller, entry: Entry) -> None:
+    match entry.kind:
+        case "client_seen":
+            controller.client_seen(entry.client or "")
+        case "client_gone":
+            controller.client_gone(entry.client or "")
+        case "missed":
+            controller.missed(entry.count or 0)
+        case _:
+            message = message_of(entry)
+            if isinstance(message, Setpoint):
+                controller.receive_setpoint(message)
+            else:
+                controller.receive(message)
+
+
+def _difference(recorded: State, replayed: State) -> str | None:
+    for name in recorded.__struct_fields__:
+        before, after = getattr(recorded, name), getattr(replayed, name)
+        if before != after:
+            return f"tick {recorded.tick}: {name} was {before}, is {after}"
+    return None

@@ -1,0 +1,189 @@
+"""A second opinion on the plant: the same arm built in MuJoCo from the same numbers and nothing else of ours.
+
+Bodies, virtual joints and lumps are placed by the description's Denavit-Hartenberg parameters; MuJoCo finds
+the dynamics and integrates them (semi-implicit Euler with implicit damping, first order). The two have the
+description in common; gear errors and sensor noise are left out. Needs the package `mujoco`.
+"""
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tvist_plant.description import Payload, RobotDescription, Tensor
+from tvist_plant.drives import DriveCommand
+
+Floats = NDArray[np.float64]
+
+PERIOD = 0.002
+"""Time between commands [s]."""
+
+
+class SecondOpinion:
+    """The flexible arm and its drives in MuJoCo.
+
+    A motor is a rotor of inertia B in a body of its own, a gear the spring of a fixed tendon from its angle
+    to the joint's. Velocity gain and friction's slope at rest are joint damping, which MuJoCo takes
+    implicitly; the rest of the drive is a torque on the rotor.
+
+    Args:
+        description: The robot.
+        payload: What it carries.
+        timestep: Of MuJoCo's integrator, a fraction of 2 ms [s]. 1 ms is unstable for the UR5e.
+
+    Raises:
+        ValueError: 2 ms is no multiple of the time step.
+    """
+
+    def __init__(self, description: RobotDescription, payload: Payload, timestep: float) -> None:
+        self._steps = round(PERIOD / timestep)
+        if self._steps < 1 or abs(self._steps * timestep - PERIOD) > 1e-12:
+            raise ValueError(f"timestep is {timestep} s; {PERIOD} s must be a multiple of it")
+        self._timestep = timestep
+        drives = description.drives
+        self._velocity_gain = np.array(drives.velocity_gain)
+        self._position_gain = self._velocity_gain * (
+            np.array(drives.position_gain) + np.array(drives.integral_gain)
+        )
+        self._integral_gain = (
+            self._velocity_gain * np.array(drives.position_gain) * np.array(drives.integral_gain)
+        )
+        self._friction = np.array(drives.coulomb_friction) * (not drives.linear_friction)
+        self._friction_width = drives.friction_width
+        self._gear_stiffness = np.array(drives.gear_stiffness)
+        self._model = _build(description, payload, timestep)
+        self._data = mujoco.MjData(self._model)
+
+        def dofs(names: list[str]) -> NDArray[np.int64]:
+            return np.array([self._model.joint(name).dofadr[0] for name in names], dtype=np.int64)
+
+        links = description.link_flexibility.links
+        self._joints = dofs([_joint(number) for number in range(description.joints)])
+        self._motors = dofs([_motor(number) for number in range(description.joints)])
+        self._flexes = dofs([_flex(number, axis) for number in links for axis in "yz"])
+        self._flex_stiffness = np.repeat(description.link_flexibility.stiffness, 2)
+        self._s = np.zeros(description.joints)
+        self._command = np.zeros((3, description.joints))
+
+    def reset(self, command: DriveCommand) -> Floats:
+        """Static equilibrium under a command, integrators preloaded; link-side q, shape (n,) [rad]."""
+        data = self._data
+        mujoco.mj_resetData(self._model, data)
+        self._command = np.array([command.q, command.qd, command.torque])
+        gravity = np.zeros(self._model.nv)
+        for _ in range(20):
+            data.qpos[self._joints] = command.q - gravity[self._joints] / self._gear_stiffness
+            data.qpos[self._flexes] = -gravity[self._flexes] / self._flex_stiffness
+            data.qpos[self._motors] = command.q
+            mujoco.mj_forward(self._model, data)
+            gravity = data.qfrc_bias.copy()
+        self._s = (gravity[self._joints] - command.torque) / self._integral_gain
+        return self._q()
+
+    def step(self, command: DriveCommand) -> Floats:
+        """One period of 2 ms, the drives going linearly to this command; link-side q, shape (n,) [rad]."""
+        start, end = self._command, np.array([command.q, command.qd, command.torque])
+        data = self._data
+        for k in range(self._steps):
+            q_r, qd_r, torque = start + (k + 0.5) / self._steps * (end - start)
+            angle, speed = data.qpos[self._motors], data.qvel[self._motors]
+            slack = self._friction * (speed / self._friction_width - np.tanh(speed / self._friction_width))
+            data.qfrc_applied[self._motors] = (
+                torque
+                + self._velocity_gain * qd_r
+                + self._position_gain * (q_r - angle)
+                + self._integral_gain * self._s
+                + slack
+            )
+            self._s += self._timestep * (q_r - angle)
+            mujoco.mj_step(self._model, data)
+        self._command = end
+        return self._q()
+
+    def _q(self) -> Floats:
+        return np.array(self._data.qpos[self._joints])
+
+
+def _joint(number: int) -> str:
+    return f"joint {number}"
+
+
+def _motor(number: int) -> str:
+    return f"motor {number}"
+
+
+def _flex(number: int, axis: str) -> str:
+    return f"flex {number} {axis}"
+
+
+def _build(description: RobotDescription, payload: Payload, timestep: float) -> "mujoco.MjModel":
+    """Compile the arm: hinges, a welded body for each Denavit-Hartenberg frame, rotors beside the chain."""
+    kinematics, links, drives = description.kinematics, description.links, description.drives
+    flexibility = description.link_flexibility
+    stiffness_of = dict(zip(flexibility.links, flexibility.stiffness, strict=True))
+    spec = mujoco.MjSpec()
+    spec.option.timestep = timestep
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.gravity = [0.0, 0.0, -9.81]
+    spec.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    frame = spec.worldbody
+    for number in range(description.joints):
+        a, d, alpha = kinematics.a[number], kinematics.d[number], kinematics.alpha[number]
+        turn = [np.cos(alpha / 2), np.sin(alpha / 2), 0.0, 0.0]
+        body = frame.add_body()
+        body.add_joint(name=_joint(number), type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
+        if number in stiffness_of:
+            near, far = _lump_places(description, number)
+            lump, Ixx = links.mass[number] / 2, links.inertia[number][0]
+            small = (Ixx / 2, 0.0, 0.0, Ixx / 2, 0.0, Ixx / 2)
+            _add_mass(body.add_body(pos=[a, 0, d], quat=turn), lump, near, small)
+            body = body.add_body(pos=[a / 2, 0, d])
+            for axis, direction in (("y", [0, 1, 0]), ("z", [0, 0, 1])):
+                body.add_joint(
+                    name=_flex(number, axis),
+                    type=mujoco.mjtJoint.mjJNT_HINGE,
+                    axis=direction,
+                    stiffness=stiffness_of[number],
+                    damping=stiffness_of[number] * flexibility.damping_time,
+                )
+            frame = body.add_body(pos=[a / 2, 0, 0], quat=turn)
+            _add_mass(frame, lump, far, small)
+        else:
+            frame = body.add_body(pos=[a, 0, d], quat=turn)
+            _add_mass(frame, links.mass[number], links.com[number], links.inertia[number])
+        B = drives.rotor_inertia[number]
+        rotor = spec.worldbody.add_body()
+        _add_mass(rotor, 1.0, (0.0, 0.0, 0.0), (B, 0.0, 0.0, B, 0.0, B))
+        rotor.add_joint(
+            name=_motor(number),
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=[0, 0, 1],
+            damping=drives.velocity_gain[number] + drives.coulomb_friction[number] / drives.friction_width,
+        )
+        gear = spec.add_tendon(
+            stiffness=drives.gear_stiffness[number],
+            damping=drives.gear_damping[number],
+            springlength=[0.0, 0.0],
+        )
+        gear.wrap_joint(_joint(number), 1.0)
+        gear.wrap_joint(_motor(number), -1.0)
+    if payload.mass > 0.0:
+        _add_mass(frame.add_body(), payload.mass, payload.com, payload.inertia)
+    return spec.compile()
+
+
+def _add_mass(body: "mujoco.MjsBody", mass: float, com: tuple[float, float, float], inertia: Tensor) -> None:
+    """Give a body its mass, its centre and its inertia about it (xx xy xz yy yz zz)."""
+    xx, xy, xz, yy, yz, zz = inertia
+    body.mass, body.ipos, body.fullinertia = mass, list(com), [xx, yy, zz, xy, xz, yz]
+    body.explicitinertial = True
+
+
+def _lump_places(
+    description: RobotDescription, number: int
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Where the two halves of a bending link sit in its frame: the one nearer to its joint, the other."""
+    x, y, z = description.links.com[number]
+    arm = float(np.sqrt(description.links.inertia[number][3] / description.links.mass[number]))
+    joint = -description.kinematics.a[number]
+    near, far = sorted((x - arm, x + arm), key=lambda place: abs(place - joint))
+    return (near, y, z), (far, y, z)

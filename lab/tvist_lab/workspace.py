@@ -1,0 +1,43 @@
+"""Where a six-joint arm on a stand is measured and tried out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import qmc
+
+from tvist_lab.recordings import Floats
+
+
+@dataclass(frozen=True)
+class Region:
+    """A box of joint angles; joints beyond its sides stay at zero."""
+
+    low: tuple[float, ...]
+    """[rad], one a joint from the base on."""
+    high: tuple[float, ...]
+    """[rad]."""
+
+    def spread(self, count: int, joints: int, seed: int) -> Floats:
+        """Configurations that cover the box evenly (scrambled Halton sequence), shape (count, joints) [rad]."""
+        sampler = qmc.Halton(len(self.low), rng=np.random.default_rng(seed))
+        return self._place(sampler.random(count), joints)
+
+    def random(self, count: int, joints: int, seed: int) -> Floats:
+        """Independent configurations, shape (count, joints) [rad]."""
+        return self._place(np.random.default_rng(seed).random((count, len(self.low))), joints)
+
+    def _place(self, unit: Floats, joints: int) -> Floats:
+        low, high = np.array(self.low), np.array(self.high)
+        used = min(len(low), joints)
+        q = np.zeros((len(unit), joints))
+        q[:, :used] = (low + unit * (high - low))[:, :used]
+        return q
+
+
+WORKSPACE = Region(
+    low=(-np.pi, -np.pi, -5.0 * np.pi / 6.0, -np.pi),
+    high=(np.pi, 0.0, 5.0 * np.pi / 6.0, 0.0),
+)
+"""Above the stand, the wrist's two outer joints at zero."""
+IDENTIFIED = Region(low=(0.0, *WORKSPACE.low[1:]), high=(0.0, *WORKSPACE.high[1:]))
+"""The same without the base: turning an arm on a rigid stand changes none of its modes."""

@@ -1,0 +1,98 @@
+"""Recordings made by hand, of which every metric's answer is known."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tvist_lab.recordings import STATE_COLUMNS, Recording
+
+PERIOD = 0.002
+JOINTS = 6
+
+
+def straight_step(ticks, start, stop, stroke):
+    """A joint that goes at constant speed: its first and last moving ticks are exact."""
+    return stroke * np.clip((np.arange(ticks) - start) / (stop - start), 0.0, 1.0)
+
+
+@pytest.fixture
+def make_recording():
+    """Build a recording from arrays; what is not given rests."""
+
+    def make(
+        reference=None,
+        target=None,
+        *,
+        ticks=1500,
+        first_tick=0,
+        position=None,
+        rotation=None,
+        alpha=None,
+        truth=None,
+        events=(),
+        **columns,
+    ):
+        tick = first_tick + np.arange(ticks)
+        up = np.tile([0.0, 0.0, 9.81], (ticks, 1))
+        zeros = np.zeros((ticks, JOINTS))
+        of_joints = {
+            name: np.zeros((ticks, JOINTS)) if q is None else np.column_stack([q, zeros[:, 1:]])
+            for name, q in (("reference_q", reference), ("target_q", target))
+        }
+        made = {name: np.zeros(ticks) for name in STATE_COLUMNS}
+        made |= dict.fromkeys(("target_qd", "target_qdd", "target_moment"), zeros)
+        made |= dict.fromkeys(("actual_q", "actual_qd", "actual_moment", "actual_TCP_speed"), zeros)
+        made |= of_joints
+        made["tick"] = tick.astype(float)
+        made["timestamp"] = tick * PERIOD
+        pose = np.zeros((ticks, 6))
+        if position is not None:
+            pose[:, :3] = position
+        if rotation is not None:
+            pose[:, 3:] = rotation
+        made["actual_TCP_pose"] = pose
+        made["actual_tool_accelerometer"] = up + (0.0 if alpha is None else alpha)
+        made["estimated_f_d"] = np.full((ticks, 1), 10.0)
+        made["estimated_zeta"] = np.full((ticks, 1), 0.2)
+        if truth is not None:
+            made["truth_tool_acceleration"] = up + truth
+        return Recording({**made, **columns}, tuple(events))
+
+    return make
+
+
+@pytest.fixture
+def one_motion(make_recording):
+    """A motion of one joint from tick 100 to 500, published a tick later and shaped by so many ticks more."""
+
+    def make(shaped_ticks=0, **columns):
+        ticks = columns.setdefault("ticks", 1500)
+        reference = straight_step(ticks, 100, 500, 1.0)
+        target = straight_step(ticks, 101, 501 + shaped_ticks, 1.0)
+        return make_recording(reference, target, **columns)
+
+    return make
+
+
+@pytest.fixture
+def event():
+    """An event as the protocol has it."""
+
+    def make(tick, kind, identifier=None):
+        return SimpleNamespace(tick=tick, kind=kind, id=identifier, code=None, why=None)
+
+    return make
+
+
+@pytest.fixture
+def ring():
+    """A damped sine on given axes from a tick on, zero before."""
+
+    def make(ticks, start, f_d, zeta, amplitude, *, axis=(1.0, 0.0, 0.0), phase=0.0):
+        t = PERIOD * (np.arange(ticks) - start)
+        sigma = 2.0 * np.pi * f_d * zeta / np.sqrt(1.0 - zeta**2)
+        wave = np.exp(-sigma * np.maximum(t, 0.0)) * np.cos(2.0 * np.pi * f_d * t + phase) * (t >= 0.0)
+        return amplitude * wave[:, None] * (np.array(axis) / np.linalg.norm(axis))
+
+    return make

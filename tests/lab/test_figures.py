@@ -1,0 +1,82 @@
+"""The figures show the numbers they stand for."""
+
+import numpy as np
+import pytest
+
+from tvist_lab.figures import figure_4, figure_7, figure_16, motion_figure, save
+from tvist_lab.metrics import motions
+
+TICKS = 1500
+
+
+@pytest.fixture
+def recorded(one_motion, ring):
+    """The same motion without and with shaping."""
+
+    def make(shaped_ticks, amplitude):
+        position = np.zeros((TICKS, 3))
+        position[:, 0] = np.interp(np.arange(TICKS), [100, 540], [0.5, 0.0])
+        qdd = np.zeros((TICKS, 6))
+        qdd[101:200, 0], qdd[101:200, 1:3] = 2.0, 1.0
+        recording = one_motion(
+            shaped_ticks,
+            alpha=ring(TICKS, 501 + shaped_ticks, 10.0, 0.1, amplitude),
+            position=position,
+            target_qdd=qdd,
+        )
+        return recording, motions(recording)[0]
+
+    return make(0, 1.0), make(37, 0.1)
+
+
+def texts(panel):
+    return [text.get_text() for text in panel.texts]
+
+
+def test_figure_4_shows_that_the_least_sensitive_shaper_leaves_36_percent():
+    figure = figure_4()
+    (panel,) = figure.axes
+    assert any(text.startswith("35.8 %") for text in texts(panel))
+    curves = {line.get_label(): line.get_xydata() for line in panel.get_lines()}
+    ei = curves["EI 5 %"]
+    assert np.interp(15.0, *ei.T) == pytest.approx(35.82, abs=0.05)
+    assert np.interp(10.5, *curves["ZV"].T) == pytest.approx(0.0, abs=0.1)
+
+
+def test_figure_7_shows_rounded_delays_jump_and_fractional_ones_not():
+    rounded, fractional, *_ = figure_7().axes[2].get_lines()
+    assert np.max(np.abs(rounded.get_ydata())) > 50.0
+    assert np.max(np.abs(fractional.get_ydata())) < 2.1
+
+
+def test_figures_12_to_14_have_the_papers_five_panels_on_one_clock(recorded):
+    figure = motion_figure("Q1 → Q2", *recorded)
+    assert len(figure.axes) == 5
+    assert [panel.get_ylabel().split()[-1] for panel in figure.axes] == [
+        "(rad/s$^2$)",
+        "(mm)",
+        "(m/s$^2$)",
+        "(Hz)",
+        "(–)",
+    ]
+    assert len(figure.legends) == 1
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["Unshaped", "Shaped"]
+    joints = texts(figure.axes[0])
+    assert len(joints) == 3
+    assert r"$\ddot q^*_1$, $\ddot q^*_2$" in joints
+
+
+def test_figure_16_writes_the_rv_it_draws_and_where_it_is_no_fit(recorded):
+    figure = figure_16({"Q1 → Q2": recorded, "Q1 → Q3": recorded})
+    assert len(figure.axes) == 2
+    words = texts(figure.axes[0])
+    assert any("RV 0.9" in text or "RV 1.0" in text for text in words)
+    assert any("largest value" in text for text in words)
+    assert sum(text == "$t_b$" for text in words) == 2
+
+
+def test_a_saved_figure_is_an_equal_file_each_time_and_makes_its_folder(tmp_path):
+    files = [save(figure_4(), tmp_path / name / "figure_4.png") for name in ("a", "b")]
+    first, second = (file.read_bytes() for file in files)
+    assert first == second
+    assert first.startswith(b"\x89PNG")
