@@ -30,8 +30,8 @@ RECORD_LIMIT = 2**28
 
 _TOPIC = re.compile(r"tvist/(?P<robot>[^/]+)/(?P<kind>\w+)")
 _KINDS: dict[str, type[State | Event | Truth | Entry]] = {tag(k): k for k in (State, Event, Truth, Entry)}
-_DAMAGE = (McapError, ZstdError, struct.error, ValueError)
-"""What a record that is cut short or altered raises; a checksum that does not fit is a ValueError."""
+_DAMAGE = (McapError, ZstdError, ValueError, OverflowError, MemoryError)
+"""What an altered record raises: a false checksum is a ValueError, a length may be beyond memory."""
 
 
 class RecordingFileError(RecordingError):
@@ -109,7 +109,7 @@ class _Content:
         except (EndOfFile, struct.error):
             self.damage = "was not closed"
         except _DAMAGE as error:
-            self.damage = f"is cut short or damaged ({error})"
+            self.damage = f"is damaged ({error or type(error).__name__})"
         except ProtocolError as error:
             self.damage = f"holds what is none of ours ({error.why})"
 
@@ -120,8 +120,7 @@ class _Content:
         if not states:
             raise self._error("holds no state")
         ours = self.metadata.get(METADATA)
-        ended = self.metadata.get(END_METADATA)
-        dropped = None if ended is None else {kind: int(count) for kind, count in ended.items()}
+        dropped = self._dropped()
         return RecordingFile(
             robot=self.robot,
             info=None if ours is None else self._json(ours, "info", Info),
@@ -158,6 +157,13 @@ class _Content:
             self.robot = found["robot"]
         self.readers.setdefault(channel.id, (JsonReader(_KINDS[found["kind"]]), self.messages[found["kind"]]))
 
+    def _dropped(self) -> dict[str, int] | None:
+        counts = self.metadata.get(END_METADATA)
+        try:
+            return None if counts is None else {kind: int(count) for kind, count in counts.items()}
+        except ValueError as error:
+            raise self._error(f"has no valid {END_METADATA}: {error}") from error
+
     def _json(self, metadata: Mapping[str, str], name: str, kind: Any) -> Any:
         try:
             return msgspec.json.decode(metadata[name], type=kind)
@@ -178,7 +184,9 @@ class _Content:
 
 def _records(stream: IO[bytes]) -> Iterator[McapRecord]:
     """Records in order; those of a chunk only if the whole of it is sound."""
-    for record in StreamReader(stream, emit_chunks=True, record_size_limit=RECORD_LIMIT).records:
+    for record in StreamReader(
+        stream, emit_chunks=True, validate_crcs=True, record_size_limit=RECORD_LIMIT
+    ).records:
         if isinstance(record, Chunk):
             yield from breakup_chunk(record, validate_crc=True)
         else:

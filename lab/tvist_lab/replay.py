@@ -2,13 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from tvist_protocol.commands import Setpoint
 from tvist_protocol.errors import TvistError
 from tvist_protocol.journal import Entry, message_of
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.controller import Controller
+from tvist_server.recording import Recorder
 from tvist_server.setup import Setup
+
+from tvist_lab.mcap_file import RecordingFile
 
 
 class ReplayError(TvistError):
@@ -48,6 +52,45 @@ def replay(setup: Setup, journal: Sequence[Entry], states: Sequence[State]) -> R
         if done.first_difference is None:
             done.first_difference = _difference(recorded, done.states[-1])
     return done
+
+
+def replay_file(content: RecordingFile, output: Path | None = None) -> Replay:
+    """Replay a recording from its own start.
+
+    Args:
+        content: The recording, from the server's first tick on.
+        output: MCAP file for the second run.
+
+    Raises:
+        ReplayError: The recording does not say how its robot started, or begins too late.
+        ValueError: What it says of the start is wrong.
+    """
+    if content.start is None:
+        raise ReplayError("the recording does not say how its robot started: only tvist serve --record writes that")
+    if (content.dropped or {}).get("journal"):
+        raise ReplayError("the recorder dropped messages of its journal: no equal run can be made of what is left")
+    done = replay(setup := Setup.from_builtins(content.start), content.journal, content.states)
+    if output is not None:
+        _write(setup, content, done, output)
+    return done
+
+
+def _write(setup: Setup, content: RecordingFile, done: Replay, output: Path) -> None:
+    if content.info is None:
+        raise ReplayError("the recording has no info of its robot")
+    truths = {truth.tick: truth for truth in done.truths}
+    events = iter(done.events)
+    event = next(events, None)
+    with Recorder(output, content.info, setup.to_builtins()) as recorder:
+        for entry in content.journal:
+            recorder.journal(entry)
+        for state in done.states:
+            while event is not None and event.tick <= state.tick:
+                recorder.event(event)
+                event = next(events, None)
+            recorder.state(state)
+            if state.tick in truths:
+                recorder.truth(truths[state.tick])
 
 
 def _tick(controller: Controller, setup: Setup, done: Replay) -> None:

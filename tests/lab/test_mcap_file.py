@@ -54,13 +54,13 @@ def path(tmp_path):
     return tmp_path / "run.mcap"
 
 
-def foreign(path, topic="tvist/ur5e/state", encoding="json", messages=(), metadata=None):
+def foreign(path, topic="tvist/ur5e/state", encoding="json", messages=(), metadata=None, name="tvist"):
     """A file some other program wrote."""
     with path.open("wb") as stream:
         writer = Writer(stream, compression=CompressionType.NONE)
         writer.start()
         if metadata is not None:
-            writer.add_metadata("tvist", metadata)
+            writer.add_metadata(name, metadata)
         channel = writer.register_channel(topic, encoding, 0)
         for time, data in enumerate(messages):
             writer.add_message(channel, time, data, time)
@@ -215,6 +215,20 @@ def test_a_recording_of_a_later_format_is_refused(path):
 def test_metadata_that_is_none_of_ours_is_refused(path):
     with pytest.raises(RecordingFileError, match="has no valid info"):
         read(foreign(path, metadata={"format": "1", "info": "{}"}, messages=[to_json(STATE)]))
+
+
+def test_counts_that_are_no_numbers_are_refused(path):
+    with pytest.raises(RecordingFileError, match=r"has no valid tvist\.end"):
+        read(foreign(path, name="tvist.end", metadata={"state": "few"}, messages=[to_json(STATE)]))
+
+
+def test_a_start_that_was_altered_on_the_disk_is_noticed(path):
+    whole = record(path, states(3)).read_bytes()
+    assert whole.count(b'"seed": 3') == 1
+    path.write_bytes(whole.replace(b'"seed": 3', b'"seed": 4'))
+    found = read(path)
+    assert not found.complete
+    assert "is damaged" in found.note
 
 
 def test_a_message_that_is_none_ends_what_can_be_read(path):

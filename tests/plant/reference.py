@@ -1,8 +1,11 @@
 """A second way to move the arm: classical Runge-Kutta on pinocchio's articulated-body algorithm."""
 
+import itertools
+
 import numpy as np
 import pinocchio as pin
 import ruckig
+
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.model import flexible_model, rigid_model
@@ -43,13 +46,19 @@ def runge_kutta(description: RobotDescription, drive: list[DriveCommand], step: 
     F_c, w = np.array(drives.coulomb_friction), drives.friction_width
 
     def slope(x, q_r, qd_r, torque):
-        q, theta, v, omega, s = x[:N], x[N : N + n], x[N + n : 2 * N + n], x[2 * N + n : 2 * N + 2 * n], x[-n:]
+        q, theta, v, omega, s = (
+            x[:N],
+            x[N : N + n],
+            x[N + n : 2 * N + n],
+            x[2 * N + n : 2 * N + 2 * n],
+            x[-n:],
+        )
         gear = K_g * (q[arm.joints] - theta) + D_g * (v[arm.joints] - omega)
         tau = np.zeros(N)
         tau[arm.joints] = -gear
         tau[arm.flexes] = -arm.flex_stiffness * q[arm.flexes] - arm.flex_damping * v[arm.flexes]
         motor = torque + K_d * (qd_r - omega + (K_p + K_i) * (q_r - theta) + K_p * K_i * s)
-        omega_dot = (motor + gear - F_c * np.tanh(omega / w)) / B
+        omega_dot = (motor + gear - F_c * (omega / w if drives.linear_friction else np.tanh(omega / w))) / B
         return np.concatenate([v, omega, pin.aba(model, data, q, v, tau), omega_dot, q_r - theta]), tau
 
     first = drive[0]
@@ -62,10 +71,13 @@ def runge_kutta(description: RobotDescription, drive: list[DriveCommand], step: 
     x = np.concatenate([q, first.q, np.zeros(N + n), s])
     felt = []
     count = round(TICK / step)
-    for last, new in zip(drive[:-1], drive[1:], strict=True):
+    for last, new in itertools.pairwise(drive):
         for k in range(count):
             a, b, c = (
-                [getattr(last, f) + (k + p) / count * (getattr(new, f) - getattr(last, f)) for f in ("q", "qd", "torque")]
+                [
+                    getattr(last, f) + (k + p) / count * (getattr(new, f) - getattr(last, f))
+                    for f in ("q", "qd", "torque")
+                ]
                 for p in (0.0, 0.5, 1.0)
             )
             k1 = slope(x, *a)[0]

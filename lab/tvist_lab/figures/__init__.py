@@ -1,9 +1,10 @@
 """The paper's figures, drawn from recordings and from the shaping library."""
 
 from tvist_lab.figures.discretisation import figure_7
-from tvist_lab.figures.recorded import Recorded, motion_figure
+from tvist_lab.figures.identified import identified_figure
+from tvist_lab.figures.recorded import Recorded, motion_figure, observed_figure
 from tvist_lab.figures.residual import figure_16
 from tvist_lab.figures.sensitivity import figure_4
 from tvist_lab.figures.style import save
 
-__all__ = ["Recorded", "figure_4", "figure_7", "figure_16", "motion_figure", "save"]
+__all__ = ["Recorded", "figure_4", "figure_7", "figure_16", "identified_figure", "motion_figure", "observed_figure", "save"]

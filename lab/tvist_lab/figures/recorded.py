@@ -1,5 +1,6 @@
 """Figures 12 to 14: everything recorded of a motion, unshaped and shaped on one clock."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -37,11 +38,29 @@ def motion_figure(name: str, unshaped: Recorded, shaped: Recorded) -> Figure:
     Raises:
         NotMeasurableError: The attained position cannot be told: too little rest was recorded.
     """
+    return _figure(name, ((unshaped, UNSHAPED, "Unshaped"), (shaped, SHAPED, "Shaped")))
+
+
+def observed_figure(name: str, recorded: Recorded) -> Figure:
+    """The same panels for one motion of any recording.
+
+    Args:
+        name: Of the motion, as heading.
+        recorded: The motion.
+
+    Raises:
+        NotMeasurableError: The attained position cannot be told: too little rest was recorded.
+    """
+    return _figure(name, ((recorded, SHAPED, "Recorded"),))
+
+
+def _figure(name: str, drawn: Sequence[tuple[Recorded, str, str]]) -> Figure:
+    """The five panels, each recording with its colour and its name."""
     figure, axes = panels(5, 8.6, ratios=(1.25, 1, 1.25, 0.85, 0.85))
-    for recorded, color, label in ((unshaped, UNSHAPED, "Unshaped"), (shaped, SHAPED, "Shaped")):
+    for recorded, color, label in drawn:
         _draw(axes, recorded, color, label)
     accelerations, errors, alphas, frequencies, dampings = axes
-    _name_joints(accelerations, unshaped)
+    _name_joints(accelerations, drawn[0][0])
     title(accelerations, name)
     errors.axhline(1e3 * REPEATABILITY, color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)))
     note(
@@ -64,7 +83,7 @@ def motion_figure(name: str, unshaped: Recorded, shaped: Recorded) -> Figure:
     dampings.set_ylabel(r"Estimated $\zeta$ (–)")
     _grow(dampings, 0.1, 0.4)
     dampings.set_xlabel("Time (s)")
-    ends = [recording.time[m.shaped_stop] - recording.time[m.start] for recording, m in (unshaped, shaped)]
+    ends = [recording.time[m.shaped_stop] - recording.time[m.start] for (recording, m), _, _ in drawn]
     dampings.set_xlim(-LEAD, max(ends) + REST)
     legend(figure, accelerations)
     return figure

@@ -4,12 +4,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
 
+import msgspec
 import numpy as np
 from tvist_client.errors import ClientError
 from tvist_client.robot import Arm, Robot
 from tvist_protocol.calibration import Calibration, Provenance, Spread
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.info import Info
+from tvist_shaping import Polynomial
 
 from tvist_lab.collect import collect
 from tvist_lab.identification.fit import Fit, fit_polynomials, spread
@@ -68,6 +70,24 @@ class Identification:
     """Of the calibration [%]."""
     error_zeta: Spread
     """Of the calibration [%]."""
+    anchors: int = 0
+    """How many of the configurations, the first ones, were named."""
+
+    def poses(self) -> list[dict[str, float]]:
+        """Measured and estimated mode at each named pose."""
+        estimator = Polynomial(**msgspec.structs.asdict(self.calibration.polynomial))
+        rows = []
+        for number in range(self.anchors):
+            estimated_f_d, estimated_zeta = estimator.estimate(self.q[number])
+            rows.append(
+                {
+                    "f_d_hz": float(self.f_d[number]),
+                    "zeta": float(self.zeta[number]),
+                    "estimated_f_d_hz": float(estimated_f_d[0]),
+                    "estimated_zeta": float(estimated_zeta[0]),
+                }
+            )
+        return rows
 
 
 async def identify(
@@ -107,6 +127,7 @@ async def identify(
         progress(number + 1, len(q))
     if not kept:
         raise IdentificationError("no ring-down could be fitted: does the arm move, and is its accelerometer read?")
+    named = sum(number < len(plan.anchors) for number in kept)
     f_d, zeta = np.array(values).T
     q, weights = q[kept], weights[kept]
     joints = tuple(j for j in (1, 2, 3) if j < len(info.joints)) or (0,)
@@ -115,13 +136,13 @@ async def identify(
     if any(truth is None for truth in truths):
         return Identification(
             calibration, q, f_d, zeta, None, None,
-            "measurements that a fit did not see", fit.cross_validated_f_d, fit.cross_validated_zeta,
+            "measurements that a fit did not see", fit.cross_validated_f_d, fit.cross_validated_zeta, named,
         )  # fmt: skip
     true_f_d, true_zeta = np.array(truths, dtype=float).T
     return Identification(
         calibration, q, f_d, zeta, true_f_d, true_zeta,
         "the arm's true lowest mode, by fits that did not see the configuration",
-        spread(fit.unseen_f_d, true_f_d), spread(fit.unseen_zeta, true_zeta),
+        spread(fit.unseen_f_d, true_f_d), spread(fit.unseen_zeta, true_zeta), named,
     )  # fmt: skip
 
 
@@ -161,6 +182,6 @@ def _calibration(
             residual_f_d_percent=fit.residual_f_d,
             residual_zeta_percent=fit.residual_zeta,
             cross_validated_f_d_percent=fit.cross_validated_f_d,
-            cross_validated_zeta_percent=fit.cross_validated_zeta,
+            cross_validated_zeta_percent=fit.cross_validated_zeta, named,
         ),
     )

@@ -1,0 +1,41 @@
+"""How well a calibration says what was measured."""
+
+import msgspec
+import numpy as np
+from matplotlib.figure import Figure
+from tvist_protocol.calibration import Calibration
+from tvist_shaping import Polynomial
+
+from tvist_lab.figures.style import SHAPED, THIRD, UNSHAPED, legend, panels, title
+from tvist_lab.recordings import Floats
+
+
+def identified_figure(
+    calibration: Calibration, q: Floats, f_d: Floats, zeta: Floats, true_f_d: Floats | None, true_zeta: Floats | None
+) -> Figure:
+    """Estimated against measured (f_d, ζ), a point a configuration, and against the truth where it is known.
+
+    Args:
+        calibration: With the polynomials.
+        q: Configurations, shape (N, n) [rad].
+        f_d: Measured, shape (N,) [Hz].
+        zeta: Measured, shape (N,) [-].
+        true_f_d: Of the lowest true mode, shape (N,) [Hz].
+        true_zeta: Of the lowest true mode, shape (N,) [-].
+    """
+    estimator = Polynomial(**msgspec.structs.asdict(calibration.polynomial))
+    estimated = np.array([np.concatenate(estimator.estimate(row)) for row in q]).T
+    figure, axes = panels(2, 7.6, share_x=False)
+    for panel, estimate, measured, true, name in (
+        (axes[0], estimated[0], f_d, true_f_d, "$f_d$ (Hz)"),
+        (axes[1], estimated[1], zeta, true_zeta, r"$\zeta$ (–)"),
+    ):
+        ends = [float(np.min(measured)), float(np.max(measured))]
+        panel.plot(ends, ends, color=THIRD, linewidth=1.0, label="equal")
+        if true is not None:
+            panel.plot(true, estimate, ".", color=UNSHAPED, markersize=5, alpha=0.7, label="against the true lowest mode")
+        panel.plot(measured, estimate, ".", color=SHAPED, markersize=5, alpha=0.8, label="against the ring-down")
+        panel.set(xlabel=f"Measured or true {name}", ylabel=f"Calibration's {name}")
+    title(axes[0], f"{calibration.name}: {len(q)} configurations")
+    legend(figure, axes[0])
+    return figure

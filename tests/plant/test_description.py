@@ -1,0 +1,133 @@
+"""A robot file is read, checked and refused in one sentence that names file and key."""
+
+from importlib import resources
+
+import msgspec
+import numpy as np
+import pytest
+
+from tvist_plant.description import DescriptionError, RobotDescription, is_real_body, load, robots
+from tvist_plant.plant import Plant
+
+from .arms import chain, hold
+
+TEXT = (resources.files("tvist_plant") / "robots" / "ur5e.toml").read_text(encoding="utf-8")
+MASS = "mass = [3.761, 8.058, 2.846, 1.37, 1.3, 0.365]"
+NAMES = 'joints = ["base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3"]'
+
+
+def test_ur5e_comes_with_the_package(ur5e):
+    assert "ur5e" in robots()
+    assert ur5e.joints == 6
+    assert {"Q1", "Q2", "Q3"} <= ur5e.poses.keys()
+    assert ur5e.payload.mass == 5.0
+
+
+def test_a_file_by_its_path_is_the_same_as_the_name(tmp_path, ur5e):
+    file = tmp_path / "mine.toml"
+    file.write_text(TEXT, encoding="utf-8")
+    assert load(file) == load(str(file)) == ur5e
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ("repeatability = 3.0e-5", "repeatability = 3.0e-5\nrepeatabilty = 1.0", "repeatabilty"),
+        ("[sensors]", "[sensor]", "sensor"),
+        ("repeatability = 3.0e-5", "", "repeatability"),
+        ("[payload] #", "[[payload]] #", "payload"),
+        ("mass    = 5.0", 'mass    = "5 kg"', "payload.mass"),
+        ("mass    = 5.0", "mass    = nan", "payload.mass"),
+        ("mass    = 5.0", "mass    = -1.0", "payload.mass"),
+        ("d     = [0.1625", "d     = [nan", "kinematics.d"),
+        ("d     = [0.1625", "d     = [inf", "kinematics.d"),
+        ("d     = [0.1625", "d     = [-inf", "kinematics.d"),
+        (MASS, "mass = [3.761, 8.058]", "links.mass"),
+        (MASS, MASS.replace("3.761", "0.0"), "links.mass"),
+        ("[0.0, -0.02561, 0.00193]", "[0.0, -0.02561]", "links.com"),
+        (NAMES, "joints = []", "robot.joints"),
+        (NAMES, 'joints = ["a", "b", "c", "d", "e", "f", "g", "h"]', "robot.joints"),
+        ("links        = [1, 2]", "links        = [1, 6]", "link_flexibility.links"),
+        ("links        = [1, 2]", "links        = [1, 3]", "link_flexibility.links"),
+        ("links        = [1, 2]", "links        = [1, 1]", "link_flexibility.links"),
+        ("links        = [1, 2]", "links        = [1, 99]", "link_flexibility.links"),
+        ("links        = [1, 2]", "links        = [1]", "link_flexibility.stiffness"),
+        ("gear_error_waves     = 202", "gear_error_waves     = 0", "drives.gear_error_waves"),
+        ("[0.00018694, 6e-8", "[0.00018694, 6e-2", "links.inertia[5]"),
+        (
+            "inertia = [0.00586, 0.0, 0.0, 0.00586, 0.0, 0.00625]",
+            "inertia = [0.0, 0, 0, 0, 0, 1]",
+            "payload.inertia",
+        ),
+        ("Q1 = [0.0, ", "Q1 = [", "poses.Q1"),
+        ("[robot]", "[robot", "line 8"),
+    ],
+)
+def test_a_wrong_file_is_one_sentence_that_names_file_and_key(tmp_path, old, new, key):
+    assert TEXT.count(old) == 1
+    file = tmp_path / "wrong.toml"
+    file.write_text(TEXT.replace(old, new), encoding="utf-8")
+    with pytest.raises(DescriptionError) as refused:
+        load(file)
+    sentence = str(refused.value)
+    assert "wrong.toml" in sentence
+    assert key in sentence
+    assert "\n" not in sentence
+
+
+def test_an_unknown_robot_is_answered_with_the_known_ones():
+    with pytest.raises(DescriptionError, match=r"ur6e.*ur5e"):
+        load("ur6e")
+
+
+def test_what_cannot_be_read_is_named(tmp_path):
+    with pytest.raises(DescriptionError, match="nor a readable file"):
+        load(tmp_path)
+    file = tmp_path / "binary.toml"
+    file.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(DescriptionError, match=r"binary\.toml"):
+        load(file)
+
+
+def test_a_body_of_points_is_real_and_one_with_a_too_large_moment_is_not():
+    assert is_real_body((0.0,) * 6)
+    assert is_real_body((1.0, 0.0, 0.0, 1.0, 0.0, 2.0))  # a thin disc: the limit
+    assert not is_real_body((1.0, 0.0, 0.0, 1.0, 0.0, 2.1))
+    assert not is_real_body((1.0, 1.1, 0.0, 1.0, 0.0, 1.0))
+
+
+def test_clean_takes_away_what_is_not_linear(ur5e):
+    clean = ur5e.clean()
+    assert clean.drives.linear_friction
+    assert clean.drives.gear_error_amplitude == clean.sensors.accelerometer_noise == 0.0
+    assert clean.drives.coulomb_friction == ur5e.drives.coulomb_friction
+    assert msgspec.structs.replace(clean, drives=ur5e.drives, sensors=ur5e.sensors) == ur5e
+
+
+@pytest.mark.parametrize("joints", [1, 2, 3, 7])
+def test_arms_of_other_sizes_stand_still_and_move(joints):
+    arm = chain(joints)
+    assert isinstance(arm, RobotDescription)
+    plant = Plant(arm, arm.payload)
+    command = hold(arm, np.linspace(0.3, -0.4, joints))
+    first = plant.reset(command, seed=3)
+    place = plant.truth().flange_position
+    for _ in range(500):
+        measured = plant.step(command)
+    assert measured.q.shape == measured.qd.shape == measured.moment.shape == (joints,)
+    np.testing.assert_allclose(measured.q, first.q, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(plant.truth().flange_position, place, rtol=0.0, atol=1e-9)
+    target = hold(arm, command.q + 0.001)
+    for _ in range(500):
+        measured = plant.step(target)
+    assert np.isfinite(measured.accelerometer).all()
+    np.testing.assert_allclose(measured.q, plant.reset(target, seed=3).q, rtol=0.0, atol=1e-4)
+
+
+def test_modes_are_found_for_any_number_of_joints():
+    for joints in (1, 2, 3, 7):
+        arm = chain(joints)
+        found = Plant(arm, arm.payload).modes(np.zeros(joints))
+        assert len(found.f_d) >= 1
+        assert np.all(np.diff(found.f_d) >= 0.0)
+        assert np.all((found.zeta > 0.0) & (found.zeta < 1.0))

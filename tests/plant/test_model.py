@@ -1,0 +1,133 @@
+"""The two multibody models against textbook kinematics and against each other."""
+
+import msgspec
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from tvist_plant.description import Payload
+from tvist_plant.model import FLANGE, flexible_model, rigid_model
+
+from .arms import chain, forward_kinematics
+
+
+def random_poses(joints, count=20):
+    return np.random.default_rng(5).uniform(-np.pi, np.pi, (count, joints))
+
+
+def stiff(flexible, q):
+    """Joint angles among those of the flexible arm, whose links do not bend."""
+    angles = np.zeros(flexible.model.nv)
+    angles[flexible.joints] = q
+    return angles
+
+
+def symmetric(M):
+    return np.triu(M) + np.triu(M, 1).T
+
+
+def test_mass_is_that_of_the_links_and_the_payload(ur5e):
+    total = sum(ur5e.links.mass) + ur5e.payload.mass
+    assert pin.computeTotalMass(rigid_model(ur5e, ur5e.payload)) == pytest.approx(total, rel=1e-12)
+    assert pin.computeTotalMass(flexible_model(ur5e, ur5e.payload).model) == pytest.approx(total, rel=1e-12)
+
+
+def test_gravity_asks_the_shoulder_for_107_newton_metres_at_Q1(ur5e):
+    model = rigid_model(ur5e, ur5e.payload)
+    gravity = pin.computeGeneralizedGravity(model, model.createData(), np.array(ur5e.poses["Q1"]))
+    assert abs(gravity[1]) == pytest.approx(106.6, abs=0.05)
+    assert gravity[0] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("pose", "elbow", "place"),
+    [("Q1", 1, (0.917, -0.233, 0.163)), ("Q3", 1, (0.233, -0.246, 0.162)), ("Q3", -1, (0.233, 0.246, 0.162))],
+)
+def test_the_flange_is_where_the_paper_moves_it(ur5e, pose, elbow, place):
+    q = np.array(ur5e.poses[pose]) * [1, 1, elbow, 1, 1, 1]
+    np.testing.assert_allclose(forward_kinematics(ur5e, q)[:3, 3], place, atol=6e-4)
+
+
+@pytest.mark.parametrize("arm", ["ur5e", "chain"])
+def test_both_models_have_the_flange_where_denavit_and_hartenberg_put_it(ur5e, arm):
+    description = ur5e if arm == "ur5e" else chain(7)
+    rigid = rigid_model(description, description.payload)
+    flexible = flexible_model(description, description.payload)
+    for q in random_poses(description.joints):
+        expected = forward_kinematics(description, q)
+        for model, angles in ((rigid, q), (flexible.model, stiff(flexible, q))):
+            data = model.createData()
+            pin.framesForwardKinematics(model, data, angles)
+            np.testing.assert_allclose(data.oMf[model.getFrameId(FLANGE)].homogeneous, expected, atol=1e-12)
+
+
+def test_bending_links_keep_mass_centre_and_gravity(ur5e):
+    rigid, flexible = rigid_model(ur5e, ur5e.payload), flexible_model(ur5e, ur5e.payload)
+    for q in random_poses(6):
+        data, flexible_data = rigid.createData(), flexible.model.createData()
+        angles = stiff(flexible, q)
+        np.testing.assert_allclose(
+            pin.centerOfMass(flexible.model, flexible_data, angles),
+            pin.centerOfMass(rigid, data, q),
+            atol=1e-12,
+        )
+        np.testing.assert_allclose(
+            pin.computeGeneralizedGravity(flexible.model, flexible_data, angles)[flexible.joints],
+            pin.computeGeneralizedGravity(rigid, data, q),
+            atol=1e-10,
+        )
+
+
+def test_lumps_change_the_mass_matrix_by_the_inertia_they_change_and_nothing_else(ur5e, measured):
+    """Two lumps have Iyy and Izz of Iyy + Ixx and no products; the rest of the arm is untouched."""
+    rigid, flexible = rigid_model(ur5e, ur5e.payload), flexible_model(ur5e, ur5e.payload)
+    largest = 0.0
+    for q in random_poses(6):
+        data, angles = rigid.createData(), stiff(flexible, q)
+        M = symmetric(pin.crba(rigid, data, q))
+        lumped = symmetric(pin.crba(flexible.model, flexible.model.createData(), angles))
+        expected = M.copy()
+        for link in ur5e.link_flexibility.links:
+            xx, xy, xz, yy, yz, zz = ur5e.links.inertia[link]
+            change = np.array([[0, -xy, -xz], [-xy, xx, -yz], [-xz, -yz, yy + xx - zz]])
+            alpha = ur5e.kinematics.alpha[link]
+            turn = pin.exp3(np.array([alpha, 0.0, 0.0]))
+            spin = pin.computeJointJacobian(rigid, data, q, link + 1)[3:]
+            expected += spin.T @ turn @ change @ turn.T @ spin
+        projected = lumped[np.ix_(flexible.joints, flexible.joints)]
+        np.testing.assert_allclose(projected, expected, atol=1e-12)
+        largest = max(largest, np.max(np.abs(projected - M)))
+    measured("largest change of an entry of M [kg m^2]", largest)
+    assert largest < 0.05
+
+
+def test_virtual_joints_turn_about_the_middle_of_their_link(ur5e):
+    """Bending by a small angle moves the flange by that angle times its distance from the middle."""
+    flexible = flexible_model(ur5e, Payload())
+    data = flexible.model.createData()
+    q = np.zeros(6)
+    angles = stiff(flexible, q)
+    jacobian = pin.computeFrameJacobian(
+        flexible.model, data, angles, flexible.flange, pin.LOCAL_WORLD_ALIGNED
+    )
+    flange = forward_kinematics(ur5e, q)[:3, 3]
+    kinematics = ur5e.kinematics
+    for number, dof in zip((1, 2), flexible.flexes[1::2], strict=True):
+        part = msgspec.structs.replace(
+            ur5e,
+            kinematics=msgspec.structs.replace(
+                kinematics,
+                a=(*kinematics.a[:number], kinematics.a[number] / 2),
+                d=kinematics.d[: number + 1],
+                alpha=kinematics.alpha[: number + 1],
+            ),
+        )
+        middle = forward_kinematics(part, q[: number + 1])
+        np.testing.assert_allclose(
+            jacobian[:3, dof], np.cross(middle[:3, 2], flange - middle[:3, 3]), atol=1e-12
+        )
+
+
+def test_a_payload_of_zero_mass_changes_nothing(ur5e):
+    empty = rigid_model(ur5e, Payload())
+    assert pin.computeTotalMass(empty) == pytest.approx(sum(ur5e.links.mass), rel=1e-12)

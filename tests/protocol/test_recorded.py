@@ -1,0 +1,133 @@
+"""Messages as they stand in a recording: exact, and in the form viewers open."""
+
+import json
+import math
+
+import jsonschema
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tvist_protocol import Event, ProtocolError, State, Truth
+from tvist_protocol.generate import FOLDER
+from tvist_protocol.journal import Entry
+from tvist_protocol.recorded import JsonReader, to_json, topics, viewer_schema
+
+KINDS = (State, Event, Truth, Entry)
+HARD_FLOATS = [5e-324, -0.0, 0.0, 0.1 + 0.2, 1e300, -1e300, 1.0, 1e22, 2.0**53 + 2, 1.7976931348623157e308]
+
+
+def golden(name, kind):
+    return msgspec.json.decode((FOLDER / "fixtures" / "v1" / f"{name}.json").read_bytes(), type=kind)
+
+
+STATE = golden("state", State)
+MESSAGES = [
+    STATE,
+    msgspec.structs.replace(STATE, setpoint_sequence=None),
+    msgspec.structs.replace(STATE, setpoint_sequence=2**64 - 1),
+    golden("event", Event),
+    Event(tick=1, kind="warning"),
+    Event(tick=1, kind="warning", why='a "quoted":null sentence\n'),
+    golden("truth", Truth),
+    Entry(tick=4, kind="client_gone", client="x"),
+    Entry(tick=4, kind="missed", count=3),
+    Entry(tick=4, kind="setpoint", message={"type": "setpoint", "token": "t", "sequence": 0, "q": [0.5]}),
+]
+
+
+def bits(values):
+    return [value.hex() for value in values]
+
+
+@pytest.mark.parametrize("message", MESSAGES, ids=lambda message: type(message).__name__)
+def test_a_message_comes_back_equal(message):
+    back = JsonReader(type(message)).read(to_json(message))
+    assert type(back) is type(message)
+    assert back == message
+
+
+def test_hard_floats_come_back_bit_for_bit():
+    state = msgspec.structs.replace(STATE, reference_q=HARD_FLOATS, shaper_delay=-0.0)
+    back = JsonReader(State).read(to_json(state))
+    assert bits(back.reference_q) == bits(HARD_FLOATS)
+    assert back.shaper_delay.hex() == (-0.0).hex()
+
+
+@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), max_size=8))
+def test_any_finite_float_comes_back_bit_for_bit(values):
+    back = JsonReader(State).read(to_json(msgspec.structs.replace(STATE, target_q=values)))
+    assert bits(back.target_q) == bits(values)
+
+
+def test_a_number_that_is_not_finite_comes_back_as_nan():
+    state = msgspec.structs.replace(
+        STATE, setpoint_sequence=None, actual_q=[1.5, math.nan, math.inf], shaper_delay=-math.inf
+    )
+    back = JsonReader(State).read(to_json(state))
+    assert back.actual_q[0] == 1.5
+    assert all(map(math.isnan, (*back.actual_q[1:], back.shaper_delay)))
+    assert back.setpoint_sequence is None
+    assert back.target_q == state.target_q
+
+
+@pytest.mark.parametrize("message", MESSAGES, ids=lambda message: type(message).__name__)
+def test_the_schema_accepts_what_is_recorded(message):
+    schema = viewer_schema(type(message))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(json.loads(to_json(message)), schema)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_schema_refuses_another_kind_of_message(kind):
+    for message in MESSAGES:
+        if type(message) is not kind:
+            with pytest.raises(jsonschema.ValidationError):
+                jsonschema.validate(json.loads(to_json(message)), viewer_schema(kind))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_schema_is_of_the_form_viewers_read(kind):
+    """One plain type a field, properties at every object, no reference: all that Lichtblick knows."""
+
+    def check(schema):
+        assert schema["type"] == "object"
+        for part in schema["properties"].values():
+            assert part["type"] in {"boolean", "string", "number", "integer", "object", "array"}
+            if part["type"] == "object":
+                check(part)
+            if part["type"] == "array":
+                assert part["items"]["type"] in {"boolean", "string", "number", "integer"}
+
+    schema = viewer_schema(kind)
+    check(schema)
+    assert "$ref" not in json.dumps(schema)
+    assert "null" not in json.dumps([part.get("type") for part in schema["properties"].values()])
+    assert all(part.get("description") for name, part in schema["properties"].items() if name != "type")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "data", [b"", b"{", b"[1]", b"[]", b"3", b"{}", b"\xff\xfe", b'{"type":"done"}', b"null"]
+)
+def test_what_is_no_message_is_a_protocol_error(kind, data):
+    with pytest.raises(ProtocolError) as caught:
+        JsonReader(kind).read(data)
+    assert caught.value.code == "malformed"
+
+
+def test_fields_of_a_later_version_are_ignored():
+    data = to_json(STATE)[:-1] + b',"mood":"good"}'
+    assert JsonReader(State).read(data) == STATE
+
+
+def test_topics_are_named_as_the_keys():
+    assert list(topics("ur5e").values()) == [
+        "tvist/ur5e/state",
+        "tvist/ur5e/event",
+        "tvist/ur5e/truth",
+        "tvist/ur5e/journal",
+    ]
+    with pytest.raises(ProtocolError):
+        topics("*")

@@ -1,0 +1,338 @@
+"""The recorder: takes everything at once, disturbs nobody, and says what it lost."""
+
+import io
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import msgspec
+import pytest
+from mcap.reader import make_reader
+
+from tvist_protocol import Event, Info, Setpoint, State, Truth
+from tvist_protocol.generate import FOLDER
+from tvist_protocol.journal import Entry, entry_of
+from tvist_protocol.recorded import JsonReader
+from tvist_server.recording import Recorder, RecordingError
+from tvist_server.recording.writer import RecordingWriter
+
+
+def golden(name, kind):
+    return msgspec.json.decode((FOLDER / "fixtures" / "v1" / f"{name}.json").read_bytes(), type=kind)
+
+
+INFO, STATE, TRUTH = golden("info", Info), golden("state", State), golden("truth", Truth)
+
+
+def state(tick):
+    return msgspec.structs.replace(STATE, tick=tick, timestamp=tick * 0.002, actual_q=[tick / 3] * 6)
+
+
+def read(path):
+    """Messages by kind, through the plain reader, in the order of the file."""
+    kinds = {"state": State, "event": Event, "truth": Truth, "journal": Entry}
+    found = {kind: [] for kind in kinds}
+    with path.open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages(log_time_order=False):
+            kind = channel.topic.rsplit("/", 1)[1]
+            found[kind].append(JsonReader(kinds[kind]).read(message.data))
+    return found
+
+
+def dropped_in(path):
+    with path.open("rb") as stream:
+        metadata = {m.name: m.metadata for m in make_reader(stream).iter_metadata()}
+    return {kind: int(count) for kind, count in metadata["tvist.end"].items()}
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "run.mcap"
+
+
+@pytest.fixture
+def gate(monkeypatch):
+    """Holds the writer's thread at its first message until it is opened."""
+    opened, reached = threading.Event(), threading.Event()
+    write = RecordingWriter.write
+
+    def held(self, message):
+        reached.set()
+        opened.wait()
+        write(self, message)
+
+    monkeypatch.setattr(RecordingWriter, "write", held)
+    opened.reached = reached
+    yield opened
+    opened.set()
+
+
+def test_everything_comes_back_in_order(path):
+    entries = [
+        entry_of(tick, Setpoint(token="t", sequence=tick, q=(0.1 + 0.2, -0.0))) for tick in range(1, 9)
+    ]
+    events = [Event(tick=4, kind="motion_done", id=1), Event(tick=4, kind="warning", why="x")]
+    with Recorder(path, INFO, {}) as recorder:
+        for tick, entry in enumerate(entries, start=1):
+            recorder.journal(entry)
+            recorder.state(state(tick))
+            recorder.truth(msgspec.structs.replace(TRUTH, tick=tick))
+        for event in events:
+            recorder.event(event)
+    assert recorder.error is None
+    assert recorder.dropped == 0
+    found = read(path)
+    assert found["state"] == [state(tick) for tick in range(1, 9)]
+    assert [truth.tick for truth in found["truth"]] == list(range(1, 9))
+    assert found["event"] == events
+    assert [entry.tick for entry in found["journal"]] == list(range(1, 9))
+
+
+def test_equal_runs_make_equal_files_whatever_the_threads_do(tmp_path):
+    paths = tmp_path / "a.mcap", tmp_path / "b.mcap"
+    for path, queue_size in zip(paths, (3, 8192), strict=True):
+        with Recorder(path, INFO, {"seed": 1}, queue_size=queue_size, wait=True) as recorder:
+            for tick in range(2000):
+                recorder.state(state(tick))
+        assert recorder.dropped == 0
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+def test_what_finds_the_queue_full_is_dropped_and_counted_and_the_rest_keeps_its_order(path, gate):
+    recorder = Recorder(path, INFO, {}, queue_size=5)
+    recorder.state(state(0))
+    assert gate.reached.wait(10)
+    for tick in range(1, 11):
+        recorder.state(state(tick))
+    recorder.event(Event(tick=10, kind="warning"))
+    recorder.journal(Entry(tick=10, kind="missed", count=1))
+    assert recorder.dropped == 7
+    gate.set()
+    recorder.close()
+    assert recorder.error is None
+    assert [s.tick for s in read(path)["state"]] == [0, 1, 2, 3, 4, 5]
+    assert dropped_in(path) == {"state": 5, "event": 1, "truth": 0, "journal": 1}
+
+
+def test_recording_goes_on_after_a_full_queue(path, gate):
+    recorder = Recorder(path, INFO, {}, queue_size=2)
+    recorder.state(state(0))
+    assert gate.reached.wait(10)
+    for tick in range(1, 5):
+        recorder.state(state(tick))
+    assert recorder.dropped == 2
+    gate.set()
+    recorder._wait_for_room()
+    recorder.state(state(5))
+    recorder.close()
+    assert [s.tick for s in read(path)["state"]] == [0, 1, 2, 5]
+    assert recorder.dropped == 2
+
+
+def test_who_may_wait_loses_nothing(path):
+    with Recorder(path, INFO, {}, queue_size=1, wait=True) as recorder:
+        for tick in range(30):
+            recorder.state(state(tick))
+    assert [s.tick for s in read(path)["state"]] == list(range(30))
+
+
+def test_closing_again_does_nothing_and_leaves_no_thread(path):
+    before = set(threading.enumerate())
+    recorder = Recorder(path, INFO, {})
+    recorder.state(state(1))
+    recorder.close()
+    content = path.read_bytes()
+    recorder.close()
+    assert path.read_bytes() == content
+    assert set(threading.enumerate()) == before
+
+
+def test_what_comes_after_closing_is_counted(path):
+    recorder = Recorder(path, INFO, {})
+    recorder.close()
+    recorder.state(state(1))
+    recorder.event(Event(tick=1, kind="warning"))
+    assert recorder.dropped == 2
+
+
+def test_a_file_that_exists_is_replaced_only_when_asked(path):
+    path.write_bytes(b"precious")
+    with pytest.raises(RecordingError, match=r"run\.mcap exists"):
+        Recorder(path, INFO, {})
+    assert path.read_bytes() == b"precious"
+    with Recorder(path, INFO, {}, overwrite=True) as recorder:
+        recorder.state(state(1))
+    assert len(read(path)["state"]) == 1
+
+
+@pytest.mark.parametrize("start", [{"x": float("nan")}, {"x": object()}])
+def test_a_start_that_cannot_be_written_costs_no_file(path, start):
+    path.write_bytes(b"precious")
+    with pytest.raises(RecordingError, match="cannot be begun"):
+        Recorder(path, INFO, start, overwrite=True)
+    assert path.read_bytes() == b"precious"
+
+
+@pytest.mark.parametrize(
+    ("where", "says"),
+    [
+        ("missing/run.mcap", "No such file or directory"),
+        ("file/run.mcap", "Not a directory"),
+        (".", "Is a directory"),
+    ],
+)
+def test_a_place_that_cannot_be_written_is_refused_before_anything_runs(tmp_path, where, says):
+    (tmp_path / "file").touch()
+    before = threading.active_count()
+    with pytest.raises(RecordingError, match=says) as caught:
+        Recorder(tmp_path / where, INFO, {}, overwrite=True)
+    assert "\n" not in str(caught.value)
+    assert threading.active_count() == before
+
+
+def test_a_full_disk_is_refused_before_anything_runs():
+    with pytest.raises(RecordingError, match="No space left on device"):
+        Recorder("/dev/full", INFO, {}, overwrite=True)
+
+
+def test_a_queue_without_room_is_refused(path):
+    with pytest.raises(RecordingError, match="queue_size is 0"):
+        Recorder(path, INFO, {}, queue_size=0)
+    assert not path.exists()
+
+
+class FullDisk(io.FileIO):
+    """A disk with room for so many bytes."""
+
+    room = 0
+
+    def write(self, data):
+        if self.tell() + len(data) > self.room:
+            raise OSError(28, "No space left on device")
+        return super().write(data)
+
+
+@pytest.mark.parametrize("room", [20_000, 100_000])
+def test_a_disk_that_fills_up_stops_the_recording_and_is_told_once(path, monkeypatch, room):
+    disk = FullDisk(path, "w")
+    disk.room = room
+    monkeypatch.setattr(type(path), "open", lambda *_: io.BufferedWriter(disk))
+    told, called = [], threading.Event()
+
+    def on_error(sentence):
+        told.append((sentence, threading.current_thread().name))
+        called.set()
+
+    before = set(threading.enumerate())
+    recorder = Recorder(path, INFO, {}, wait=True, on_error=on_error)
+    tick = 0
+    while not called.is_set():
+        recorder.state(state(tick))
+        tick += 1
+    lost = recorder.dropped
+    recorder.state(state(tick))
+    assert recorder.dropped == lost + 1
+    recorder.close()
+    recorder.close()
+    assert told == [(recorder.error, "recorder")]
+    assert recorder.error.endswith("has stopped and is incomplete: No space left on device")
+    assert str(path) in recorder.error
+    assert disk.closed
+    assert set(threading.enumerate()) == before
+
+
+def test_a_disk_that_fills_up_at_the_end_is_told_too(path, monkeypatch):
+    disk = FullDisk(path, "w")
+    disk.room = 15_000
+    monkeypatch.setattr(type(path), "open", lambda *_: io.BufferedWriter(disk))
+    told = []
+    recorder = Recorder(path, INFO, {}, on_error=told.append)
+    disk.room = disk.tell() + 100
+    recorder.state(state(1))
+    recorder.close()
+    assert told == [recorder.error]
+
+
+def test_a_message_that_cannot_be_written_stops_the_recording_not_the_robot(path):
+    told = threading.Event()
+    recorder = Recorder(path, INFO, {}, on_error=lambda _: told.set())
+    recorder.state(msgspec.structs.replace(STATE, actual_q=[object()]))
+    assert told.wait(10)
+    recorder.close()
+    assert "object" in recorder.error
+
+
+def test_on_error_may_close(path):
+    told = threading.Event()
+
+    def on_error(_):
+        recorder.close()
+        told.set()
+
+    recorder = Recorder(path, INFO, {}, on_error=on_error)
+    recorder.state(msgspec.structs.replace(STATE, tick=-1))
+    assert told.wait(10)
+    recorder.close()
+    assert recorder.error is not None
+
+
+CHILD = """
+import os, resource, sys
+import msgspec
+from tvist_protocol import Info, State
+from tvist_server.recording import Recorder
+
+path, info, state, size, limit = sys.argv[1:]
+if limit != "0":
+    resource.setrlimit(resource.RLIMIT_FSIZE, (int(limit), int(limit)))
+recorder = Recorder(path, msgspec.json.decode(info, type=Info), {"seed": 5}, wait=True)
+state = msgspec.json.decode(state, type=State)
+tick = 0
+while os.path.getsize(path) < int(size) and recorder.error is None:
+    tick += 1
+    recorder.state(msgspec.structs.replace(state, tick=tick, timestamp=tick * 0.002, actual_q=[tick / 3] * 6))
+print(recorder.error or "recording", flush=True)
+sys.stdin.read()
+recorder.close()
+"""
+
+
+def recording_process(path, size, limit=0):
+    arguments = [str(path), msgspec.json.encode(INFO).decode(), msgspec.json.encode(STATE).decode()]
+    return subprocess.Popen(
+        [sys.executable, "-c", CHILD, *arguments, str(size), str(limit)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_a_killed_process_leaves_its_complete_chunks_behind(path):
+    from tvist_lab.mcap_file import read as read_file
+
+    with recording_process(path, size=60_000) as process:
+        assert process.stdout.readline() == "recording\n"
+        os.kill(process.pid, signal.SIGKILL)
+    assert process.returncode == -signal.SIGKILL
+    found = read_file(path)
+    assert not found.complete
+    assert "was not closed" in found.note
+    assert found.start == {"seed": 5}
+    assert found.dropped is None
+    assert [s.tick for s in found.states] == list(range(1, len(found.states) + 1))
+    assert len(found.states) > 100
+
+
+def test_a_file_that_may_grow_no_further_is_readable_up_to_there(path):
+    from tvist_lab.mcap_file import read as read_file
+
+    with recording_process(path, size=10**9, limit=100_000) as process:
+        assert process.stdout.readline().endswith("is incomplete: File too large\n")
+        process.stdin.close()
+        assert process.wait(10) == 0
+    found = read_file(path)
+    assert not found.complete
+    assert [s.tick for s in found.states] == list(range(1, len(found.states) + 1))
+    assert len(found.states) > 100

@@ -1,0 +1,120 @@
+"""The file: opened by the plain MCAP reader, valid by its own schemas, equal for equal messages."""
+
+import io
+import json
+
+import jsonschema
+import msgspec
+import pytest
+from mcap.reader import make_reader
+
+from tvist_protocol import Event, Info, MoveJ, Setpoint, State, Truth
+from tvist_protocol.generate import FOLDER
+from tvist_protocol.journal import Entry, entry_of
+from tvist_protocol.recorded import topics
+from tvist_server.recording.writer import CHUNK_SIZE, RecordingWriter, heading
+
+START = {"seed": 3, "q": [0.1 + 0.2, -0.0], "nested": {"b": 1, "a": None}}
+
+
+def golden(name, kind):
+    return msgspec.json.decode((FOLDER / "fixtures" / "v1" / f"{name}.json").read_bytes(), type=kind)
+
+
+INFO, STATE, TRUTH = golden("info", Info), golden("state", State), golden("truth", Truth)
+
+
+def session(ticks):
+    """A little of everything, in the order a server would say it."""
+    for tick in range(1, ticks + 1):
+        if tick == 1:
+            yield entry_of(tick, MoveJ(token="t", q=(0.5, 1.0)), client="a")
+        if tick % 7 == 0:
+            yield entry_of(tick, Setpoint(token="t", sequence=tick, q=(0.1 * tick, -0.0)))
+        if tick % 50 == 0:
+            yield Entry(tick=tick, kind="missed", count=1)
+            yield Event(tick=tick, kind="warning", why="late")
+        q = [tick * 0.1, tick / 3, -tick / 7]
+        yield msgspec.structs.replace(
+            STATE, tick=tick, timestamp=tick * 0.002, setpoint_sequence=tick if tick > 6 else None, actual_q=q
+        )
+        yield msgspec.structs.replace(TRUTH, tick=tick, timestamp=tick * 0.002, motor_q=q)
+
+
+def written(messages, start=START, stream=None):
+    stream = stream or io.BytesIO()
+    writer = RecordingWriter(stream, topics(INFO.name), heading(INFO, start))
+    for message in messages:
+        writer.write(message)
+    writer.finish({})
+    return stream
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return written(session(400)).getvalue()
+
+
+def test_the_plain_reader_opens_it(recording):
+    reader = make_reader(io.BytesIO(recording), validate_crcs=True)
+    summary = reader.get_summary()
+    assert {channel.topic: channel.message_encoding for channel in summary.channels.values()} == {
+        f"tvist/ur5e/{kind}": "json" for kind in ("state", "event", "truth", "journal")
+    }
+    assert {schema.name: schema.encoding for schema in summary.schemas.values()} == {
+        f"tvist.{kind}": "jsonschema" for kind in ("state", "event", "truth", "journal")
+    }
+    assert len(summary.chunk_indexes) > 3
+    assert {index.compression for index in summary.chunk_indexes} == {"zstd"}
+    counts = {
+        summary.channels[number].topic: count
+        for number, count in summary.statistics.channel_message_counts.items()
+    }
+    assert counts["tvist/ur5e/state"] == counts["tvist/ur5e/truth"] == 400
+
+
+def test_no_chunk_is_larger_than_a_chunk_and_a_message(recording):
+    chunks = make_reader(io.BytesIO(recording)).get_summary().chunk_indexes
+    assert all(chunk.uncompressed_size < CHUNK_SIZE + 4096 for chunk in chunks)
+
+
+def test_the_schemas_validate_every_message(recording):
+    validators = {}
+    for schema, _, message in make_reader(io.BytesIO(recording)).iter_messages():
+        if schema.id not in validators:
+            content = json.loads(schema.data)
+            jsonschema.Draft202012Validator.check_schema(content)
+            validators[schema.id] = jsonschema.Draft202012Validator(content)
+        validators[schema.id].validate(json.loads(message.data))
+    assert len(validators) == 4
+
+
+def test_times_are_ticks_and_ascend(recording):
+    last = 0
+    for _, _, message in make_reader(io.BytesIO(recording)).iter_messages(log_time_order=False):
+        assert message.log_time == message.publish_time == json.loads(message.data)["tick"] * 2_000_000
+        assert message.log_time >= last
+        last = message.log_time
+
+
+def test_metadata_says_how_the_server_was_started_and_what_was_dropped(recording):
+    metadata = {m.name: m.metadata for m in make_reader(io.BytesIO(recording)).iter_metadata()}
+    assert metadata["tvist"]["format"] == "1"
+    assert json.loads(metadata["tvist"]["start"]) == START
+    assert msgspec.json.decode(metadata["tvist"]["info"], type=Info) == INFO
+    assert metadata["tvist.end"] == {"state": "0", "event": "0", "truth": "0", "journal": "0"}
+
+
+def test_equal_messages_make_equal_files(recording):
+    again = dict(reversed(START.items()))
+    assert written(session(400), again).getvalue() == recording
+
+
+def test_another_message_makes_another_file(recording):
+    assert written(session(401)).getvalue() != recording
+
+
+@pytest.mark.parametrize("wrong", [{"x": float("nan")}, {"x": object()}, {"x": float("inf")}])
+def test_a_start_that_json_cannot_say_is_an_error(wrong):
+    with pytest.raises((TypeError, ValueError)):
+        heading(INFO, wrong)

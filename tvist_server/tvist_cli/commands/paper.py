@@ -1,0 +1,63 @@
+"""`tvist paper`: the paper's experiment."""
+
+import asyncio
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tvist_cli.failure import Failure, told
+from tvist_cli.output import err, print_json, progress
+from tvist_cli.tables import print_paper
+
+if TYPE_CHECKING:
+    from tvist_lab.paper.experiment import Experiment
+
+
+def paper(
+    *,
+    runs: int = 10,
+    seed: int = 0,
+    figures: Path | None = None,
+    calibration: str = "ur5e_5kg",
+    baselines: bool = True,
+    json: bool = False,
+) -> None:
+    """Run the paper's three motions, unshaped and shaped, as fast as they compute; print its tables beside ours.
+
+    Args:
+        runs: Repetitions, each with noise and gear errors of its own.
+        seed: Of the first repetition's.
+        figures: Folder for figures 4, 7, 12, 13, 14 and 16.
+        calibration: Calibration that comes with the package, or path of one.
+        baselines: Run what the method has to be compared with, too.
+        json: Print one JSON object.
+    """
+    if runs < 1:
+        raise Failure(f"runs is {runs}: must be at least 1", code=2)
+    from tvist_lab.in_process import free_setup, robot_in_process
+    from tvist_lab.paper.experiment import count, experiment
+    from tvist_lab.paper.report import as_dict
+    from tvist_server.config import ConfigError
+
+    with told(ConfigError, code=2):
+        setup = free_setup(calibration=calibration, seed=seed)
+
+    async def run() -> "Experiment":
+        with progress(count(runs, baselines=baselines), "motions") as bar:
+
+            def advance(what: str) -> None:
+                bar.update(0, advance=1, description=what)
+
+            async with robot_in_process(setup) as robot, robot.control("paper") as arm:
+                return await experiment(robot, arm, runs=runs, seed=seed, baselines=baselines, progress=advance)
+
+    done = asyncio.run(run())
+    if figures is not None:
+        from tvist_lab.paper.drawing import draw
+
+        for path in draw(done, figures, all_figures=True):
+            err.print(str(path))
+    result = as_dict(done)
+    if json:
+        print_json(result)
+    else:
+        print_paper(result)

@@ -1,0 +1,33 @@
+"""`tvist replay`: run a recording's commands again and compare."""
+
+from pathlib import Path
+
+from tvist_cli.failure import Failure, told
+from tvist_cli.output import out, print_json
+
+
+def replay(file: Path, output: Path | None = None, *, json: bool = False) -> None:
+    """Give a new robot the recorded messages at their ticks, free of any clock, and compare bit by bit.
+
+    Args:
+        file: MCAP file that `tvist serve --record` wrote.
+        output: MCAP file to write the second run to.
+        json: Print one JSON object.
+    """
+    from tvist_lab.mcap_file import read
+    from tvist_lab.recordings import RecordingError
+    from tvist_lab.replay import ReplayError, replay_file
+    from tvist_server.recording import RecordingError as WritingError
+
+    with told(RecordingError, ReplayError, WritingError, ValueError):
+        content = read(file)
+        again = replay_file(content, output)
+    if json:
+        print_json(
+            {"file": str(file), "ticks": len(again.states), "equal": again.first_difference is None,
+             "first_difference": again.first_difference}
+        )  # fmt: skip
+    elif again.first_difference is None:
+        out.print(f"{file}: {len(again.states)} ticks replayed, every state equal to the last bit")
+    if again.first_difference is not None:
+        raise Failure(f"{file}: the second run differs: {again.first_difference}")

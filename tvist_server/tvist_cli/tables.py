@@ -1,0 +1,72 @@
+"""The paper's tables beside ours, for people."""
+
+from typing import Any
+
+from tvist_cli.output import number, out, table
+
+COLUMNS = ("delay_ms", "stabilisation_ms", "cycle_ms", "overshoot_m", "residual_vibration_m_s2")
+
+
+def print_paper(result: dict[str, Any]) -> None:
+    """Print what `tvist paper` and `tvist demo` found."""
+    from tvist_lab.paper.published import published
+
+    theirs = published()
+    table(
+        "Table 1, lowest mode with 5 kg",
+        ("pose", "f_d Hz, paper", "identified", "true", "ζ, paper", "identified", "true"),
+        [
+            (
+                name,
+                number(theirs["configurations"][name]["f_d_hz"], 1), number(row["f_d_hz"], 2), number(row.get("true_f_d_hz"), 2),
+                number(theirs["configurations"][name]["zeta"], 2), number(row["zeta"]), number(row.get("true_zeta")),
+            )
+            for name, row in result["table_1"].items()
+        ],
+    )  # fmt: skip
+    rows = []
+    for motion, ours in result["table_2"].items():
+        for kind in ("unshaped", "shaped"):
+            for who, source in (("paper", theirs["table_2"][motion]), ("here", ours)):
+                rows.append((f"{motion} {kind}, {who}", *_figures(source[kind])))
+        for who, source in (("paper", theirs["table_2"][motion]), ("here", ours)):
+            impact = source["impact_percent"]
+            percents = (f"{impact[key]:+.1f} %" if impact[key] is not None else "–" for key in impact)
+            rows.append((f"{motion} impact, {who}", "", *percents))
+    table(
+        f"Table 2, mean of {result['runs']} runs beside the paper's 10",
+        ("motion", "delay ms", "stabil. ms", "cycle ms", "overshoot m", "RV m/s²"),
+        rows,
+    )
+    for motion, methods in result["baselines"].items():
+        best = min(
+            (name for name in methods if methods[name]["still_after_ms"] is not None),
+            key=lambda name: methods[name]["still_after_ms"],
+            default=None,
+        )
+        table(
+            f"{motion}: every method from the start of the unshaped reference",
+            ("method", "delay ms", "RV m/s²", "peak m/s²", "less peak %", "still after ms", "peak q̈ / limit"),
+            [
+                (
+                    ("waiting (unshaped)" if name == "unshaped" else name) + (" ← first still" if name == best else ""),
+                    number(row["delay_ms"], 0), number(row["residual_vibration_m_s2"]), number(row["peak_m_s2"]),
+                    number(row["peak_reduction_percent"], 1), number(row["still_after_ms"], 0),
+                    number(row["peak_acceleration_ratio"]),
+                )
+                for name, row in methods.items()
+            ],
+        )  # fmt: skip
+    for note in result["notes"]:
+        out.print(note)
+
+
+def _figures(row: dict[str, float | None]) -> tuple[str, ...]:
+    overshoot = row["overshoot_m"]
+    return (
+        number(row["delay_ms"], 1),
+        number(row["stabilisation_ms"], 1),
+        number(row["cycle_ms"], 1),
+        "–" if overshoot is None else f"{overshoot:.1e}",
+        number(row["residual_vibration_m_s2"]),
+    )

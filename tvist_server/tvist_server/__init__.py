@@ -1,0 +1,1 @@
+"""The controller: trajectories, TVIST filter, control, session, and the server around them."""

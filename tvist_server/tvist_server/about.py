@@ -1,0 +1,56 @@
+"""What a controller says of itself."""
+
+from importlib.metadata import version
+
+from tvist_plant.plant import PERIOD
+from tvist_protocol.info import CalibrationInfo, Info, Limits
+from tvist_protocol.values import PROTOCOL_VERSION
+
+from tvist_server.calibrations import available, fits
+from tvist_server.choices import shapers
+from tvist_server.controller import Controller
+
+VERSION = version("tvist")
+
+
+def info_of(controller: Controller) -> Info:
+    """The robot, its limits and how it is set up now."""
+    setup, limits, lease = controller.setup, controller.setup.description.limits, controller.session.lease
+    calibration = controller.calibration
+    own = (setup.calibration.name,) if setup.calibration is not None else ()
+    tvist = controller.cycle.tvist
+    return Info(
+        name=setup.name,
+        protocol=PROTOCOL_VERSION,
+        version=VERSION,
+        model=setup.description.robot.model,
+        joints=list(setup.description.robot.joints),
+        rate_hz=1.0 / PERIOD,
+        clock=setup.clock,
+        limits=Limits(
+            position=[(-limit, limit) for limit in limits.position],
+            velocity=list(limits.velocity),
+            acceleration=list(limits.acceleration),
+            jerk=list(limits.jerk),
+            torque=list(limits.torque),
+            payload=limits.payload,
+        ),
+        payload=controller.declared,
+        calibration=None
+        if calibration is None
+        else CalibrationInfo(
+            name=calibration.name,
+            payload_mass=calibration.payload.mass,
+            fits_payload=fits(calibration, controller.declared),
+            seed=calibration.provenance.seed,
+            f_d_range=calibration.provenance.measured_f_d_range,
+            zeta_range=calibration.provenance.measured_zeta_range,
+        ),
+        shaper=tvist.shaper.name,
+        modes=tvist.estimator.modes,
+        estimator=controller.estimator_name,
+        calibrations=sorted({*available(), *own}),
+        shapers=shapers(),
+        control=None if lease is None else lease.client,
+        tick=controller.tick_number,
+    )

@@ -1,0 +1,60 @@
+"""Calibrations that come with the package, and estimators made of calibrations."""
+
+from importlib import resources
+from pathlib import Path
+
+import msgspec
+from tvist_protocol.calibration import Calibration, CalibrationError, calibration_from_json
+from tvist_protocol.values import Payload
+from tvist_shaping.estimators.polynomial import Polynomial
+
+DEFAULT = "ur5e_5kg"
+
+
+def available() -> tuple[str, ...]:
+    """Names of the calibrations that come with the package."""
+    files = resources.files(__name__).iterdir()
+    return tuple(sorted(file.name.removesuffix(".json") for file in files if file.name.endswith(".json")))
+
+
+def load(calibration: str | Path) -> Calibration:
+    """Read and check a calibration.
+
+    Args:
+        calibration: Name of one that comes with the package, or path of a file.
+
+    Raises:
+        CalibrationError: There is none, or it is wrong; the message names file and key.
+    """
+    try:
+        if isinstance(calibration, str) and calibration in available():
+            content = (resources.files(__name__) / f"{calibration}.json").read_bytes()
+        else:
+            content = Path(calibration).read_bytes()
+        return calibration_from_json(content)
+    except OSError as error:
+        known = ", ".join(available())
+        raise CalibrationError(
+            f"calibration {str(calibration)!r}: neither one of {known} nor a readable file ({error.strerror})"
+        ) from error
+    except CalibrationError as error:
+        raise CalibrationError(f"calibration {calibration}: {error}") from error
+
+
+def estimator_of(calibration: Calibration) -> Polynomial:
+    """The paper's estimator with a calibration's polynomials.
+
+    Raises:
+        EstimatorError: The polynomials' parts do not go together.
+    """
+    return Polynomial(**msgspec.structs.asdict(calibration.polynomial))
+
+
+def fits(calibration: Calibration, payload: Payload) -> bool:
+    """Whether a calibration was made with this payload: within 2 % of mass and 10 mm of its centre."""
+    made_with = calibration.payload
+    if abs(payload.mass - made_with.mass) > 0.02 * max(made_with.mass, 1.0):
+        return False
+    if made_with.mass == 0.0:
+        return True
+    return max(abs(a - b) for a, b in zip(payload.com, made_with.com, strict=True)) <= 0.01

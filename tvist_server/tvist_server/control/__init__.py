@@ -1,0 +1,1 @@
+"""From shaped references to drive commands."""

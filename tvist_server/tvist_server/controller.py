@@ -1,0 +1,442 @@
+"""The controller: messages in, replies, states and events out. It has no clock, socket, thread or log.
+
+It owns a `Session` (who may) and a `ControlCycle` (what moves), which do not know each other.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from tvist_plant.plant import PERIOD
+from tvist_protocol import commands as c
+from tvist_protocol.calibration import Calibration
+from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_protocol.replies import Accepted, Code, Done, Refused, Reply
+from tvist_protocol.stream import Event, EventKind, State, Truth
+from tvist_protocol.values import PROTOCOL_VERSION
+from tvist_shaping.filter import TvistFilter
+
+from tvist_server.calibrations import fits
+from tvist_server.choices import choose_estimator, choose_filter
+from tvist_server.control.kinematics import ForwardKinematics, rotation_vector
+from tvist_server.cycle import ControlCycle, Sample
+from tvist_server.refusal import RefusalError, check_body, check_joints, check_motion
+from tvist_server.session import NoControlError, Session
+from tvist_server.setup import Setup, body
+from tvist_server.trajectory import Limits, SetpointStream
+
+STREAM_TIMEOUT = 0.25
+"""A stream without set-points for this long is stopped [s]."""
+TRUE_MODES_EVERY = 50
+"""Ticks between two computations of the arm's true modes: an eigenvalue problem costs a good part of a tick."""
+
+
+@dataclass
+class Counters:
+    """What was counted since the start."""
+
+    commands: int = 0
+    refused: int = 0
+    setpoints_received: int = 0
+    setpoints_late: int = 0
+    setpoints_lost: int = 0
+    setpoints_limited: int = 0
+    setpoints_refused: int = 0
+    missed_ticks: int = 0
+
+
+class Controller:
+    """One robot.
+
+    Args:
+        setup: How it starts.
+
+    Raises:
+        ValueError: The setup is wrong.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        setup.check()
+        self.setup = setup
+        self.tick_number = 0
+        self.counters = Counters()
+        self.declared = setup.payload
+        self.calibration: Calibration | None = setup.calibration
+        self.estimator_name = "fixed" if setup.calibration is None else "polynomial"
+        self.session = Session(timeouts=setup.clock == "realtime")
+        self._timeouts = setup.clock == "realtime"
+        q = np.array(setup.q, dtype=float)
+        self.cycle = ControlCycle(
+            setup.description,
+            choose_filter(setup.shaper, setup.estimator(), setup.description.joints),
+            q=q,
+            declared=body(setup.payload),
+            carried=body(setup.payload),
+            seed=setup.seed,
+        )
+        self._kinematics = ForwardKinematics(setup.description)
+        self._events: list[Event] = []
+        self._motions = 0
+        self._motion: int | None = None
+        self._stream: SetpointStream | None = None
+        self._stream_limits = Limits(0.0, 0.0, 0.0)
+        self._stream_heard = 0.0
+        self._true_modes: dict[str, list[float]] = {}
+        self._warn_of_payload()
+
+    @property
+    def now(self) -> float:
+        """Time of the present tick [s]; it passes by ticks alone."""
+        return self.tick_number * PERIOD
+
+    # ------------------------------------------------------------------ what comes in
+
+    def receive(self, command: c.Command) -> Reply:
+        """Carry out a command between two ticks. A refused one changes nothing."""
+        self.counters.commands += 1
+        try:
+            return _HANDLERS[type(command)](self, command)
+        except RefusalError as refusal:
+            reply = refusal.reply
+        except NoControlError as refusal:
+            reply = _refused(refusal.code, "token", refusal.why)  # type: ignore[arg-type]
+        self.counters.refused += 1
+        return reply
+
+    def receive_setpoint(self, setpoint: c.Setpoint) -> None:
+        """Take a set-point; one that is not for us is counted and dropped, since nobody waits for an answer."""
+        counters, stream = self.counters, self._stream
+        counters.setpoints_received += 1
+        lease = self.session.lease
+        limits = self.setup.description.limits.position
+        wanted = (
+            stream is not None
+            and lease is not None
+            and setpoint.token == lease.token
+            and len(setpoint.q) == len(limits)
+            and all(abs(angle) <= limit for angle, limit in zip(setpoint.q, limits, strict=True))
+        )
+        if not wanted or stream is None:
+            counters.setpoints_refused += 1
+            return
+        self.session.renew(setpoint.token, self.now)
+        self._stream_heard = self.now
+        stream.offer(setpoint.sequence, np.array(setpoint.q, dtype=float))
+
+    def client_seen(self, client: str) -> None:
+        """A client's liveliness token is there."""
+        self.session.client_seen(client)
+
+    def client_gone(self, client: str) -> None:
+        """A client's liveliness token is gone; where it held control, motion ends with it."""
+        if self.session.client_gone(client):
+            self._lose_lease(f"client {client!r} is gone")
+
+    def missed(self, ticks: int) -> None:
+        """Ticks have begun too late."""
+        self.counters.missed_ticks += ticks
+
+    # ------------------------------------------------------------------ what goes out
+
+    def tick(self) -> tuple[State, list[Event]]:
+        """One control period."""
+        self._watch_time()
+        sample = self.cycle.step()
+        if self.cycle.at_rest and self._motion is not None:
+            self._emit("motion_done", id=self._motion)
+            self._motion = None
+        self.tick_number += 1
+        events, self._events = self._events, []
+        return self._state(sample), events
+
+    def truth(self) -> Truth:
+        """What no robot can know, after a tick."""
+        arm = self.cycle.arm
+        if not self._true_modes or self.tick_number % TRUE_MODES_EVERY == 0:
+            modes = arm.modes()
+            count = self.setup.description.joints
+            self._true_modes = {
+                "f_d": modes.f_d[:count].tolist(),
+                "zeta": modes.zeta[:count].tolist(),
+                "participation": modes.participation[:count].tolist(),
+            }
+        truth = arm.truth()
+        return Truth(
+            tick=self.tick_number,
+            timestamp=self.now,
+            motor_q=truth.motor_q.tolist(),
+            motor_qd=truth.motor_qd.tolist(),
+            gear_deflection=truth.gear_deflection.tolist(),
+            link_deflection=truth.link_deflection.tolist(),
+            flange_pose=truth.flange_position.tolist() + rotation_vector(truth.flange_rotation),
+            tool_acceleration=truth.specific_force.tolist(),
+            **self._true_modes,
+        )
+
+    def _state(self, sample: Sample) -> State:
+        target, measured, tvist = sample.target, sample.measured, self.cycle.tvist
+        pose, speed = self._kinematics.tool(measured.q, measured.qd)
+        return State(
+            tick=self.tick_number,
+            timestamp=self.now,
+            robot_mode=RobotMode.RUNNING.value,
+            safety_mode=SafetyMode.NORMAL.value,
+            runtime_state=(RuntimeState.STOPPED if self.cycle.at_rest else RuntimeState.PLAYING).value,
+            setpoint_sequence=self._stream.sequence if self._stream else None,
+            reference_q=sample.reference.tolist(),
+            target_q=target.q.tolist(),
+            target_qd=target.qd.tolist(),
+            target_qdd=target.qdd.tolist(),
+            target_moment=sample.torque.tolist(),
+            actual_q=measured.q.tolist(),
+            actual_qd=measured.qd.tolist(),
+            actual_moment=measured.moment.tolist(),
+            actual_TCP_pose=pose,
+            actual_TCP_speed=speed,
+            actual_tool_accelerometer=measured.accelerometer.tolist(),
+            speed_scaling=1.0,
+            estimated_f_d=tvist.f_d.tolist(),
+            estimated_zeta=tvist.zeta.tolist(),
+            shaper_delay=tvist.delay,
+            missed_ticks=self.counters.missed_ticks,
+        )
+
+    def _emit(self, kind: EventKind, *, id: int | None = None, code: Code | None = None, why: str | None = None) -> None:  # noqa: A002  the wire's name
+        """Put down an event of the tick that is being made; of the next one between two."""
+        self._events.append(Event(tick=self.tick_number + 1, kind=kind, id=id, code=code, why=why))
+
+    # ------------------------------------------------------------------ motion
+
+    def _watch_time(self) -> None:
+        """End what nobody keeps up."""
+        if self.session.expired(self.now):
+            self._lose_lease("the lease ran out: no command renewed it")
+        if self._timeouts and self._stream is not None and self.now - self._stream_heard >= STREAM_TIMEOUT:
+            self._stop(None, f"no set-point for {STREAM_TIMEOUT:g} s")
+
+    def _lose_lease(self, why: str) -> None:
+        self.session.release()
+        self._emit("lease_lost", why=why)
+        if not self.cycle.at_rest:
+            self._stop(None, why)
+
+    def _stop(self, deceleration: float | None, why: str) -> None:
+        """Stop past the filter and say how what was moving ended."""
+        self._end_stream(why)
+        if self.cycle.at_rest or self.cycle.stopping:
+            return
+        plan = self.cycle.stop(deceleration)
+        if plan.limited:
+            why = f"{why}; deceleration limited to {plan.acceleration:.3g} rad/s²"
+        if self._motion is not None:
+            self._emit("motion_stopped", id=self._motion, why=why)
+            self._motion = None
+        elif plan.limited:
+            self._emit("warning", code="limit_acceleration", why=why)
+
+    def _end_stream(self, why: str) -> None:
+        if self._stream is not None:
+            counters = self.counters
+            counters.setpoints_late += self._stream.late
+            counters.setpoints_lost += self._stream.lost
+            counters.setpoints_limited += self._stream.limited
+            self._stream = None
+            self._emit("stream_stopped", why=why)
+
+    def stream_counters(self) -> tuple[int, int, int]:
+        """Late, lost and limited set-points, the running stream's included."""
+        counters, stream = self.counters, self._stream
+        late, lost, limited = (stream.late, stream.lost, stream.limited) if stream else (0, 0, 0)
+        return (
+            counters.setpoints_late + late,
+            counters.setpoints_lost + lost,
+            counters.setpoints_limited + limited,
+        )
+
+    def _check_rest(self) -> None:
+        if not self.cycle.at_rest or self._stream is not None:
+            raise RefusalError("busy", "", "the arm is moving: wait for motion_done or send stop")
+
+    # ------------------------------------------------------------------ commands
+
+    def take_control(self, command: c.TakeControl) -> Reply:
+        """Give a lease."""
+        if command.protocol != PROTOCOL_VERSION:
+            raise RefusalError(
+                "unsupported_version", "protocol",
+                f"protocol is {command.protocol}; this server speaks {PROTOCOL_VERSION}", PROTOCOL_VERSION,
+            )  # fmt: skip
+        lease = self.session.take(command.client, command.lease_s, self.now)
+        return Accepted(token=lease.token, lease_s=lease.seconds)
+
+    def keep_alive(self, command: c.KeepAlive) -> Reply:
+        """Renew the lease."""
+        self._authorize(command.token)
+        return Done()
+
+    def release_control(self, command: c.ReleaseControl) -> Reply:
+        """End the lease, and motion with it."""
+        self._authorize(command.token)
+        self.session.release()
+        if not self.cycle.at_rest:
+            self._stop(None, "control was released")
+        return Done()
+
+    def move_j(self, command: c.MoveJ) -> Reply:
+        """Start a point-to-point motion."""
+        self._authorize(command.token)
+        description = self.setup.description
+        check_joints(command.q, description)
+        check_motion(command.velocity, command.acceleration, command.jerk, description)
+        self._check_rest()
+        limits = Limits(command.velocity, command.acceleration, command.jerk)
+        self.cycle.move(np.array(command.q, dtype=float), limits)
+        self._motions += 1
+        self._motion = self._motions
+        self._emit("motion_started", id=self._motion)
+        return Accepted(id=self._motion)
+
+    def servo_start(self, command: c.ServoStart) -> Reply:
+        """Start to follow set-points."""
+        self._authorize(command.token)
+        check_motion(command.velocity, command.acceleration, command.jerk, self.setup.description)
+        self._check_rest()
+        self._stream_limits = Limits(command.velocity, command.acceleration, command.jerk)
+        self._stream = self.cycle.stream(command.period, self._stream_limits)
+        self._stream_heard = self.now
+        return Done()
+
+    def servo_stop(self, command: c.ServoStop) -> Reply:
+        """Bring the stream to rest."""
+        self._authorize(command.token)
+        if self._stream is None:
+            raise RefusalError("wrong_mode", "", "no stream is running: send servo_start first")
+        self.cycle.end_stream(self._stream, self._stream_limits)
+        self._end_stream("servo_stop")
+        return Done()
+
+    def stop(self, command: c.Stop) -> Reply:
+        """Stop; anyone may."""
+        if command.token is not None:
+            self._authorize(command.token)
+        self._stop(command.deceleration, "a stop was commanded")
+        return Done()
+
+    def set_shaper(self, command: c.SetShaper) -> Reply:
+        """Choose the shaper."""
+        self._authorize(command.token)
+        self._check_rest()
+        if command.modes > 1:
+            raise RefusalError("out_of_range", "modes", f"modes is {command.modes}; the estimators give 1", 1)
+        tvist = choose_filter(command.name, self.cycle.tvist.estimator, self.setup.description.joints, where="name")
+        self._use(tvist)
+        return Done()
+
+    def set_estimator(self, command: c.SetEstimator) -> Reply:
+        """Choose the estimator."""
+        self._authorize(command.token)
+        self._check_rest()
+        estimator, calibration = choose_estimator(command, self.setup)
+        tvist = choose_filter(self.cycle.tvist.shaper.name, estimator, self.setup.description.joints)
+        self.calibration, self.estimator_name = calibration, command.name
+        self._use(tvist)
+        self._warn_of_payload()
+        return Done()
+
+    def set_payload(self, command: c.SetPayload) -> Reply:
+        """Change what the controller believes that the arm carries."""
+        self._authorize(command.token)
+        payload = c.Payload(mass=command.mass, com=command.com, inertia=command.inertia)
+        check_body(payload, rated=self.setup.description.limits.payload)
+        self._check_rest()
+        self.declared = payload
+        self.cycle.declare(body(payload))
+        self._warn_of_payload()
+        return Done()
+
+    def simulation_reset(self, command: c.SimulationReset) -> Reply:
+        """Put the simulated arm somewhere at rest."""
+        self._authorize(command.token)
+        description = self.setup.description
+        if command.q is not None:
+            check_joints(command.q, description)
+        if command.payload is not None:
+            check_body(command.payload, "payload")
+        if command.mode not in {None, "RUNNING"}:
+            raise RefusalError("out_of_range", "mode", f"mode is {command.mode!r}; this version knows RUNNING only")
+        tvist = None
+        if command.shaper is not None:
+            tvist = choose_filter(command.shaper, self.cycle.tvist.estimator, description.joints, where="shaper")
+        self._end_stream("simulation.reset")
+        if self._motion is not None:
+            self._emit("motion_stopped", id=self._motion, why="simulation.reset")
+            self._motion = None
+        q = self.cycle.position if command.q is None else np.array(command.q, dtype=float)
+        carried = None if command.payload is None else body(command.payload)
+        if tvist is not None:
+            self._use(tvist)
+        self.cycle.reset(q, carried=carried, seed=self.setup.seed if command.seed is None else command.seed)
+        self._true_modes = {}
+        return Done(tick=self.tick_number)
+
+    def simulation_step(self, command: c.SimulationStep) -> Reply:
+        """Check that a client may let time pass; the driver then does."""
+        self._authorize(command.token)
+        if self.setup.clock == "realtime":
+            raise RefusalError("wrong_mode", "type", "time passes by itself here: start with --clock lockstep to step")
+        if command.setpoints is not None and self._stream is None:
+            raise RefusalError("wrong_mode", "setpoints", "no stream is running: send servo_start first")
+        for number, setpoint in enumerate(command.setpoints or ()):
+            check_joints(setpoint.q, self.setup.description, f"setpoints[{number}].q")
+        return Done(tick=self.tick_number + command.ticks)
+
+    def not_yet(self, command: c.Command) -> Reply:
+        """Refuse a command of the protocol that this version does not carry out."""
+        name = type(command).__struct_config__.tag
+        raise RefusalError("unknown_type", "type", f"{name} is not carried out by this version of the server")
+
+    def _authorize(self, token: str) -> None:
+        self.session.renew(token, self.now)
+
+    def _use(self, tvist: TvistFilter) -> None:
+        tvist.reset(self.cycle.position)
+        self.cycle.tvist = tvist
+        self._emit("shaper_changed", why=f"{tvist.shaper.name} with estimator {self.estimator_name}")
+
+    def _warn_of_payload(self) -> None:
+        if self.calibration is not None and not fits(self.calibration, self.declared):
+            self._emit(
+                "warning",
+                code="payload_mismatch",
+                why=f"calibration {self.calibration.name!r} was made with {self.calibration.payload.mass:g} kg; "
+                f"{self.declared.mass:g} kg is declared: frequencies will be off",
+            )
+
+
+def _refused(code: Code, where: str, why: str) -> Refused:
+    return Refused(code=code, where=where, why=why)
+
+
+_HANDLERS: dict[type, Callable[[Controller, Any], Reply]] = {
+    c.TakeControl: Controller.take_control,
+    c.KeepAlive: Controller.keep_alive,
+    c.ReleaseControl: Controller.release_control,
+    c.MoveJ: Controller.move_j,
+    c.ServoStart: Controller.servo_start,
+    c.ServoStop: Controller.servo_stop,
+    c.Stop: Controller.stop,
+    c.SetShaper: Controller.set_shaper,
+    c.SetEstimator: Controller.set_estimator,
+    c.SetPayload: Controller.set_payload,
+    c.SimulationReset: Controller.simulation_reset,
+    c.SimulationStep: Controller.simulation_step,
+    c.HandOver: Controller.not_yet,
+    c.Pause: Controller.not_yet,
+    c.Resume: Controller.not_yet,
+    c.SetSpeed: Controller.not_yet,
+    c.PowerOn: Controller.not_yet,
+    c.PowerOff: Controller.not_yet,
+    c.UnlockProtectiveStop: Controller.not_yet,
+    c.SimulationInject: Controller.not_yet,
+}

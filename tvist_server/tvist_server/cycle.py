@@ -1,0 +1,140 @@
+"""One control period: the paper's Figure 6, left to right."""
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.plant import PERIOD, Measurement, Plant
+from tvist_shaping.filter import TvistFilter
+
+from tvist_server.control.differentiator import Differentiator, Floats, Target
+from tvist_server.control.inverse_dynamics import InverseDynamics
+from tvist_server.control.joint_controllers import JointControllers
+from tvist_server.safety import StopPlan, plan_stop
+from tvist_server.trajectory import DoubleS, Limits, Rest, SetpointStream, Stop, Trajectory
+
+T = TypeVar("T", bound=Trajectory)
+
+STILL = 1e-7
+"""A reference that moves less than this between two ticks is at rest [rad]."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What went along the line in one tick."""
+
+    reference: Floats
+    """q before shaping, shape (n,) [rad]."""
+    target: Target
+    """q* and its derivatives, of the tick before: central differences cost one."""
+    torque: Floats
+    """τ* of the rigid arm for that target, shape (n,) [N m]."""
+    measured: Measurement
+    """What the arm did."""
+
+
+class ControlCycle:
+    """Trajectory generator, TVIST filter, differentiator, inverse dynamics, joint controllers, arm.
+
+    Args:
+        description: The robot.
+        tvist: The filter, with its shaper and estimator.
+        q: Where the arm rests at the start, shape (n,) [rad].
+        declared: The payload that inverse dynamics counts on.
+        carried: The payload that the arm has.
+        seed: Of the arm's noise and gear errors.
+    """
+
+    def __init__(
+        self,
+        description: RobotDescription,
+        tvist: TvistFilter,
+        *,
+        q: Floats,
+        declared: Payload,
+        carried: Payload,
+        seed: int,
+    ) -> None:
+        self.description = description
+        self.tvist = tvist
+        self.arm = Plant(description, carried)
+        self.inverse_dynamics = InverseDynamics(description, declared)
+        self._joint_controllers = JointControllers(description, PERIOD)
+        self._differentiator = Differentiator(q, PERIOD)
+        self.reset(q, carried=carried, seed=seed)
+
+    def step(self) -> Sample:
+        """One tick."""
+        reference = self.trajectory.next()  # q [rad]
+        shaped = reference if self.stopping else self.tvist.filter(reference)  # q* [rad]
+        target = self._differentiator.update(shaped)  # q*, q̇*, q̈* of the tick before
+        torque = self.inverse_dynamics.torque(target.q, target.qd, target.qdd)  # τ* [N m]
+        gravity = self.inverse_dynamics.gravity(target.q)
+        measured = self.arm.step(self._joint_controllers.command(target, torque, gravity))
+        self._settle(reference, target)
+        return Sample(reference, target, torque, measured)
+
+    def _settle(self, reference: Floats, target: Target) -> None:
+        """Notice the end of a motion: the trajectory is over and the shaped reference has come to rest on it."""
+        if self.at_rest or not self.trajectory.finished:
+            return
+        if self.stopping:  # the delay line starts anew from where the stop ended
+            self.tvist.reset(reference)
+            self.trajectory, self.stopping = Rest(reference), False
+        moves = max(np.abs(reference - target.q).max(), np.abs(target.qd).max() * PERIOD)
+        self.at_rest = bool(moves <= STILL)
+
+    @property
+    def position(self) -> Floats:
+        """Where the shaped reference is, shape (n,) [rad]."""
+        return self._differentiator.newest.q
+
+    def move(self, target: Floats, limits: Limits) -> DoubleS:
+        """Start a point-to-point motion; the arm must be at rest."""
+        return self._start(DoubleS(self.position, target, limits, PERIOD))
+
+    def stream(self, stream_period: float, limits: Limits) -> SetpointStream:
+        """Start to follow set-points; the arm must be at rest."""
+        return self._start(SetpointStream(self.position, stream_period, limits, PERIOD))
+
+    def _start(self, trajectory: T) -> T:
+        self.trajectory = trajectory
+        self.at_rest = False
+        return trajectory
+
+    def end_stream(self, stream: SetpointStream, limits: Limits) -> None:
+        """Bring a stream to rest inside its own limits, through the filter."""
+        q, qd, qdd = stream.state
+        self._start(Stop(q, qd, qdd, acceleration=limits.acceleration, jerk=limits.jerk, period=PERIOD))
+
+    def stop(self, deceleration: float | None) -> StopPlan:
+        """Stop past the filter, from the shaped reference straight to rest; nothing in the delay line plays any more.
+
+        Args:
+            deceleration: Wanted limit [rad/s^2]; None for what the torque allows.
+
+        Returns:
+            The stop with the limit it keeps and whether that was lowered for torque.
+        """
+        plan = plan_stop(self.description, self.inverse_dynamics, self._differentiator.newest, deceleration, PERIOD)
+        self._start(plan.trajectory)
+        self.stopping = True
+        return plan
+
+    def reset(self, q: Floats, *, carried: Payload | None = None, seed: int = 0) -> None:
+        """Put the arm at rest somewhere, in static equilibrium; everything on the line starts anew."""
+        self.trajectory: Trajectory = Rest(q)
+        self.stopping = False
+        self.at_rest = True
+        self.tvist.reset(q)
+        self._differentiator.reset(q)
+        self._joint_controllers.reset()
+        still = np.zeros_like(q)
+        torque = self.inverse_dynamics.gravity(q)
+        command = self._joint_controllers.command(Target(q, still, still), torque, torque)
+        self.arm.reset(command, payload=carried, seed=seed)
+
+    def declare(self, payload: Payload) -> None:
+        """Change the payload that inverse dynamics counts on."""
+        self.inverse_dynamics = InverseDynamics(self.description, payload)

@@ -1,0 +1,45 @@
+"""Gateways: the ways clients reach a robot, and what a gateway asks of the robot."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Literal, Protocol
+
+Topic = Literal["state", "event", "truth", "telemetry"]
+"""What is put without being asked for."""
+Reply = Callable[[bytes], None]
+"""Takes the encoded answer, once, from any thread."""
+
+
+class GatewayError(Exception):
+    """A gateway cannot open; the sentence says why and what to do."""
+
+
+class Desk(Protocol):
+    """Where a gateway hands in what arrives. Callable from any thread; nothing here may wait."""
+
+    def request(self, data: bytes, reply: Reply) -> None:
+        """Take an encoded command; `reply` is called exactly once, later, from another thread."""
+
+    def setpoint(self, data: bytes) -> None:
+        """Take an encoded set-point."""
+
+    def info(self, reply: Reply) -> None:
+        """Take a question for `info`; `reply` as for `request`."""
+
+    def client_seen(self, name: str) -> None:
+        """Note that a client's liveliness token is there."""
+
+    def client_gone(self, name: str) -> None:
+        """Note that a client's liveliness token is gone."""
+
+
+class Gateway(ABC):
+    """One way in and out."""
+
+    @abstractmethod
+    def publish(self, topic: Topic, payload: bytes) -> None:
+        """Put an encoded message. Called from one thread; raises nothing for the network's sake."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Stop listening. What arrives meanwhile is left unanswered; a second call does nothing."""

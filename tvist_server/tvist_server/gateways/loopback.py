@@ -1,0 +1,70 @@
+"""The server in process: no network, no thread, no clock. Time passes when a client steps it."""
+
+from collections.abc import Callable
+from typing import Literal
+
+from tvist_protocol.codec import encode
+from tvist_protocol.journal import Entry
+from tvist_protocol.stream import Event, State, Truth
+
+from tvist_server.controller import Controller
+from tvist_server.host import Host
+from tvist_server.setup import Setup
+
+Topic = Literal["state", "event", "truth", "telemetry"]
+
+
+class LoopbackHost:
+    """A robot in the caller's own thread, as fast as it computes. Every message still goes through the codec.
+
+    Args:
+        setup: How the controller starts; its clock should be `free` or `lockstep`.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self.controller = Controller(setup)
+        self.entries: list[Entry] = []
+        """What reached the controller: with the setup, all that a replay needs."""
+        self._host = Host(self.controller, self)
+        self._callbacks: dict[Topic, list[Callable[[bytes], None]]] = {}
+
+    def request(self, client: str, data: bytes) -> bytes:  # noqa: ARG002  a network's door knows no client either
+        """Carry out a command; its encoded reply."""
+        return self._host.request(data)
+
+    def put_setpoint(self, client: str, data: bytes) -> None:  # noqa: ARG002
+        """Take a set-point."""
+        self._host.setpoint(data)
+
+    def info(self) -> bytes:
+        """What the controller says of itself."""
+        return self._host.info()
+
+    def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> Callable[[], None]:
+        """Have every message of a topic; the function returned ends that."""
+        callbacks = self._callbacks.setdefault(topic, [])
+        callbacks.append(callback)
+        return lambda: callbacks.remove(callback)
+
+    def state(self, state: State) -> None:
+        """Hand on a state."""
+        self._put("state", state)
+
+    def event(self, event: Event) -> None:
+        """Hand on an event."""
+        self._put("event", event)
+
+    def truth(self, truth: Truth) -> None:
+        """Hand on what no robot can know."""
+        self._put("truth", truth)
+
+    def journal(self, entry: Entry) -> None:
+        """Keep an entry."""
+        self.entries.append(entry)
+
+    def _put(self, topic: Topic, message: State | Event | Truth) -> None:
+        callbacks = self._callbacks.get(topic)
+        if callbacks:
+            data = encode(message)
+            for callback in tuple(callbacks):
+                callback(data)

@@ -1,0 +1,109 @@
+"""How a controller starts: everything that decides what it will do, besides what clients send."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import msgspec
+from tvist_plant.description import Payload as Body
+from tvist_plant.description import RobotDescription
+from tvist_protocol.calibration import Calibration, calibration_of
+from tvist_protocol.info import Clock
+from tvist_protocol.values import Payload
+from tvist_shaping.catalogue import shaper
+from tvist_shaping.estimators.base import Estimator
+from tvist_shaping.estimators.fixed import Fixed
+
+from tvist_server.calibrations import estimator_of
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Start of a controller."""
+
+    description: RobotDescription
+    """The robot."""
+    q: tuple[float, ...]
+    """Where the arm rests [rad]."""
+    payload: Payload
+    """Declared, and carried until a client says otherwise."""
+    calibration: Calibration | None
+    """Of the polynomial estimator; None: the estimator is `fixed` at 10 Hz and 0.2, for a robot to be identified."""
+    name: str = "ur5e"
+    """Name of the robot on the network."""
+    shaper: str = "zv"
+    """Name of the shaper."""
+    seed: int = 0
+    """Of sensor noise and gear errors."""
+    clock: Clock = "realtime"
+    """Who lets time pass. Only in real time do leases and streams time out."""
+    truth: bool = False
+    """Whether to tell what no robot can know."""
+
+    def check(self) -> None:
+        """Check what types cannot.
+
+        Raises:
+            ValueError: A value is out of range; the sentence names it.
+        """
+        joints = self.description.joints
+        if len(self.q) != joints:
+            raise ValueError(f"start has {len(self.q)} angles; {self.description.robot.model} has {joints} joints")
+        for number, (angle, limit) in enumerate(zip(self.q, self.description.limits.position, strict=True)):
+            if not abs(angle) <= limit:
+                raise ValueError(f"start q[{number}] is {angle}: must be within ±{limit} rad")
+        shaper(self.shaper)
+
+    def estimator(self) -> Estimator:
+        """The estimator to start with."""
+        return Fixed([10.0], [0.2]) if self.calibration is None else estimator_of(self.calibration)
+
+    def to_builtins(self) -> dict[str, Any]:
+        """As maps and lists, for a recording."""
+        return {
+            "description": msgspec.to_builtins(self.description),
+            "q": list(self.q),
+            "payload": msgspec.to_builtins(self.payload),
+            "calibration": msgspec.to_builtins(self.calibration),
+            "name": self.name,
+            "shaper": self.shaper,
+            "seed": self.seed,
+            "clock": self.clock,
+            "truth": self.truth,
+        }
+
+    @classmethod
+    def from_builtins(cls, content: dict[str, Any]) -> "Setup":
+        """From a recording.
+
+        Raises:
+            ValueError: A part is missing or wrong.
+        """
+        try:
+            calibration = content["calibration"]
+            return replace(
+                cls(
+                    description=msgspec.convert(content["description"], RobotDescription),
+                    q=tuple(map(float, content["q"])),
+                    payload=msgspec.convert(content["payload"], Payload),
+                    calibration=None if calibration is None else calibration_of(calibration),
+                ),
+                **{key: content[key] for key in ("name", "shaper", "seed", "clock", "truth")},
+            )
+        except (KeyError, TypeError, msgspec.ValidationError) as error:
+            raise ValueError(f"start of the recording: {error}") from error
+
+
+def body(payload: Payload) -> Body:
+    """A payload of the wire as the plant takes it."""
+    return Body(mass=payload.mass, com=payload.com, inertia=payload.inertia)
+
+
+def paper_payload(description: RobotDescription, mass: float | None = None) -> Payload:
+    """The robot file's payload, its mass and inertia scaled to another mass [kg]."""
+    own = description.payload
+    share = 1.0 if mass is None or own.mass == 0.0 else mass / own.mass
+    return Payload(
+        mass=own.mass * share if mass is None or own.mass else mass,
+        com=own.com,
+        inertia=tuple(value * share for value in own.inertia),
+    )
