@@ -1,16 +1,25 @@
 """Compile a function with numba; where numba is missing the plain Python function serves."""
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import Any, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 def compiled(function: F) -> F:
-    """Compiled `function`; its Python source stays reachable as `.py_func`. The cache survives the process."""
+    """Compile `function`; its Python source stays reachable as `.py_func`; the cache outlives the process."""
     try:
         from numba import njit
     except ImportError:  # pragma: no cover
         function.py_func = function  # type: ignore[attr-defined]
         return function
-    return njit(cache=True)(function)  # type: ignore[no-any-return]
+    return cast("F", njit(cache=True)(function))
+
+
+def is_cached(function: Callable[..., Any]) -> bool:
+    """Whether a compiled function's machine code is already on disk: else its first call takes seconds."""
+    stats = getattr(function, "stats", None)
+    if stats is None:  # pragma: no cover  numba is missing: there is nothing to compile
+        return True
+    return any(Path(stats.cache_path).glob(f"*.{function.__name__}-*.nbi"))

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import msgspec
+import numpy as np
 from msgspec import Meta, Struct
 
 Number = Annotated[float, Meta(ge=-1e7, le=1e7)]
@@ -26,7 +27,7 @@ class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One table of the file; unknown keys are refused."""
 
 
-class Robot(_Table):
+class Robot(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Names."""
 
     name: str
@@ -35,7 +36,7 @@ class Robot(_Table):
     """From the base to the flange; their number is the number of joints everywhere."""
 
 
-class Kinematics(_Table):
+class Kinematics(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Standard Denavit-Hartenberg parameters, one entry a joint."""
 
     a: tuple[Number, ...]
@@ -46,7 +47,7 @@ class Kinematics(_Table):
     """Link twists [rad]."""
 
 
-class Links(_Table):
+class Links(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Rigid-body masses, in the Denavit-Hartenberg frame of each link."""
 
     mass: tuple[Positive, ...]
@@ -57,7 +58,7 @@ class Links(_Table):
     """About the centres of mass [kg m^2]."""
 
 
-class Limits(_Table):
+class Limits(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What the controller allows, one entry a joint where it is a tuple."""
 
     position: tuple[Positive, ...]
@@ -76,7 +77,7 @@ class Limits(_Table):
     """[m]."""
 
 
-class Payload(_Table):
+class Payload(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A rigid body on the flange."""
 
     mass: NotNegative = 0.0
@@ -87,7 +88,7 @@ class Payload(_Table):
     """About the centre of mass, flange axes [kg m^2]."""
 
 
-class Drives(_Table):
+class Drives(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Motors, strain wave gears and the drives' cascaded loops, one entry a joint where it is a tuple."""
 
     gear_stiffness: tuple[Positive, ...]
@@ -120,7 +121,7 @@ class Drives(_Table):
     """Take F_c/w times velocity, and feed all of it forward: the plant that the linear modes describe."""
 
 
-class LinkFlexibility(_Table):
+class LinkFlexibility(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Links that bend: two virtual elastic joints, about y and z, in the middle of each."""
 
     links: tuple[Annotated[int, Meta(ge=0, lt=MAX_JOINTS)], ...] = ()
@@ -131,14 +132,14 @@ class LinkFlexibility(_Table):
     """Damping over stiffness [s]."""
 
 
-class Sensors(_Table):
+class Sensors(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What the arm feels."""
 
     accelerometer_noise: NotNegative = 0.0
     """rms per axis [m/s^2]."""
 
 
-class RobotDescription(_Table):
+class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Everything a robot file holds."""
 
     robot: Robot
@@ -170,7 +171,9 @@ class RobotDescription(_Table):
 def robots() -> tuple[str, ...]:
     """Names of the robots that come with the package."""
     folder = resources.files("tvist_plant") / "robots"
-    return tuple(sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")))
+    return tuple(
+        sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    )
 
 
 def load(robot: str | Path) -> RobotDescription:
@@ -191,18 +194,30 @@ def load(robot: str | Path) -> RobotDescription:
         description = msgspec.convert(tomllib.loads(text), RobotDescription)
     except OSError as error:
         known = ", ".join(robots())
-        raise DescriptionError(f"robot {str(robot)!r}: neither one of {known} nor a readable file ({error})") from error
+        raise DescriptionError(
+            f"robot {str(robot)!r}: neither one of {known} nor a readable file ({error})"
+        ) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, msgspec.ValidationError) as error:
         raise DescriptionError(f"robot file {robot}: {error}") from error
     _check(description, robot)
+    _check_bodies(description, robot)
     return description
 
 
+def is_real_body(inertia: Tensor) -> bool:
+    """Whether the principal moments are those of a body: none negative, none above the sum of the others."""
+    xx, xy, xz, yy, yz, zz = inertia
+    least, middle, most = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return bool(least >= -1e-9 * most and most <= (least + middle) * (1.0 + 1e-6))
+
+
 def _check(description: RobotDescription, source: str | Path) -> None:
-    """Check what a type cannot say: lengths that must agree, links that exist, inertias of real bodies."""
+    """Check what a type cannot say: lengths that must agree, links that exist."""
     joints = description.joints
     if not 1 <= joints <= MAX_JOINTS:
-        raise DescriptionError(f"robot file {source}: robot.joints has {joints} names; 1 to {MAX_JOINTS} are supported")
+        raise DescriptionError(
+            f"robot file {source}: robot.joints has {joints} names; 1 to {MAX_JOINTS} are supported"
+        )
     for table in ("kinematics", "links", "limits", "drives"):
         values = getattr(description, table)
         for key in values.__struct_fields__:
@@ -217,11 +232,25 @@ def _check(description: RobotDescription, source: str | Path) -> None:
             f"robot file {source}: link_flexibility.stiffness has {len(flexible.stiffness)} entries; "
             f"link_flexibility.links has {len(flexible.links)}"
         )
-    if any(link >= joints or description.kinematics.a[link] == 0.0 for link in flexible.links):
+    possible = [link for link in range(joints) if description.kinematics.a[link] != 0.0]
+    if len(set(flexible.links)) < len(flexible.links) or not set(flexible.links).issubset(possible):
         raise DescriptionError(
             f"robot file {source}: link_flexibility.links is {list(flexible.links)}; "
-            f"each must be below {joints} and have a length kinematics.a other than 0"
+            f"each may stand there once and must be one of {possible}, whose length kinematics.a is not 0"
         )
     for name, pose in description.poses.items():
         if len(pose) != joints:
-            raise DescriptionError(f"robot file {source}: poses.{name} has {len(pose)} entries; robot.joints has {joints}")
+            raise DescriptionError(
+                f"robot file {source}: poses.{name} has {len(pose)} entries; robot.joints has {joints}"
+            )
+
+
+def _check_bodies(description: RobotDescription, source: str | Path) -> None:
+    """Check that every inertia is one that a body can have."""
+    links = {f"links.inertia[{number}]": inertia for number, inertia in enumerate(description.links.inertia)}
+    for key, inertia in {**links, "payload.inertia": description.payload.inertia}.items():
+        if not is_real_body(inertia):
+            raise DescriptionError(
+                f"robot file {source}: {key} is {list(inertia)}; no body has it: "
+                "a principal moment is negative or larger than the other two together"
+            )

@@ -2,13 +2,13 @@
 
 Equations (joint side, one joint j; y = (q, θ) are link-side and motor-side angles):
 
-    link    M(q) q̈ + b(q, q̇) = -K_g (q_j - θ - e(θ)) - D_g (q̇_j - θ̇)      and  -k_l q_f - d_l q̇_f  where a link bends
+    link    M(q) q̈ + b(q, q̇) = -K_g (q_j - θ - e(θ)) - D_g (q̇_j - θ̇)   and  -k_l q_f - d_l q̇_f  where it bends
     motor   B θ̈ = τ_m + K_g (q_j - θ - e(θ)) + D_g (q̇_j - θ̇) - F_c tanh(θ̇/w)
     drive   τ_m = τ_ff + K_d [q̇_r - θ̇ + K_p (q_r - θ) + K_i (q_r - θ) + K_p K_i s],     ṡ = q_r - θ
     gear    e(θ) = ε sin(n_w θ + φ)
 
-The drive's loop is a cascade, P on position over PI on velocity, on the motor side. Motor impedance in series with the
-gear spring is why damping falls where frequency rises, as the paper's Table 1 shows.
+The drive's loop is a cascade, P on position over PI on velocity, on the motor side. Motor impedance in series
+with the gear spring is why damping falls where frequency rises, as the paper's Table 1 shows.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class DriveCommand:
 
 @dataclass(frozen=True)
 class LinearPart:
-    """Stiffness, damping and gains of arm and drives, constant over the workspace. Order: N link angles, n motors."""
+    """Stiffness, damping and gains of arm and drives, the same in every pose; N links, then n motors."""
 
     stiffness: Floats
     """Springs and position gains, shape (N+n, N+n) [N m/rad]."""
@@ -53,7 +53,9 @@ class LinearPart:
         """Put the matrices together."""
         links, joints = flexible.model.nv, len(flexible.joints)
         gear, gear_damping = np.array(drives.gear_stiffness), np.array(drives.gear_damping)
-        K_d, K_p, K_i = (np.array(g) for g in (drives.velocity_gain, drives.position_gain, drives.integral_gain))
+        K_d, K_p, K_i = (
+            np.array(g) for g in (drives.velocity_gain, drives.position_gain, drives.integral_gain)
+        )
         friction = np.array(drives.coulomb_friction) / drives.friction_width
         stiffness, damping = np.zeros((2, links + joints, links + joints))
         link, motor = flexible.joints, links + np.arange(joints)
@@ -94,7 +96,11 @@ class Nonlinear:
     @classmethod
     def of(cls, drives: Drives) -> "Nonlinear":
         """Take them from the robot's description."""
-        friction = np.zeros(len(drives.coulomb_friction)) if drives.linear_friction else np.array(drives.coulomb_friction)
+        friction = (
+            np.zeros(len(drives.coulomb_friction))
+            if drives.linear_friction
+            else np.array(drives.coulomb_friction)
+        )
         return cls(
             friction=friction,
             friction_width=drives.friction_width,

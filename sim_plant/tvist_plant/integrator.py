@@ -1,24 +1,24 @@
 """One control period of arm and drives: the linearly implicit midpoint rule.
 
-M(q) and the bias b(q, q̇) are held for the period, the bias extrapolated linearly; springs, dampers and the drives'
-gains are implicit, so one Cholesky factor of
+M(q) is held for the period at its half-way value and the bias b(q, q̇) runs on, both extrapolated linearly
+from the last two ticks; springs, dampers and the drives' gains are implicit, so one Cholesky factor of
 
     S = M_b + h/2 D + h²/4 (K + h/2 G_i)
 
-serves all substeps of the period (h one substep, M_b = diag(M(q), B), G_i the integral gains). Each substep solves
-for the mean acceleration and moves y by the mean velocity: second order, and stable for the fast poles that light
-lumps between stiff springs have (about -5e4 1/s), where explicit rules need steps below 0.04 ms.
+serves all substeps of the period (h one substep, M_b = diag(M(q), B), G_i the integral gains). Each substep
+solves for the mean acceleration and moves y by the mean velocity: second order, and stable for the fast poles
+that light lumps between stiff springs have (about -5e4 1/s), where explicit rules need steps below 0.04 ms.
 """
 
 import numpy as np
 
 from tvist_plant._compiled import compiled
-from tvist_plant.model import Floats
+from tvist_plant.model import Floats, Integers
 
 
 @compiled
 def cholesky(S: Floats) -> None:
-    """Replace the lower triangle of a symmetric positive definite matrix by its Cholesky factor; reads that triangle only."""
+    """Replace the lower triangle of a positive definite matrix by its Cholesky factor; the rest is left."""
     for j in range(S.shape[0]):
         pivot = S[j, j]
         for k in range(j):
@@ -49,17 +49,18 @@ def solve(L: Floats, x: Floats) -> None:
 
 
 @compiled
-def advance(
+def advance(  # noqa: C901, PLR0912 - one kernel: its branches are the loops over rows and joints
     y: Floats,
     v: Floats,
     s: Floats,
     a: Floats,
     M: Floats,
     bias: Floats,
-    bias_slope: Floats,
+    last_M: Floats,
+    last_bias: Floats,
     start: Floats,
     end: Floats,
-    joints: Floats,
+    joints: Integers,
     stiffness: Floats,
     damping: Floats,
     rotor_inertia: Floats,
@@ -86,7 +87,8 @@ def advance(
         a: Mean accelerations of the last substep, in and out, shape (N+n,) [rad/s^2].
         M: Mass matrix, upper triangle, shape (N, N) [kg m^2].
         bias: Coriolis, centrifugal and gravity torques at the start, shape (N,) [N m].
-        bias_slope: Their extrapolated slope [N m/s].
+        last_M: M one period earlier.
+        last_bias: The bias one period earlier.
         start: Rows q_r, q̇_r, τ_ff of the last command, shape (3, n).
         end: Rows of this command.
         joints: Numbers of the n joints among the N link angles.
@@ -114,7 +116,7 @@ def advance(
             S[i, j] = 0.5 * h * damping[i, j] + 0.25 * h * h * stiffness[i, j]
     for i in range(links):
         for j in range(i + 1):
-            S[i, j] += M[j, i]
+            S[i, j] += 1.5 * M[j, i] - 0.5 * last_M[j, i]
     for j in range(n):
         S[links + j, links + j] += rotor_inertia[j] + 0.125 * h * h * h * integral_gain[j]
     cholesky(S)
@@ -122,7 +124,7 @@ def advance(
     for step in range(substeps):
         middle = (step + 0.5) / substeps
         for i in range(links):
-            f[i] = -bias[i] - bias_slope[i] * middle * period
+            f[i] = -bias[i] - middle * (bias[i] - last_bias[i])
         for j in range(n):
             m, l = links + j, joints[j]
             q_r = start[0, j] + middle * (end[0, j] - start[0, j])
@@ -130,7 +132,7 @@ def advance(
             torque = start[2, j] + middle * (end[2, j] - start[2, j])
             speed = v[m] + 0.5 * h * a[m]
             angle = y[m] + 0.5 * h * speed
-            # The slope of friction at rest is implicit in `damping`; what saturates beyond it is put back here.
+            # Friction's slope at rest is implicit in `damping`; what saturates beyond it is put back here.
             slack = friction[j] * (speed / friction_width - np.tanh(speed / friction_width))
             wave = gear_stiffness[j] * gear_error * np.sin(gear_waves * angle + gear_phase[j])
             f[m] = torque + velocity_gain[j] * qd_r + position_gain[j] * q_r + slack - wave
@@ -162,7 +164,7 @@ def balance(
     M: Floats,
     bias: Floats,
     command: Floats,
-    joints: Floats,
+    joints: Integers,
     stiffness: Floats,
     damping: Floats,
     velocity_gain: Floats,
@@ -176,7 +178,10 @@ def balance(
     qdd: Floats,
     moment: Floats,
 ) -> None:
-    """Link accelerations `qdd`, shape (N,), and motor torques `moment`, shape (n,), at a state. Arguments as above."""
+    """Link accelerations `qdd`, shape (N,), and motor torques `moment`, shape (n,), at a state.
+
+    The other arguments are those of `advance`; `command` is the present one's rows, `S` work.
+    """
     size, links, n = y.shape[0], M.shape[0], s.shape[0]
     for i in range(links):
         value = -bias[i]

@@ -1,4 +1,4 @@
-"""Vibration modes of arm and drives together: damped frequency, damping ratio and participation, from the linearised loop.
+"""Vibration modes of arm and drives together, linearised: damped frequency, damping ratio and participation.
 
 This is the truth that an estimator is judged by; no robot can know it.
 """
@@ -65,16 +65,19 @@ def modes(flexible: FlexibleModel, linear: LinearPart, description: RobotDescrip
     drives = description.drives
     rigid = mass[np.ix_(flexible.joints, flexible.joints)]
     windup = np.array(drives.windup_feedforward) / np.array(drives.gear_stiffness)
+    friction = np.array(drives.coulomb_friction) / drives.friction_width
     participation = []
     for k in chosen:
         pole = values[k]
         q_r = np.eye(n) + (windup * pole**2)[:, None] * rigid
-        torque = pole**2 * (rigid + np.diag(linear.rotor_inertia))
+        torque = pole**2 * (rigid + np.diag(linear.rotor_inertia)) + pole * np.diag(friction)
         push = (linear.velocity_gain * pole + linear.position_gain)[:, None] * q_r + torque
         modal = left[k, size : 2 * size] @ inverse[:, motor] @ push + left[k, 2 * size :] @ q_r
         flange = jacobian @ right[size : size + links, k] * pole
         participation.append(2.0 * np.linalg.norm(np.outer(flange, modal / pole**3)))
     poles = values[chosen]
     return Modes(
-        f_d=poles.imag / (2.0 * np.pi), zeta=-poles.real / np.abs(poles), participation=np.array(participation)
+        f_d=poles.imag / (2.0 * np.pi),
+        zeta=-poles.real / np.abs(poles),
+        participation=np.array(participation),
     )

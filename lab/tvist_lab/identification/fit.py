@@ -1,5 +1,6 @@
 """Two multivariate polynomials through measured (f_d, ζ)."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +35,21 @@ class Fit:
     """[-]."""
 
 
+def check_count(configurations: int, joints: tuple[int, ...], degree: int) -> None:
+    """Check that there are enough configurations, before or after they are measured.
+
+    Raises:
+        FitError: There are fewer than one and a half times the coefficients.
+    """
+    size = terms(np.zeros((1, max(joints) + 1)), joints=joints, basis=BASIS, degree=degree).shape[1]
+    needed = math.ceil(1.5 * size)
+    if configurations < needed:
+        raise FitError(
+            f"{configurations} usable configurations for {size} coefficients: at least {needed} are needed; "
+            "measure more configurations or lower the degree"
+        )
+
+
 def fit_polynomials(
     q: Floats, f_d: Floats, zeta: Floats, weights: Floats, *, joints: tuple[int, ...], degree: int
 ) -> Fit:
@@ -50,13 +66,9 @@ def fit_polynomials(
     Raises:
         FitError: There are fewer measurements than one and a half times the coefficients.
     """
+    check_count(len(q), joints, degree)
     design = terms(q, joints=joints, basis=BASIS, degree=degree)
-    count, size = design.shape
-    if count < 1.5 * size:
-        raise FitError(
-            f"{count} usable ring-downs for {size} coefficients: at least {int(1.5 * size) + 1} are needed; "
-            "measure more configurations or lower the degree"
-        )
+    count = len(design)
     coefficients = [_solve(design, y, weights) for y in (f_d, zeta)]
     fold = np.arange(count) % FOLDS
     unseen = np.empty((2, count))

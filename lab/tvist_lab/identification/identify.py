@@ -14,7 +14,7 @@ from tvist_protocol.info import Info
 from tvist_shaping import Polynomial
 
 from tvist_lab.collect import collect
-from tvist_lab.identification.fit import Fit, fit_polynomials, spread
+from tvist_lab.identification.fit import Fit, check_count, fit_polynomials, spread
 from tvist_lab.identification.ring_downs import Jog, measure
 from tvist_lab.recordings import Floats
 from tvist_lab.workspace import IDENTIFIED
@@ -104,9 +104,12 @@ async def identify(
         progress: Told of each configuration done.
 
     Raises:
-        IdentificationError: Too few ring-downs could be used.
+        FitError: There are too few configurations, or too few of them could be used.
+        IdentificationError: No ring-down at all could be used.
     """
     info = await robot.info()
+    joints = tuple(j for j in (1, 2, 3) if j < len(info.joints)) or (0,)
+    check_count(plan.configurations + len(plan.anchors), joints, plan.degree)
     await arm.set_shaper("none")
     q, weights = _configurations(plan, len(info.joints))
     kept, values, truths = [], [], []
@@ -130,7 +133,6 @@ async def identify(
     named = sum(number < len(plan.anchors) for number in kept)
     f_d, zeta = np.array(values).T
     q, weights = q[kept], weights[kept]
-    joints = tuple(j for j in (1, 2, 3) if j < len(info.joints)) or (0,)
     fit = fit_polynomials(q, f_d, zeta, weights, joints=joints, degree=plan.degree)
     calibration = _calibration(info, plan, fit, f_d, zeta, rejected, name=name, command=command)
     if any(truth is None for truth in truths):
@@ -182,6 +184,6 @@ def _calibration(
             residual_f_d_percent=fit.residual_f_d,
             residual_zeta_percent=fit.residual_zeta,
             cross_validated_f_d_percent=fit.cross_validated_f_d,
-            cross_validated_zeta_percent=fit.cross_validated_zeta, named,
+            cross_validated_zeta_percent=fit.cross_validated_zeta,
         ),
     )
