@@ -5,7 +5,6 @@ from importlib.metadata import version
 from tvist_plant.plant import PERIOD
 from tvist_protocol.info import CalibrationInfo, Info, Limits
 from tvist_protocol.values import PROTOCOL_VERSION
-
 from tvist_server.calibrations import available, fits
 from tvist_server.choices import shapers
 from tvist_server.controller import Controller

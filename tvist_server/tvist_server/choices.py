@@ -2,15 +2,14 @@
 
 from tvist_protocol.calibration import Calibration, CalibrationError, calibration_of
 from tvist_protocol.commands import SetEstimator
+from tvist_server.calibrations import available, estimator_of, load
+from tvist_server.refusal import RefusalError
+from tvist_server.setup import Setup
 from tvist_shaping.catalogue import SHAPERS, shaper
 from tvist_shaping.errors import ShapingError, UnknownShaperError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.filter import TvistFilter
-
-from tvist_server.calibrations import available, estimator_of, load
-from tvist_server.refusal import RefusalError
-from tvist_server.setup import Setup
 
 ESTIMATORS = ("fixed", "polynomial")
 
@@ -47,7 +46,8 @@ def choose_estimator(command: SetEstimator, setup: Setup) -> tuple[Estimator, Ca
         raise RefusalError("unknown_estimator", "name", f"name is {command.name!r}: this server has {known}")
     for field in ("f_d", "zeta"):
         if getattr(command, field) is not None:
-            raise RefusalError("out_of_range", field, f"{field} belongs to the estimator fixed, not to polynomial")
+            why = f"{field} belongs to the estimator fixed, not to polynomial"
+            raise RefusalError("out_of_range", field, why)
     calibration = _calibration(command, setup)
     if calibration.robot != setup.description.robot.model:
         why = f"calibration.robot is {calibration.robot!r}; this arm is a {setup.description.robot.model}"
@@ -61,9 +61,11 @@ def choose_estimator(command: SetEstimator, setup: Setup) -> tuple[Estimator, Ca
 def _fixed(command: SetEstimator) -> Fixed:
     for field in ("f_d", "zeta"):
         if getattr(command, field) is None:
-            raise RefusalError("missing_field", field, f"{field} is missing: the estimator fixed needs f_d and zeta")
+            why = f"{field} is missing: the estimator fixed needs f_d and zeta"
+            raise RefusalError("missing_field", field, why)
     if command.calibration is not None:
-        raise RefusalError("out_of_range", "calibration", "calibration belongs to the estimator polynomial, not to fixed")
+        why = "calibration belongs to the estimator polynomial, not to fixed"
+        raise RefusalError("out_of_range", "calibration", why)
     f_d, zeta = command.f_d or (), command.zeta or ()
     if len(f_d) != 1:
         raise RefusalError("out_of_range", "f_d", f"f_d has {len(f_d)} modes; this version shapes 1", 1)
@@ -82,9 +84,11 @@ def _calibration(command: SetEstimator, setup: Setup) -> Calibration:
     own = setup.calibration
     if command.calibration is None or (own is not None and own.name == command.calibration):
         if own is None:
-            raise RefusalError("missing_field", "calibration", "calibration is missing: this server was started without")
+            why = "calibration is missing: this server was started without"
+            raise RefusalError("missing_field", "calibration", why)
         return own
     if command.calibration not in available():
         known = ", ".join(available())
-        raise RefusalError("unknown_calibration", "calibration", f"calibration is {command.calibration!r}: there is {known}")
+        why = f"calibration is {command.calibration!r}: there is {known}"
+        raise RefusalError("unknown_calibration", "calibration", why)
     return load(command.calibration)

@@ -6,10 +6,10 @@ from typing import Annotated
 
 import msgspec
 from msgspec import Meta, Struct
+
 from tvist_plant.description import RobotDescription, load
 from tvist_protocol.info import Clock
 from tvist_protocol.values import RobotName, Seed
-
 from tvist_server import calibrations
 from tvist_server.setup import Setup, paper_payload
 
@@ -56,7 +56,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         """
         try:
             description = load(self.robot)
-            calibration = None if self.calibration in {None, "none"} else calibrations.load(str(self.calibration))
+            named = self.calibration not in {None, "none"}
+            calibration = calibrations.load(str(self.calibration)) if named else None
             setup = Setup(
                 description=description,
                 q=self._start(description),
@@ -87,7 +88,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             return tuple(float(angle) for angle in self.start.split(","))
         except ValueError:
             known = ", ".join(description.poses)
-            raise ConfigError(f"start is {self.start!r}: must be one of {known}, or angles with commas") from None
+            why = f"start is {self.start!r}: must be one of {known}, or angles with commas"
+            raise ConfigError(why) from None
 
 
 def from_mapping(content: object, source: str) -> ServeConfig:

@@ -8,15 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_protocol.calibration import Calibration
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import Accepted, Code, Done, Refused, Reply
 from tvist_protocol.stream import Event, EventKind, State, Truth
-from tvist_protocol.values import PROTOCOL_VERSION
-from tvist_shaping.filter import TvistFilter
-
+from tvist_protocol.values import PROTOCOL_VERSION, Payload
 from tvist_server.calibrations import fits
 from tvist_server.choices import choose_estimator, choose_filter
 from tvist_server.control.kinematics import ForwardKinematics, rotation_vector
@@ -25,11 +24,12 @@ from tvist_server.refusal import RefusalError, check_body, check_joints, check_m
 from tvist_server.session import NoControlError, Session
 from tvist_server.setup import Setup, body
 from tvist_server.trajectory import Limits, SetpointStream
+from tvist_shaping.filter import TvistFilter
 
 STREAM_TIMEOUT = 0.25
 """A stream without set-points for this long is stopped [s]."""
 TRUE_MODES_EVERY = 50
-"""Ticks between two computations of the arm's true modes: an eigenvalue problem costs a good part of a tick."""
+"""Ticks between two computations of the arm's true modes: an eigenvalue problem takes a good part of one."""
 
 
 @dataclass
@@ -66,21 +66,24 @@ class Controller:
         self.estimator_name = "fixed" if setup.calibration is None else "polynomial"
         self.session = Session(timeouts=setup.clock == "realtime")
         self._timeouts = setup.clock == "realtime"
-        q = np.array(setup.q, dtype=float)
+        try:
+            tvist = choose_filter(setup.shaper, setup.estimator(), setup.description.joints)
+        except RefusalError as error:
+            raise ValueError(str(error)) from error
         self.cycle = ControlCycle(
             setup.description,
-            choose_filter(setup.shaper, setup.estimator(), setup.description.joints),
-            q=q,
+            tvist,
+            q=np.array(setup.q, dtype=float),
             declared=body(setup.payload),
             carried=body(setup.payload),
             seed=setup.seed,
         )
         self._kinematics = ForwardKinematics(setup.description)
         self._events: list[Event] = []
+        self._seed = setup.seed
         self._motions = 0
         self._motion: int | None = None
         self._stream: SetpointStream | None = None
-        self._stream_limits = Limits(0.0, 0.0, 0.0)
         self._stream_heard = 0.0
         self._true_modes: dict[str, list[float]] = {}
         self._warn_of_payload()
@@ -100,12 +103,12 @@ class Controller:
         except RefusalError as refusal:
             reply = refusal.reply
         except NoControlError as refusal:
-            reply = _refused(refusal.code, "token", refusal.why)  # type: ignore[arg-type]
+            reply = Refused(code=refusal.code, where="token", why=refusal.why)
         self.counters.refused += 1
         return reply
 
     def receive_setpoint(self, setpoint: c.Setpoint) -> None:
-        """Take a set-point; one that is not for us is counted and dropped, since nobody waits for an answer."""
+        """Take a set-point; one that is not for us is counted and dropped: nobody waits for an answer."""
         counters, stream = self.counters, self._stream
         counters.setpoints_received += 1
         lease = self.session.lease
@@ -202,7 +205,14 @@ class Controller:
             missed_ticks=self.counters.missed_ticks,
         )
 
-    def _emit(self, kind: EventKind, *, id: int | None = None, code: Code | None = None, why: str | None = None) -> None:  # noqa: A002  the wire's name
+    def _emit(
+        self,
+        kind: EventKind,
+        *,
+        id: int | None = None,  # noqa: A002  the wire's name
+        code: Code | None = None,
+        why: str | None = None,
+    ) -> None:
         """Put down an event of the tick that is being made; of the next one between two."""
         self._events.append(Event(tick=self.tick_number + 1, kind=kind, id=id, code=code, why=why))
 
@@ -224,11 +234,13 @@ class Controller:
     def _stop(self, deceleration: float | None, why: str) -> None:
         """Stop past the filter and say how what was moving ended."""
         self._end_stream(why)
-        if self.cycle.at_rest or self.cycle.stopping:
+        if self.cycle.at_rest:
             return
         plan = self.cycle.stop(deceleration)
+        if plan is None:
+            return
         if plan.limited:
-            why = f"{why}; deceleration limited to {plan.acceleration:.3g} rad/s²"
+            why = f"{why}; deceleration is {plan.acceleration:.3g} rad/s², limited from {deceleration:.3g}"
         if self._motion is not None:
             self._emit("motion_stopped", id=self._motion, why=why)
             self._motion = None
@@ -291,7 +303,10 @@ class Controller:
         check_motion(command.velocity, command.acceleration, command.jerk, description)
         self._check_rest()
         limits = Limits(command.velocity, command.acceleration, command.jerk)
-        self.cycle.move(np.array(command.q, dtype=float), limits)
+        try:
+            self.cycle.move(np.array(command.q, dtype=float), limits)
+        except ValueError as error:
+            raise RefusalError("out_of_range", "velocity", str(error)) from error
         self._motions += 1
         self._motion = self._motions
         self._emit("motion_started", id=self._motion)
@@ -302,8 +317,8 @@ class Controller:
         self._authorize(command.token)
         check_motion(command.velocity, command.acceleration, command.jerk, self.setup.description)
         self._check_rest()
-        self._stream_limits = Limits(command.velocity, command.acceleration, command.jerk)
-        self._stream = self.cycle.stream(command.period, self._stream_limits)
+        limits = Limits(command.velocity, command.acceleration, command.jerk)
+        self._stream = self.cycle.stream(command.period, limits)
         self._stream_heard = self.now
         return Done()
 
@@ -312,7 +327,7 @@ class Controller:
         self._authorize(command.token)
         if self._stream is None:
             raise RefusalError("wrong_mode", "", "no stream is running: send servo_start first")
-        self.cycle.end_stream(self._stream, self._stream_limits)
+        self.cycle.end_stream(self._stream)
         self._end_stream("servo_stop")
         return Done()
 
@@ -326,19 +341,22 @@ class Controller:
     def set_shaper(self, command: c.SetShaper) -> Reply:
         """Choose the shaper."""
         self._authorize(command.token)
-        self._check_rest()
         if command.modes > 1:
             raise RefusalError("out_of_range", "modes", f"modes is {command.modes}; the estimators give 1", 1)
-        tvist = choose_filter(command.name, self.cycle.tvist.estimator, self.setup.description.joints, where="name")
+        estimator, joints = self.cycle.tvist.estimator, self.setup.description.joints
+        tvist = choose_filter(command.name, estimator, joints, where="name")
+        self._check_rest()
         self._use(tvist)
         return Done()
 
     def set_estimator(self, command: c.SetEstimator) -> Reply:
         """Choose the estimator."""
         self._authorize(command.token)
-        self._check_rest()
         estimator, calibration = choose_estimator(command, self.setup)
-        tvist = choose_filter(self.cycle.tvist.shaper.name, estimator, self.setup.description.joints)
+        where = "f_d" if calibration is None else "calibration"
+        shaper, joints = self.cycle.tvist.shaper.name, self.setup.description.joints
+        tvist = choose_filter(shaper, estimator, joints, where=where)
+        self._check_rest()
         self.calibration, self.estimator_name = calibration, command.name
         self._use(tvist)
         self._warn_of_payload()
@@ -347,7 +365,7 @@ class Controller:
     def set_payload(self, command: c.SetPayload) -> Reply:
         """Change what the controller believes that the arm carries."""
         self._authorize(command.token)
-        payload = c.Payload(mass=command.mass, com=command.com, inertia=command.inertia)
+        payload = Payload(mass=command.mass, com=command.com, inertia=command.inertia)
         check_body(payload, rated=self.setup.description.limits.payload)
         self._check_rest()
         self.declared = payload
@@ -364,10 +382,11 @@ class Controller:
         if command.payload is not None:
             check_body(command.payload, "payload")
         if command.mode not in {None, "RUNNING"}:
-            raise RefusalError("out_of_range", "mode", f"mode is {command.mode!r}; this version knows RUNNING only")
+            why = f"mode is {command.mode!r}; this version knows RUNNING only"
+            raise RefusalError("out_of_range", "mode", why)
         tvist = None
         if command.shaper is not None:
-            tvist = choose_filter(command.shaper, self.cycle.tvist.estimator, description.joints, where="shaper")
+            tvist = choose_filter(command.shaper, self.cycle.tvist.estimator, description.joints)
         self._end_stream("simulation.reset")
         if self._motion is not None:
             self._emit("motion_stopped", id=self._motion, why="simulation.reset")
@@ -376,7 +395,9 @@ class Controller:
         carried = None if command.payload is None else body(command.payload)
         if tvist is not None:
             self._use(tvist)
-        self.cycle.reset(q, carried=carried, seed=self.setup.seed if command.seed is None else command.seed)
+        if command.seed is not None:
+            self._seed = command.seed
+        self.cycle.reset(q, carried=carried, seed=self._seed)
         self._true_modes = {}
         return Done(tick=self.tick_number)
 
@@ -384,10 +405,15 @@ class Controller:
         """Check that a client may let time pass; the driver then does."""
         self._authorize(command.token)
         if self.setup.clock == "realtime":
-            raise RefusalError("wrong_mode", "type", "time passes by itself here: start with --clock lockstep to step")
+            why = "time passes by itself here: start with --clock lockstep to step"
+            raise RefusalError("wrong_mode", "type", why)
         if command.setpoints is not None and self._stream is None:
             raise RefusalError("wrong_mode", "setpoints", "no stream is running: send servo_start first")
-        for number, setpoint in enumerate(command.setpoints or ()):
+        setpoints = command.setpoints or ()
+        if len(setpoints) > command.ticks:
+            why = f"setpoints has {len(setpoints)} entries, one a tick; ticks is {command.ticks}"
+            raise RefusalError("out_of_range", "setpoints", why, command.ticks)
+        for number, setpoint in enumerate(setpoints):
             check_joints(setpoint.q, self.setup.description, f"setpoints[{number}].q")
         return Done(tick=self.tick_number + command.ticks)
 
@@ -400,7 +426,7 @@ class Controller:
         self.session.renew(token, self.now)
 
     def _use(self, tvist: TvistFilter) -> None:
-        tvist.reset(self.cycle.position)
+        tvist.reset(self.cycle.reference)
         self.cycle.tvist = tvist
         self._emit("shaper_changed", why=f"{tvist.shaper.name} with estimator {self.estimator_name}")
 
@@ -409,13 +435,10 @@ class Controller:
             self._emit(
                 "warning",
                 code="payload_mismatch",
-                why=f"calibration {self.calibration.name!r} was made with {self.calibration.payload.mass:g} kg; "
-                f"{self.declared.mass:g} kg is declared: frequencies will be off",
+                why=f"calibration {self.calibration.name!r} was made with "
+                f"{self.calibration.payload.mass:g} kg; {self.declared.mass:g} kg is declared: "
+                "frequencies will be off",
             )
-
-
-def _refused(code: Code, where: str, why: str) -> Refused:
-    return Refused(code=code, where=where, why=why)
 
 
 _HANDLERS: dict[type, Callable[[Controller, Any], Reply]] = {

@@ -1,18 +1,19 @@
 """One control period: the paper's Figure 6, left to right."""
 
+import math
 from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
+
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import PERIOD, Measurement, Plant
-from tvist_shaping.filter import TvistFilter
-
 from tvist_server.control.differentiator import Differentiator, Floats, Target
 from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.control.joint_controllers import JointControllers
 from tvist_server.safety import StopPlan, plan_stop
 from tvist_server.trajectory import DoubleS, Limits, Rest, SetpointStream, Stop, Trajectory
+from tvist_shaping.filter import TvistFilter
 
 T = TypeVar("T", bound=Trajectory)
 
@@ -62,11 +63,19 @@ class ControlCycle:
         self.inverse_dynamics = InverseDynamics(description, declared)
         self._joint_controllers = JointControllers(description, PERIOD)
         self._differentiator = Differentiator(q, PERIOD)
+        self.trajectory: Trajectory = Rest(q)
+        self.reference = q
+        """Newest one before shaping, shape (n,) [rad]."""
+        self.at_rest = True
+        """Whether nothing moves the shaped reference any more."""
+        self.stopping = False
+        """Whether a stop bypasses the filter."""
+        self._deceleration = math.inf
         self.reset(q, carried=carried, seed=seed)
 
     def step(self) -> Sample:
         """One tick."""
-        reference = self.trajectory.next()  # q [rad]
+        reference = self.reference = self.trajectory.next()  # q [rad]
         shaped = reference if self.stopping else self.tvist.filter(reference)  # q* [rad]
         target = self._differentiator.update(shaped)  # q*, q̇*, q̈* of the tick before
         torque = self.inverse_dynamics.torque(target.q, target.qd, target.qdd)  # τ* [N m]
@@ -76,14 +85,17 @@ class ControlCycle:
         return Sample(reference, target, torque, measured)
 
     def _settle(self, reference: Floats, target: Target) -> None:
-        """Notice the end of a motion: the trajectory is over and the shaped reference has come to rest on it."""
+        """Notice the end of a motion: its trajectory is over and the shaped reference rests on it."""
         if self.at_rest or not self.trajectory.finished:
             return
-        if self.stopping:  # the delay line starts anew from where the stop ended
+        step = PERIOD * (
+            target.qd - 0.5 * PERIOD * target.qdd
+        )  # what central differences make of q*ᵢ - q*ᵢ₋₁
+        way_left = reference - target.q
+        self.at_rest = bool(max(np.abs(step).max(), np.abs(way_left).max()) <= STILL)
+        if self.at_rest and self.stopping:  # the delay line starts anew from where the stop ended
             self.tvist.reset(reference)
-            self.trajectory, self.stopping = Rest(reference), False
-        moves = max(np.abs(reference - target.q).max(), np.abs(target.qd).max() * PERIOD)
-        self.at_rest = bool(moves <= STILL)
+            self.stopping = False
 
     @property
     def position(self) -> Floats:
@@ -91,42 +103,49 @@ class ControlCycle:
         return self._differentiator.newest.q
 
     def move(self, target: Floats, limits: Limits) -> DoubleS:
-        """Start a point-to-point motion; the arm must be at rest."""
-        return self._start(DoubleS(self.position, target, limits, PERIOD))
+        """Start a point-to-point motion; the arm must be at rest.
+
+        Raises:
+            ValueError: There is no such motion.
+        """
+        return self._start(DoubleS(self.reference, target, limits, PERIOD))
 
     def stream(self, stream_period: float, limits: Limits) -> SetpointStream:
         """Start to follow set-points; the arm must be at rest."""
-        return self._start(SetpointStream(self.position, stream_period, limits, PERIOD))
+        return self._start(SetpointStream(self.reference, stream_period, limits, PERIOD))
 
     def _start(self, trajectory: T) -> T:
         self.trajectory = trajectory
         self.at_rest = False
         return trajectory
 
-    def end_stream(self, stream: SetpointStream, limits: Limits) -> None:
+    def end_stream(self, stream: SetpointStream) -> None:
         """Bring a stream to rest inside its own limits, through the filter."""
-        q, qd, qdd = stream.state
-        self._start(Stop(q, qd, qdd, acceleration=limits.acceleration, jerk=limits.jerk, period=PERIOD))
+        limits = stream.limits
+        self._start(Stop(*stream.state, acceleration=limits.acceleration, jerk=limits.jerk, period=PERIOD))
 
-    def stop(self, deceleration: float | None) -> StopPlan:
-        """Stop past the filter, from the shaped reference straight to rest; nothing in the delay line plays any more.
+    def stop(self, deceleration: float | None) -> StopPlan | None:
+        """Stop past the filter, straight from the shaped reference; nothing in the delay line plays on.
 
         Args:
             deceleration: Wanted limit [rad/s^2]; None for what the torque allows.
 
         Returns:
-            The stop with the limit it keeps and whether that was lowered for torque.
+            The stop with the limit it keeps; None where a stop under way is as hard already, and goes on.
         """
-        plan = plan_stop(self.description, self.inverse_dynamics, self._differentiator.newest, deceleration, PERIOD)
+        wanted = math.inf if deceleration is None else deceleration
+        if self.stopping and wanted <= self._deceleration:
+            return None
+        newest = self._differentiator.newest
+        plan = plan_stop(self.description, self.inverse_dynamics, newest, deceleration, PERIOD)
         self._start(plan.trajectory)
-        self.stopping = True
+        self.stopping, self._deceleration = True, wanted
         return plan
 
     def reset(self, q: Floats, *, carried: Payload | None = None, seed: int = 0) -> None:
         """Put the arm at rest somewhere, in static equilibrium; everything on the line starts anew."""
-        self.trajectory: Trajectory = Rest(q)
-        self.stopping = False
-        self.at_rest = True
+        self.trajectory, self.reference = Rest(q), q
+        self.at_rest, self.stopping = True, False
         self.tvist.reset(q)
         self._differentiator.reset(q)
         self._joint_controllers.reset()

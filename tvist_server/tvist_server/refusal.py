@@ -3,9 +3,12 @@
 import math
 from collections.abc import Sequence
 
-from tvist_plant.description import RobotDescription
+from tvist_plant.description import RobotDescription, is_real_body
 from tvist_protocol.replies import Code, Refused
 from tvist_protocol.values import Payload
+
+SLOWEST = {"velocity": 1e-3, "acceleration": 1e-2, "jerk": 0.1}
+"""Limits of a motion below which it would take for ever [rad/s, rad/s^2, rad/s^3]."""
 
 
 class RefusalError(Exception):
@@ -19,17 +22,17 @@ class RefusalError(Exception):
 def check_joints(q: Sequence[float], description: RobotDescription, where: str = "q") -> None:
     """Refuse a posture with another number of joints or outside their range."""
     if len(q) != description.joints:
-        raise RefusalError(
-            "out_of_range", where, f"{where} has {len(q)} angles; the arm has {description.joints}", description.joints
-        )
+        why = f"{where} has {len(q)} angles; the arm has {description.joints}"
+        raise RefusalError("out_of_range", where, why, description.joints)
     for number, (angle, limit) in enumerate(zip(q, description.limits.position, strict=True)):
         if not abs(angle) <= limit:
             field = f"{where}[{number}]"
-            raise RefusalError("limit_position", field, f"{field} is {angle:g} rad; the joint goes to ±{limit:g}", limit)
+            why = f"{field} is {angle:g} rad; the joint goes to ±{limit:g}"
+            raise RefusalError("limit_position", field, why, limit)
 
 
 def check_motion(velocity: float, acceleration: float, jerk: float, description: RobotDescription) -> None:
-    """Refuse limits of a motion above those of the arm."""
+    """Refuse limits of a motion above those of the arm, or so low that it would hardly move."""
     limits = description.limits
     code: Code
     for code, where, value, highest, unit in (
@@ -38,7 +41,11 @@ def check_motion(velocity: float, acceleration: float, jerk: float, description:
         ("out_of_range", "jerk", jerk, min(limits.jerk), "rad/s³"),
     ):
         if value > highest:
-            raise RefusalError(code, where, f"{where} is {value:g} {unit}; the arm's limit is {highest:g}", highest)
+            why = f"{where} is {value:g} {unit}; the arm's limit is {highest:g}"
+            raise RefusalError(code, where, why, highest)
+        if value < (lowest := SLOWEST[where]):
+            why = f"{where} is {value:g} {unit}; it must be at least {lowest:g}"
+            raise RefusalError("out_of_range", where, why, lowest)
 
 
 def check_body(payload: Payload, where: str = "", rated: float = math.inf) -> None:
@@ -46,15 +53,9 @@ def check_body(payload: Payload, where: str = "", rated: float = math.inf) -> No
     prefix = f"{where}." if where else ""
     if payload.mass > rated:
         field = f"{prefix}mass"
-        raise RefusalError("out_of_range", field, f"{field} is {payload.mass:g} kg; the arm is rated for {rated:g}", rated)
-    xx, xy, xz, yy, yz, zz = payload.inertia
-    # Leading minors of a moment tensor that a distribution of mass can have, with room for rounding.
-    small = -1e-12
-    minors = (xx, yy, zz, xx * yy - xy * xy, xx * zz - xz * xz, yy * zz - yz * yz)
-    determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
-    triangle = (xx + yy - zz, yy + zz - xx, zz + xx - yy)
-    if min(*minors, determinant, *triangle) < small:
+        why = f"{field} is {payload.mass:g} kg; the arm is rated for {rated:g}"
+        raise RefusalError("out_of_range", field, why, rated)
+    if not is_real_body(payload.inertia):
         field = f"{prefix}inertia"
-        raise RefusalError(
-            "out_of_range", field, f"{field} is {list(payload.inertia)}: no body has these moments of inertia"
-        )
+        why = f"{field} is {list(payload.inertia)}: no body has these moments of inertia"
+        raise RefusalError("out_of_range", field, why)

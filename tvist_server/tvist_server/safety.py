@@ -1,10 +1,10 @@
 """What the arm may do: positions, velocities, accelerations, torques."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from tvist_plant.description import RobotDescription
 
+from tvist_plant.description import RobotDescription
 from tvist_server.control.differentiator import Floats, Target
 from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.trajectory import Stop
@@ -12,7 +12,7 @@ from tvist_server.trajectory import Stop
 TORQUE_SHARE = 0.9
 """Share of the joints' torque that a stop may ask for [-]."""
 GENTLEST_STOP = 1.0
-"""Deceleration below which no stop goes, even where the torque then passes its share [rad/s^2]."""
+"""Deceleration below which no stop goes: neither for torque, nor because a client wants it [rad/s^2]."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class StopPlan:
     acceleration: float
     """Limit it keeps [rad/s^2]."""
     limited: bool
-    """Whether that is less than was wanted."""
+    """Whether that is not what was wanted."""
 
 
 def plan_stop(
@@ -35,8 +35,10 @@ def plan_stop(
 ) -> StopPlan:
     """The shortest stop whose torque stays within its share of the joints' limits.
 
-    Gravity alone takes most of a stretched arm's torque, so the deceleration that is left depends on the pose: it is
-    lowered in steps until the torque along the whole stop, by inverse dynamics of the rigid arm, is inside.
+    Gravity alone takes most of a stretched arm's torque, so the deceleration left depends on the pose:
+    it is lowered in steps until the torque along the whole stop, by inverse dynamics of the rigid arm, is
+    inside. Where the motion already takes more, the stop may too. A stop so gentle that it would end beyond a
+    joint's range is made as hard as one without a wish.
 
     Args:
         description: The robot.
@@ -47,17 +49,20 @@ def plan_stop(
     """
     limits = description.limits
     highest = min(limits.acceleration)
-    acceleration = highest if wanted is None else min(wanted, highest)
-    torque = TORQUE_SHARE * np.array(limits.torque)
-    lowered = wanted is not None and wanted > highest
+    acceleration = highest if wanted is None else min(max(wanted, GENTLEST_STOP), highest)
+    present = np.abs(dynamics.torque(state.q, state.qd, state.qdd))
+    torque = np.maximum(TORQUE_SHARE * np.array(limits.torque), present)
     while True:
         trajectory = Stop(
             state.q, state.qd, state.qdd, acceleration=acceleration, jerk=min(limits.jerk), period=period
         )
         if acceleration <= GENTLEST_STOP or _within(trajectory, dynamics, torque):
-            return StopPlan(trajectory, acceleration, lowered)
+            break
         acceleration = max(0.8 * acceleration, GENTLEST_STOP)
-        lowered = wanted is not None
+    if wanted is not None and (np.abs(trajectory.at(trajectory.duration)[0]) > limits.position).any():
+        hardest = plan_stop(description, dynamics, state, None, period)
+        return replace(hardest, limited=True)
+    return StopPlan(trajectory, acceleration, wanted is not None and acceleration != wanted)
 
 
 def _within(trajectory: Stop, dynamics: InverseDynamics, torque: Floats, samples: int = 12) -> bool:

@@ -1,6 +1,8 @@
-"""Who may move the arm: control by lease. It knows no motion, no network and no clock: the time is an argument."""
+"""Who may move the arm: control by lease. It knows no motion, network or clock: the time is an argument."""
 
 from dataclasses import dataclass
+
+from tvist_protocol.replies import Code
 
 
 @dataclass(frozen=True)
@@ -20,7 +22,7 @@ class Lease:
 class NoControlError(Exception):
     """A command that needs control came without it."""
 
-    def __init__(self, code: str, why: str) -> None:
+    def __init__(self, code: Code, why: str) -> None:
         super().__init__(why)
         self.code = code
         self.why = why
@@ -46,7 +48,8 @@ class Session:
             NoControlError: Another client holds it.
         """
         if self.lease is not None and self.lease.client != client:
-            raise NoControlError("no_control", f"control is held by {self.lease.client!r} until it releases it")
+            why = f"control is held by {self.lease.client!r} until it releases it"
+            raise NoControlError("no_control", why)
         self._granted += 1
         self.lease = Lease(
             client=client,
@@ -67,7 +70,8 @@ class Session:
         if lease is None:
             raise NoControlError("no_control", "nobody has control: send take_control first")
         if token != lease.token:
-            raise NoControlError("stale_token", f"token is not that of the present lease, held by {lease.client!r}")
+            why = f"token is not that of the present lease, held by {lease.client!r}"
+            raise NoControlError("stale_token", why)
         self.lease = Lease(lease.client, lease.token, lease.seconds, now + lease.seconds, lease.watched)
         return self.lease
 

@@ -4,16 +4,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import msgspec
+
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_protocol.info import Clock
 from tvist_protocol.values import Payload
+from tvist_server.calibrations import estimator_of
 from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.fixed import Fixed
-
-from tvist_server.calibrations import estimator_of
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Setup:
     payload: Payload
     """Declared, and carried until a client says otherwise."""
     calibration: Calibration | None
-    """Of the polynomial estimator; None: the estimator is `fixed` at 10 Hz and 0.2, for a robot to be identified."""
+    """Of the polynomial estimator; None: it is `fixed` at 10 Hz and 0.2, for a robot to be identified."""
     name: str = "ur5e"
     """Name of the robot on the network."""
     shaper: str = "zv"
@@ -47,7 +47,8 @@ class Setup:
         """
         joints = self.description.joints
         if len(self.q) != joints:
-            raise ValueError(f"start has {len(self.q)} angles; {self.description.robot.model} has {joints} joints")
+            model = self.description.robot.model
+            raise ValueError(f"start has {len(self.q)} angles; {model} has {joints} joints")
         for number, (angle, limit) in enumerate(zip(self.q, self.description.limits.position, strict=True)):
             if not abs(angle) <= limit:
                 raise ValueError(f"start q[{number}] is {angle}: must be within ±{limit} rad")
@@ -101,9 +102,10 @@ def body(payload: Payload) -> Body:
 def paper_payload(description: RobotDescription, mass: float | None = None) -> Payload:
     """The robot file's payload, its mass and inertia scaled to another mass [kg]."""
     own = description.payload
+    xx, xy, xz, yy, yz, zz = own.inertia
     share = 1.0 if mass is None or own.mass == 0.0 else mass / own.mass
     return Payload(
         mass=own.mass * share if mass is None or own.mass else mass,
         com=own.com,
-        inertia=tuple(value * share for value in own.inertia),
+        inertia=(xx * share, xy * share, xz * share, yy * share, yz * share, zz * share),
     )

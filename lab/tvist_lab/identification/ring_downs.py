@@ -14,7 +14,9 @@ LISTEN = 0.6
 PAUSE = 0.3
 """Time it rests before the next [s]."""
 MODES = 2
-"""Modes that are fitted together; the strongest is taken."""
+"""Modes that are fitted together."""
+SHARE = 0.25
+"""The lowest mode that rings at least this loud beside the loudest is the first one [-]."""
 
 
 @dataclass(frozen=True)
@@ -60,4 +62,4 @@ async def measure(robot: Robot, arm: Arm, q: Floats, jog: Jog, repeats: int) -> 
         stop = motions(recording)[0].shaped_stop
         rings.append(tool_acceleration(recording)[stop : stop + round(LISTEN / period)])
     length = min(map(len, rings))
-    return fit_ring_down(np.mean([ring[:length] for ring in rings], axis=0), period, modes=MODES)
+    return fit_ring_down(np.mean([ring[:length] for ring in rings], axis=0), period, modes=MODES, share=SHARE)

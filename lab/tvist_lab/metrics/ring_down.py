@@ -29,7 +29,7 @@ class RingDown:
     """A damped sine fitted to a ring-down; where `ok` is false, its figures are not to be used."""
 
     f_d: float
-    """Damped frequency of the strongest mode [Hz]."""
+    """Damped frequency of the mode that counts [Hz]."""
     zeta: float
     """Its damping ratio [-]."""
     amplitude: float
@@ -60,6 +60,7 @@ def fit_ring_down(
     slow_poles: tuple[float, ...] = (),
     skip: float = SKIP,
     window: float | None = None,
+    share: float = 1.0,
 ) -> RingDown:
     """Fit damped sines to a ring-down by vector nonlinear least squares.
 
@@ -77,12 +78,13 @@ def fit_ring_down(
         slow_poles: Rates of non-oscillatory tails to allow for [1/s].
         skip: Time after the stop that is left out [s].
         window: Time to fit [s]; None chooses.
+        share: The lowest mode counts that has at least this share of the largest amplitude [-]; 1: the strongest.
 
     Returns:
-        The mode with the largest amplitude. `ok` is false with a `reason` where none is measurable.
+        That mode. `ok` is false with a `reason` where none is measurable.
     """
     first = round(skip / period)
-    ring = _Ring(alpha[first:], period, skip, slow_poles)
+    ring = _Ring(alpha[first:], period, skip, slow_poles, share)
     if window is not None:
         return ring.cut(window).fit(modes)
     if ring.length < WINDOWS[0]:
@@ -99,8 +101,11 @@ def fit_ring_down(
 class _Ring:
     """A ring-down and the projection that eliminates its amplitudes."""
 
-    def __init__(self, alpha: Floats, period: float, skip: float, slow_poles: tuple[float, ...]) -> None:
+    def __init__(
+        self, alpha: Floats, period: float, skip: float, slow_poles: tuple[float, ...], share: float
+    ) -> None:
         self.alpha = alpha
+        self.share = share
         self.period = period
         self.skip = skip
         self.slow_poles = slow_poles
@@ -110,7 +115,9 @@ class _Ring:
 
     def cut(self, window: float) -> "_Ring":
         """The ring-down's first part."""
-        return _Ring(self.alpha[: round(window / self.period)], self.period, self.skip, self.slow_poles)
+        return _Ring(
+            self.alpha[: round(window / self.period)], self.period, self.skip, self.slow_poles, self.share
+        )
 
     def basis(self, parameters: Floats) -> Floats:
         """Columns of the linear part for (f_d, ζ) of each mode, shape (T, 2 modes + slow poles)."""
@@ -164,20 +171,21 @@ class _Ring:
         return bool(samples * math.log(before / after) > added * math.log(samples))
 
     def _judge(self, parameters: Floats) -> RingDown:
-        """The strongest mode, its standard errors, and whether they are small enough."""
+        """The mode that counts, its standard errors, and whether they are small enough."""
         weights, *_ = np.linalg.lstsq(self.basis(parameters), self.alpha)
         left = self.unexplained(parameters)
         count = parameters.size // 2
         amplitudes = [float(np.linalg.norm(weights[2 * k : 2 * k + 2], ord=2)) for k in range(count)]
-        strongest = int(np.argmax(amplitudes))
-        f_d, zeta = parameters.reshape(-1, 2)[strongest]
-        errors = self._standard_errors(parameters, left, weights.size)[2 * strongest : 2 * strongest + 2]
+        loud = np.flatnonzero(np.array(amplitudes) >= self.share * max(amplitudes))
+        counts = int(min(loud, key=lambda k: parameters[2 * k]))
+        f_d, zeta = parameters.reshape(-1, 2)[counts]
+        errors = self._standard_errors(parameters, left, weights.size)[2 * counts : 2 * counts + 2]
         energy = float(np.sum(self.alpha**2))
         rms = float(np.sqrt(np.mean(left**2)))
         fit = RingDown(
             f_d=float(f_d),
             zeta=float(zeta),
-            amplitude=amplitudes[strongest],
+            amplitude=amplitudes[counts],
             f_d_error=float(errors[0]),
             zeta_error=float(errors[1]),
             rms=rms,

@@ -4,6 +4,7 @@ from importlib import resources
 from pathlib import Path
 
 import msgspec
+
 from tvist_protocol.calibration import Calibration, CalibrationError, calibration_from_json
 from tvist_protocol.values import Payload
 from tvist_shaping.estimators.polynomial import Polynomial

@@ -50,7 +50,7 @@ class Differentiator:
     def newest(self) -> Target:
         """State of motion at the newest reference, from it and the two before.
 
-        The derivatives are such that a motion continued from them has the second difference q̈ at its first tick.
+        A motion continued from these derivatives has the second difference q̈ at its first tick.
         """
         h = self._period
         rise, fall = self._last - self._middle, self._middle - self._before

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pinocchio as pin
+
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import rigid_model
-
 from tvist_server.control.differentiator import Floats
 
 

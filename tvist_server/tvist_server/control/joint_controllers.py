@@ -1,18 +1,20 @@
 """What the drives are told: set-points with their feed-forward."""
 
 import numpy as np
+
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
-
 from tvist_server.control.differentiator import Floats, Target
 
 
 class JointControllers:
     """Feed-forward of the drives; their feedback runs in the drives themselves.
 
-    - Torque: τ_ff = τ* + B q̈* + friction, the rotors' inertia and a share of Coulomb friction on top of the rigid arm.
-    - Wind-up: a gear that transmits τ - g twists by (τ - g)/K_g. The motor is led by a share c_w of that, so that the
-      link is nearer to its reference; gravity's own twist is left, as the paper's robot reports joint angles.
+    - Torque: τ_ff = τ* + B q̈* + friction, the rotors' inertia and a share of Coulomb friction on top of the
+      rigid arm.
+    - Wind-up: a gear that transmits τ - g twists by (τ - g)/K_g. The motor is led by a share c_w of that, so
+      that the link is nearer to its reference; gravity's own twist is left, as the paper's robot reports
+      joint angles.
 
     Args:
         description: The robot.
@@ -24,9 +26,10 @@ class JointControllers:
         self._period = period
         self._rotor = np.array(drives.rotor_inertia)
         self._compliance = np.array(drives.windup_feedforward) / np.array(drives.gear_stiffness)
-        friction = np.array(drives.coulomb_friction)
-        self._viscous = friction / drives.friction_width if drives.linear_friction else np.zeros_like(friction)
-        self._coulomb = np.zeros_like(friction) if drives.linear_friction else drives.friction_feedforward * friction
+        friction, none = np.array(drives.coulomb_friction), np.zeros(description.joints)
+        linear = drives.linear_friction
+        self._viscous = friction / drives.friction_width if linear else none
+        self._coulomb = none if linear else drives.friction_feedforward * friction
         self._width = drives.friction_feedforward_width
         self._windup = np.zeros(description.joints)
 

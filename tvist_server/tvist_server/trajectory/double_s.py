@@ -10,14 +10,17 @@ class DoubleS(Trajectory):
     """Time-optimal motion at rest to rest, all joints in phase: a straight line in joint space.
 
     Velocity, acceleration and jerk limits hold for every joint; the joint with the longest way sets the pace
-    (Biagiotti and Melchiorri 2008, ch. 3.4). With the paper's limits of 1.5 rad/s, 2.0 rad/s² and 100 rad/s³ the
-    acceleration ramps last 20 ms.
+    (Biagiotti and Melchiorri 2008, ch. 3.4). With the paper's limits of 1.5 rad/s, 2.0 rad/s² and 100 rad/s³
+    the acceleration ramps last 20 ms.
 
     Args:
         start: Joint positions at rest, shape (n,) [rad].
         target: Joint positions at rest, shape (n,) [rad].
         limits: For every joint.
         period: Tick [s].
+
+    Raises:
+        ValueError: There is no such motion within these limits, or it would last for hours.
     """
 
     def __init__(self, start: Floats, target: Floats, limits: Limits, period: float) -> None:
@@ -29,9 +32,13 @@ class DoubleS(Trajectory):
         request.max_jerk = [limits.jerk] * n
         request.synchronization = ruckig.Synchronization.Phase
         self._trajectory = ruckig.Trajectory(n)
-        result = ruckig.Ruckig(n).calculate(request, self._trajectory)
-        if result not in {ruckig.Result.Working, ruckig.Result.Finished}:
-            raise ValueError(f"no double-S motion from {start.tolist()} to {target.tolist()} within {limits}: {result}")
+        try:
+            ruckig.Ruckig(n).calculate(request, self._trajectory)
+        except (ruckig.RuckigError, ValueError) as error:  # beyond 7600 s its result is one it cannot name
+            raise ValueError(
+                f"no motion goes from {start.tolist()} to {target.tolist()} in less than two hours within "
+                f"velocity {limits.velocity:g}, acceleration {limits.acceleration:g}, jerk {limits.jerk:g}"
+            ) from error
         self._target = np.array(target, dtype=float)
         self._period = period
         self._ticks = 0

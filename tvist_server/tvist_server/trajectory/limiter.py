@@ -7,9 +7,9 @@ from tvist_server.trajectory.base import Floats, Limits
 
 
 class Limiter:
-    """Follows a position signal exactly while that takes no more than the limits; catches up time-optimally otherwise.
+    """Follows a position signal exactly while that is within the limits; catches up time-optimally otherwise.
 
-    The jerk limit shapes the catching up; a stream inside its limits of velocity and acceleration passes to the bit.
+    The jerk limit shapes the catching up; what keeps the limits of velocity and acceleration passes as it is.
 
     Args:
         q: Position at rest to start from, shape (n,) [rad].
@@ -24,6 +24,7 @@ class Limiter:
         n = len(q)
         self._limits, self._period = limits, period
         self.q, self.qd, self.qdd = np.array(q, dtype=float), np.zeros(n), np.zeros(n)
+        self._step = np.zeros(n)  # the last one, in position
         self._generator = ruckig.Ruckig(n, period)
         self._request, self._result = ruckig.InputParameter(n), ruckig.OutputParameter(n)
         self._request.max_velocity = [limits.velocity] * n
@@ -42,19 +43,28 @@ class Limiter:
         Returns:
             Where the reference is, shape (n,) [rad]; `limited` tells whether that is not q.
         """
-        velocity = (q - self.q) / self._period
-        acceleration = (velocity - self.qd) / self._period
+        h = self._period
+        step = q - self.q
+        velocity, acceleration = step / h, (step - self._step) / (h * h)
         room = 1.0 + self.TOLERANCE
         self.limited = bool(
             np.abs(velocity).max() > room * self._limits.velocity
             or np.abs(acceleration).max() > room * self._limits.acceleration
         )
         if not self.limited:
-            self.q, self.qd, self.qdd = q, velocity, acceleration
+            # A motion continued from here has the second difference q̈ at its first tick.
+            self.q, self.qd, self.qdd = q, velocity + 0.5 * h * acceleration, acceleration
+            self._step = step
             return q
-        return self._catch_up(q, qd)
+        before = self.q
+        try:
+            self._catch_up(q, qd)
+        except (ruckig.RuckigError, ValueError):  # it would take more than 7600 s
+            self._brake()
+        self._step = self.q - before
+        return self.q
 
-    def _catch_up(self, q: Floats, qd: Floats) -> Floats:
+    def _catch_up(self, q: Floats, qd: Floats) -> None:
         request, result = self._request, self._result
         limits = self._limits
         request.current_position = self.q.tolist()
@@ -62,9 +72,11 @@ class Limiter:
         request.current_acceleration = np.clip(self.qdd, -limits.acceleration, limits.acceleration).tolist()
         request.target_position = q.tolist()
         request.target_velocity = np.clip(qd, -limits.velocity, limits.velocity).tolist()
-        outcome = self._generator.update(request, result)
-        if outcome not in {ruckig.Result.Working, ruckig.Result.Finished}:
-            raise ArithmeticError(f"limiter: {outcome} from {self.q.tolist()} to {q.tolist()}")
+        self._generator.update(request, result)
         self.q, self.qd = np.array(result.new_position), np.array(result.new_velocity)
         self.qdd = np.array(result.new_acceleration)
-        return self.q
+
+    def _brake(self) -> None:
+        h, limit = self._period, self._limits.acceleration
+        self.qdd = np.clip(-self.qd / h, -limit, limit)
+        self.q, self.qd = self.q + h * (self.qd + 0.5 * h * self.qdd), self.qd + h * self.qdd

@@ -1,6 +1,6 @@
 """Set-points from a client, played out by their sequence numbers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,15 +8,18 @@ from tvist_server.trajectory.base import Floats, Limits, Trajectory
 from tvist_server.trajectory.limiter import Limiter
 from tvist_server.trajectory.stop import Stop
 
+LONGEST_RAMP = 0.1
+"""Longest time that taking back an acceleration may last, whatever the jerk limit: the arm moves on [s]."""
+
 
 class SetpointStream(Trajectory):
     """A reference made of a client's set-points.
 
-    At the controller's own rate set-points pass straight through. Slower ones are played one period late, by cubic
-    Hermite interpolation between the two neighbours: the slope at each set-point is that of the parabola through it
-    and the two before, so it is known when the set-point arrives and velocity never steps. A set-point that is late
-    or lost is bridged by that parabola for at most one period; after that the reference comes to rest inside the
-    limits until the stream goes on.
+    At the controller's own rate set-points pass straight through. Slower ones are played one period late, by
+    cubic Hermite interpolation between the two neighbours: the slope at each set-point is that of the
+    parabola through it and the two before, so it is known when the set-point arrives and velocity never
+    steps. One that is late or lost is bridged by that parabola for at most one period; after that the
+    reference comes to rest inside the limits until the stream goes on.
 
     Args:
         q: Where the arm rests, shape (n,) [rad].
@@ -29,8 +32,10 @@ class SetpointStream(Trajectory):
         self._rest = np.array(q, dtype=float)
         self._stride = period / stream_period
         self._direct = self._stride >= 1.0
-        self._period, self._stream_period, self._limits = period, stream_period, limits
-        self._limiter = Limiter(self._rest, limits, period)
+        self._period, self._stream_period = period, stream_period
+        self.limits = replace(limits, jerk=max(limits.jerk, limits.acceleration / LONGEST_RAMP))
+        """Of what the reference does where it is not at the set-points."""
+        self._limiter = Limiter(self._rest, self.limits, period)
         self._waiting: dict[int, Floats] = {}
         self._nodes: list[_Node] = []
         # Play-out position in sequence numbers: an exact origin and a small offset.
@@ -41,7 +46,7 @@ class SetpointStream(Trajectory):
         self.late = 0
         """Set-points that came too late to be played, or twice."""
         self.lost = 0
-        """Sequence numbers that were passed over."""
+        """Sequence numbers that were passed over; a gap counts for no more than `MAX_WAITING`."""
         self.limited = 0
         """Ticks in which the reference could not be where the set-points were."""
 
@@ -86,7 +91,7 @@ class SetpointStream(Trajectory):
 
     def _play_from(self, sequence: int) -> None:
         """Put the play-out position where a set-point that has just come belongs."""
-        self._origin, self._offset = sequence, 0.0 if self._direct else self._stride - 1.0
+        self._origin, self._offset = sequence, 0.0 if self._direct else -1.0
 
     def _admit(self) -> None:
         """Move set-points whose time has come from waiting to nodes."""
@@ -98,7 +103,7 @@ class SetpointStream(Trajectory):
         reach = self._offset + (0.5 if self._direct else 1.0)
         while self._waiting and (first := min(self._waiting)) - self._origin < reach:
             node = _Node.after(self._nodes, first, self._waiting.pop(first))
-            self.lost += first - self._nodes[-1].sequence - 1
+            self.lost += min(first - self._nodes[-1].sequence - 1, self.MAX_WAITING)
             self._nodes = [*self._nodes[-2:], node]
             self.sequence = first
 
@@ -112,7 +117,8 @@ class SetpointStream(Trajectory):
         if ahead == 0.0:
             return last.q, last.slope
         if ahead > 0.0:
-            return last.q + ahead * (last.slope + 0.5 * ahead * last.curvature), last.slope + ahead * last.curvature
+            slope = last.slope + ahead * last.curvature
+            return last.q + 0.5 * ahead * (last.slope + slope), slope
         for before, after in zip(self._nodes[-2::-1], self._nodes[:0:-1], strict=True):
             since = self._offset - (before.sequence - self._origin)
             if since >= 0.0:
@@ -122,7 +128,7 @@ class SetpointStream(Trajectory):
     def _wait(self) -> tuple[Floats, Floats]:
         """Come to rest and stay until the stream goes on."""
         if self._pause is None:
-            limits = self._limits
+            limits = self.limits
             self._pause = Stop(
                 *self.state, acceleration=limits.acceleration, jerk=limits.jerk, period=self._period
             )
@@ -154,7 +160,7 @@ class _Node:
 
 
 def _hermite(since: float, before: _Node, after: _Node) -> tuple[Floats, Floats]:
-    """Cubic between two set-points with their slopes; position and slope `since` sequence numbers after the first."""
+    """Position and slope of the cubic between two set-points, `since` sequence numbers after the first."""
     span = after.sequence - before.sequence
     u, rise = since / span, after.q - before.q
     a, b = span * before.slope - rise, rise - span * after.slope

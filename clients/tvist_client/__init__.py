@@ -1,0 +1,50 @@
+"""The Python client: asyncio here, a blocking face of it in `tvist_client.blocking`."""
+
+from tvist_client.arm import Arm, make_payload
+from tvist_client.errors import (
+    AnswerTimeoutError,
+    ClientError,
+    MisuseError,
+    MotionStoppedError,
+    NotConnectedError,
+    StreamStoppedError,
+    UnexpectedReplyError,
+)
+from tvist_client.motion import Motion
+from tvist_client.robot import Robot
+from tvist_client.servo import Servo
+from tvist_client.stream import Stream
+from tvist_client.transports import LoopbackHost, LoopbackTransport, Transport, ZenohTransport
+from tvist_protocol.errors import ProtocolError, RefusedError, TvistError
+from tvist_protocol.info import Info
+from tvist_protocol.stream import Event, State, Telemetry, Truth
+from tvist_protocol.values import Payload
+
+__all__ = [
+    "AnswerTimeoutError",
+    "Arm",
+    "ClientError",
+    "Event",
+    "Info",
+    "LoopbackHost",
+    "LoopbackTransport",
+    "MisuseError",
+    "Motion",
+    "MotionStoppedError",
+    "NotConnectedError",
+    "Payload",
+    "ProtocolError",
+    "RefusedError",
+    "Robot",
+    "Servo",
+    "State",
+    "Stream",
+    "StreamStoppedError",
+    "Telemetry",
+    "Transport",
+    "Truth",
+    "TvistError",
+    "UnexpectedReplyError",
+    "ZenohTransport",
+    "make_payload",
+]

@@ -1,0 +1,274 @@
+"""An arm under control: what only the holder of the lease may do."""
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from tvist_client.errors import AnswerTimeoutError, ClientError, UnexpectedReplyError
+from tvist_client.motion import Motion
+from tvist_client.servo import Servo
+from tvist_client.values import floats
+from tvist_protocol.commands import (
+    KeepAlive,
+    MoveJ,
+    ServoStart,
+    ServoStop,
+    SetEstimator,
+    SetPayload,
+    SetShaper,
+    SimulationReset,
+    SimulationStep,
+    StepSetpoint,
+    Stop,
+)
+from tvist_protocol.errors import RefusedError
+from tvist_protocol.replies import Accepted, Done
+from tvist_protocol.values import Payload, ResetMode
+
+if TYPE_CHECKING:
+    from tvist_client.robot import Robot
+
+log = logging.getLogger(__name__)
+
+STEP_S = 60.0
+"""How long a `simulation.step` may take [s]: a server may compute more slowly than time passes."""
+
+
+class Arm:
+    """What `Robot.control` gives. Joint values are any sequence of numbers [rad], one a joint.
+
+    Every command may raise RefusedError: then it changed nothing.
+
+    Attributes:
+        robot: The robot it belongs to.
+        token: Names the lease; goes with every command.
+    """
+
+    def __init__(self, robot: "Robot", token: str) -> None:
+        self.robot = robot
+        self.token = token
+
+    # ------------------------------------------------------------------ motion
+
+    async def move_j(
+        self,
+        q: Iterable[float],
+        *,
+        velocity: float = 1.5,
+        acceleration: float = 2.0,
+        jerk: float = 100.0,
+        wait: bool = True,
+    ) -> Motion:
+        """Move to a joint configuration, all joints in phase.
+
+        Args:
+            q: Target [rad].
+            velocity: Largest velocity of any joint [rad/s].
+            acceleration: Largest acceleration of any joint [rad/s²].
+            jerk: Largest jerk of any joint [rad/s³].
+            wait: Whether to wait for the end; in lockstep and free time is made to pass until it comes.
+
+        Returns:
+            The motion; `started` and `done` are ticks once they are known.
+
+        Raises:
+            MotionStoppedError: It ended before its target.
+        """
+        reply = await self.robot.request(
+            MoveJ(
+                token=self.token,
+                q=floats(q),
+                velocity=float(velocity),
+                acceleration=float(acceleration),
+                jerk=float(jerk),
+            )
+        )
+        if not isinstance(reply, Accepted) or reply.id is None:
+            raise UnexpectedReplyError(f"move_j was answered by {reply}, without the number of a motion")
+        motion = self.robot.motions.motion(reply.id)
+        return await motion.wait() if wait else motion
+
+    @contextlib.asynccontextmanager
+    async def servo(
+        self,
+        *,
+        period: float = 0.002,
+        velocity: float = 1.5,
+        acceleration: float = 2.0,
+        jerk: float = 100.0,
+    ) -> AsyncIterator[Servo]:
+        """Stream set-points for as long as the block lasts; then the stream ends and the arm comes to rest.
+
+        Args:
+            period: Time between two set-points [s].
+            velocity: Velocity beyond which the stream is limited [rad/s].
+            acceleration: Acceleration beyond which the stream is limited [rad/s²].
+            jerk: Jerk beyond which the stream is limited [rad/s³].
+        """
+        start = ServoStart(
+            token=self.token,
+            period=float(period),
+            velocity=float(velocity),
+            acceleration=float(acceleration),
+            jerk=float(jerk),
+        )
+        await self.robot.request(start)
+        servo = Servo(self, float(period))
+        with servo:
+            try:
+                yield servo
+            except BaseException:
+                # The error that ends the block says more than a refusal to end a stream that has ended.
+                with contextlib.suppress(RefusedError, ClientError):
+                    await self.robot.request(ServoStop(token=self.token))
+                raise
+            servo.check()
+        await self.robot.request(ServoStop(token=self.token))
+        await self.robot.rest()
+
+    async def stop(self, deceleration: float | None = None) -> None:
+        """Come to rest now, past the shaper.
+
+        Args:
+            deceleration: Largest deceleration of any joint [rad/s²]; None: what the torque allows.
+        """
+        limit = None if deceleration is None else float(deceleration)
+        await self.robot.request(Stop(token=self.token, deceleration=limit))
+
+    # ------------------------------------------------------------------ setting up
+
+    async def set_shaper(self, name: str, modes: int = 1) -> None:
+        """Choose the input shaper, one of those in `info`; `none` does not shape."""
+        await self.robot.request(SetShaper(token=self.token, name=name, modes=int(modes)))
+
+    async def set_estimator(
+        self,
+        name: str,
+        *,
+        f_d: float | Iterable[float] | None = None,
+        zeta: float | Iterable[float] | None = None,
+        calibration: str | Mapping[str, Any] | None = None,
+    ) -> None:
+        """Choose where the shaper's frequency and damping come from.
+
+        Args:
+            name: `fixed` with `f_d` and `zeta`, or `polynomial` with `calibration`.
+            f_d: Damped frequency of each mode [Hz]; a number stands for one mode.
+            zeta: Damping ratio of each mode [-]; likewise.
+            calibration: Name of one of those in `info`, or the content as a map.
+        """
+        await self.robot.request(
+            SetEstimator(
+                token=self.token,
+                name=name,
+                f_d=_modes(f_d),
+                zeta=_modes(zeta),
+                calibration=dict(calibration) if isinstance(calibration, Mapping) else calibration,
+            )
+        )
+
+    async def set_payload(self, mass: float, com: Iterable[float], inertia: Iterable[float]) -> None:
+        """Declare what hangs on the flange: what the controller believes.
+
+        Args:
+            mass: Mass [kg].
+            com: Centre of mass x y z in the flange frame [m].
+            inertia: xx xy xz yy yz zz about the centre of mass, flange axes [kg m²].
+        """
+        believed = make_payload(mass, com, inertia)
+        await self.robot.request(
+            SetPayload(token=self.token, mass=believed.mass, com=believed.com, inertia=believed.inertia)
+        )
+
+    # ------------------------------------------------------------------ simulation
+
+    async def reset(
+        self,
+        q: Iterable[float] | None = None,
+        *,
+        seed: int | None = None,
+        payload: Payload | None = None,
+        mode: ResetMode | None = None,
+        shaper: str | None = None,
+    ) -> int | None:
+        """Put the simulated arm somewhere at rest; what is None stays.
+
+        Args:
+            q: Where [rad].
+            seed: Seed of the sensors' noise, which starts anew.
+            payload: What the arm carries, whatever the controller believes; `make_payload` makes one.
+            mode: Robot mode to put it into.
+            shaper: Shaper to choose.
+
+        Returns:
+            The tick at which it was done.
+        """
+        reply = await self.robot.request(
+            SimulationReset(
+                token=self.token,
+                q=None if q is None else floats(q),
+                seed=None if seed is None else int(seed),
+                payload=payload,
+                mode=mode,
+                shaper=shaper,
+            )
+        )
+        return reply.tick if isinstance(reply, Done) else None
+
+    async def step(self, ticks: int, setpoints: Sequence[StepSetpoint] | None = None) -> int:
+        """Let 1 to 1000 ticks pass at once, in lockstep and free; `Robot.advance` takes any number.
+
+        Args:
+            ticks: How many control periods.
+            setpoints: Set-points of a running stream, one a tick in order; `Servo.step_through` numbers them.
+
+        Returns:
+            The last of the ticks; its state has arrived.
+        """
+        self.robot.watch()
+        played = None if setpoints is None else tuple(setpoints)
+        step = SimulationStep(token=self.token, ticks=int(ticks), setpoints=played)
+        reply = await self.robot.request(step, STEP_S)
+        if not isinstance(reply, Done) or reply.tick is None:
+            raise UnexpectedReplyError(f"simulation.step was answered by {reply}, without a tick")
+        await self.robot.until(reply.tick)
+        return reply.tick
+
+    # ------------------------------------------------------------------ lease
+
+    async def keep_alive(self) -> None:
+        """Renew the lease, as every command does; `Robot.control` sees to it."""
+        await self.robot.request(KeepAlive(token=self.token))
+
+    async def keep_alive_every(self, period_s: float) -> None:
+        """Renew the lease again and again, until it is lost."""
+        while True:
+            await asyncio.sleep(period_s)
+            try:
+                await self.keep_alive()
+            except AnswerTimeoutError as error:
+                log.warning("the lease was not renewed: %s", error)
+            except (RefusedError, ClientError) as error:
+                log.warning("control is lost: %s", error)
+                return
+
+
+def make_payload(mass: float, com: Iterable[float], inertia: Iterable[float]) -> Payload:
+    """What hangs on a flange.
+
+    Args:
+        mass: Mass [kg].
+        com: Centre of mass x y z in the flange frame [m].
+        inertia: xx xy xz yy yz zz about the centre of mass, flange axes [kg m²].
+    """
+    x, y, z = com
+    xx, xy, xz, yy, yz, zz = floats(inertia)
+    return Payload(mass=float(mass), com=(float(x), float(y), float(z)), inertia=(xx, xy, xz, yy, yz, zz))
+
+
+def _modes(values: float | Iterable[float] | None) -> tuple[float, ...] | None:
+    if values is None:
+        return None
+    return floats(values) if isinstance(values, Iterable) else (float(values),)

@@ -1,0 +1,297 @@
+"""The client without `await`: the same names, and an event loop in a thread of its own.
+
+    with Robot.connect() as robot, robot.control("me") as arm:
+        arm.move_j(q)
+
+A call waits for its answer; Ctrl-C ends the wait. Callbacks run in the loop's thread and may not wait.
+"""
+
+import contextlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from types import TracebackType
+from typing import Any, Generic, Self, TypeVar
+
+from tvist_client import arm as asynchronous_arm
+from tvist_client import motion as asynchronous_motion
+from tvist_client import robot as asynchronous_robot
+from tvist_client import servo as asynchronous_servo
+from tvist_client import stream as asynchronous_stream
+from tvist_client.portal import Portal
+from tvist_client.robot import ANSWER_S, BUFFER, ENDPOINT, NAME
+from tvist_client.transports.base import Transport
+from tvist_protocol.commands import Command, StepSetpoint
+from tvist_protocol.info import Clock, Info
+from tvist_protocol.replies import Accepted, Done
+from tvist_protocol.stream import Event, State, Telemetry, Truth
+from tvist_protocol.values import Payload, ResetMode
+
+M = TypeVar("M")
+
+
+class Stream(Iterator[M], Generic[M]):
+    """Messages as an iterator; see `tvist_client.stream.Stream`."""
+
+    def __init__(self, portal: Portal, stream: asynchronous_stream.Stream[M]) -> None:
+        self._portal = portal
+        self._stream = stream
+
+    @property
+    def dropped(self) -> int:
+        """Messages the reader was too slow for."""
+        return self._stream.dropped
+
+    def __next__(self) -> M:
+        try:
+            return self._portal.call(self._stream.__anext__)
+        except StopAsyncIteration:
+            raise StopIteration from None
+
+
+class Motion:
+    """One motion; see `tvist_client.motion.Motion`."""
+
+    def __init__(self, portal: Portal, motion: asynchronous_motion.Motion) -> None:
+        self._portal = portal
+        self._motion = motion
+
+    @property
+    def id(self) -> int:
+        """The robot's number for it."""
+        return self._motion.id
+
+    @property
+    def started(self) -> int | None:
+        """Tick at which it began; None before."""
+        return self._motion.started
+
+    @property
+    def done(self) -> int | None:
+        """Tick at which it came to rest at the target; None before, and where it never did."""
+        return self._motion.done
+
+    @property
+    def stopped(self) -> Event | None:
+        """The event that says that it ended before its target; None where it did not."""
+        return self._motion.stopped
+
+    @property
+    def ended(self) -> bool:
+        """Whether the motion moves no more."""
+        return self._motion.ended
+
+    def wait(self) -> Self:
+        """Wait for the end; raises MotionStoppedError where it came before the target."""
+        self._portal.call(self._motion.wait)
+        return self
+
+
+class Servo:
+    """A stream of set-points; see `tvist_client.servo.Servo`."""
+
+    def __init__(self, portal: Portal, servo: asynchronous_servo.Servo) -> None:
+        self._portal = portal
+        self._servo = servo
+
+    @property
+    def period(self) -> float:
+        """Time between two set-points [s]."""
+        return self._servo.period
+
+    @property
+    def sequence(self) -> int:
+        """Number of the next set-point."""
+        return self._servo.sequence
+
+    def set(self, q: Iterable[float]) -> int:
+        """Send the next set-point: call it once a period."""
+        return self._portal.run(lambda: self._servo.set(q))
+
+    def step_through(self, qs: Iterable[Iterable[float]]) -> int:
+        """Play set-points in lockstep and free, each for one period."""
+        return self._portal.call(lambda: self._servo.step_through(qs))
+
+
+class Arm:
+    """An arm under control; see `tvist_client.arm.Arm` for what the arguments mean."""
+
+    def __init__(self, portal: Portal, arm: asynchronous_arm.Arm) -> None:
+        self._portal = portal
+        self._arm = arm
+
+    @property
+    def token(self) -> str:
+        """Names the lease."""
+        return self._arm.token
+
+    def move_j(
+        self,
+        q: Iterable[float],
+        *,
+        velocity: float = 1.5,
+        acceleration: float = 2.0,
+        jerk: float = 100.0,
+        wait: bool = True,
+    ) -> Motion:
+        """Move to a joint configuration [rad]."""
+        motion = self._portal.call(
+            lambda: self._arm.move_j(q, velocity=velocity, acceleration=acceleration, jerk=jerk, wait=wait)
+        )
+        return Motion(self._portal, motion)
+
+    @contextlib.contextmanager
+    def servo(
+        self,
+        *,
+        period: float = 0.002,
+        velocity: float = 1.5,
+        acceleration: float = 2.0,
+        jerk: float = 100.0,
+    ) -> Iterator[Servo]:
+        """Stream set-points for as long as the block lasts; then come to rest."""
+        stream = self._arm.servo(period=period, velocity=velocity, acceleration=acceleration, jerk=jerk)
+        with self._portal.enter(stream) as servo:
+            yield Servo(self._portal, servo)
+
+    def stop(self, deceleration: float | None = None) -> None:
+        """Come to rest now, past the shaper."""
+        self._portal.call(lambda: self._arm.stop(deceleration))
+
+    def set_shaper(self, name: str, modes: int = 1) -> None:
+        """Choose the input shaper."""
+        self._portal.call(lambda: self._arm.set_shaper(name, modes))
+
+    def set_estimator(
+        self,
+        name: str,
+        *,
+        f_d: float | Iterable[float] | None = None,
+        zeta: float | Iterable[float] | None = None,
+        calibration: str | Mapping[str, Any] | None = None,
+    ) -> None:
+        """Choose where the shaper's frequency and damping come from."""
+        self._portal.call(lambda: self._arm.set_estimator(name, f_d=f_d, zeta=zeta, calibration=calibration))
+
+    def set_payload(self, mass: float, com: Iterable[float], inertia: Iterable[float]) -> None:
+        """Declare what hangs on the flange."""
+        self._portal.call(lambda: self._arm.set_payload(mass, com, inertia))
+
+    def reset(
+        self,
+        q: Iterable[float] | None = None,
+        *,
+        seed: int | None = None,
+        payload: Payload | None = None,
+        mode: ResetMode | None = None,
+        shaper: str | None = None,
+    ) -> int | None:
+        """Put the simulated arm somewhere at rest."""
+        return self._portal.call(
+            lambda: self._arm.reset(q, seed=seed, payload=payload, mode=mode, shaper=shaper)
+        )
+
+    def step(self, ticks: int, setpoints: Sequence[StepSetpoint] | None = None) -> int:
+        """Let 1 to 1000 ticks pass at once, in lockstep and free."""
+        return self._portal.call(lambda: self._arm.step(ticks, setpoints))
+
+    def keep_alive(self) -> None:
+        """Renew the lease; `Robot.control` sees to it."""
+        self._portal.call(self._arm.keep_alive)
+
+
+class Robot:
+    """One robot; see `tvist_client.robot.Robot` for what the arguments mean."""
+
+    def __init__(self, portal: Portal, robot: asynchronous_robot.Robot) -> None:
+        self._portal = portal
+        self._robot = robot
+
+    @classmethod
+    def connect(cls, endpoint: str = ENDPOINT, name: str = NAME) -> Self:
+        """Connect over Zenoh and shake hands."""
+        portal = Portal()
+        try:
+            robot = portal.call(lambda: asynchronous_robot.Robot.connect(endpoint, name))
+        except BaseException:
+            portal.close()
+            raise
+        return cls(portal, robot)
+
+    @classmethod
+    def over(cls, transport: Transport) -> Self:
+        """Talk to a robot over a transport that belongs to no event loop yet, as the loopback's."""
+        portal = Portal()
+        return cls(portal, portal.run(lambda: asynchronous_robot.Robot.over(transport)))
+
+    def close(self) -> None:
+        """End the connection and the loop's thread; a second call does nothing."""
+        if not self._portal.closed:
+            try:
+                self._portal.call(self._robot.close)
+            finally:
+                self._portal.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def info(self) -> Info:
+        """Ask what the robot is and how it is set up."""
+        return self._portal.call(self._robot.info)
+
+    def clock(self) -> Clock:
+        """Who lets time pass."""
+        return self._portal.call(self._robot.clock)
+
+    def state(self) -> State:
+        """The present state: in real time the next to come, otherwise the last."""
+        return self._portal.call(self._robot.state)
+
+    def states(self, buffer: int = BUFFER) -> Stream[State]:
+        """Every state from now on."""
+        return Stream(self._portal, self._portal.run(lambda: self._robot.states(buffer)))
+
+    def events(self, buffer: int = BUFFER) -> Stream[Event]:
+        """Every event from now on."""
+        return Stream(self._portal, self._portal.run(lambda: self._robot.events(buffer)))
+
+    def on_state(self, callback: Callable[[State], object]) -> Callable[[], None]:
+        """Have a callback called with every state; the function returned ends that."""
+        return self._portal.subscription(lambda: self._robot.on_state(callback))
+
+    def on_event(self, callback: Callable[[Event], object]) -> Callable[[], None]:
+        """As `on_state`, with every event."""
+        return self._portal.subscription(lambda: self._robot.on_event(callback))
+
+    def on_truth(self, callback: Callable[[Truth], object]) -> Callable[[], None]:
+        """As `on_state`, with what no robot can know."""
+        return self._portal.subscription(lambda: self._robot.on_truth(callback))
+
+    def on_telemetry(self, callback: Callable[[Telemetry], object]) -> Callable[[], None]:
+        """As `on_state`, with the server's own figures."""
+        return self._portal.subscription(lambda: self._robot.on_telemetry(callback))
+
+    def request(self, command: Command, timeout_s: float = ANSWER_S) -> Accepted | Done:
+        """Send any command."""
+        return self._portal.call(lambda: self._robot.request(command, timeout_s))
+
+    def stop(self) -> None:
+        """Bring the arm to rest now; anyone may."""
+        self._portal.call(self._robot.stop)
+
+    @contextlib.contextmanager
+    def control(self, client: str, *, lease_s: float = 30.0) -> Iterator[Arm]:
+        """Hold control for as long as the block lasts."""
+        with self._portal.enter(self._robot.control(client, lease_s=lease_s)) as arm:
+            yield Arm(self._portal, arm)
+
+    def advance(self, ticks: int) -> int:
+        """Let ticks pass: by steps in lockstep and free, by waiting in real time."""
+        return self._portal.call(lambda: self._robot.advance(ticks))
+
+    def rest(self) -> State:
+        """Let time pass until the shaped reference rests."""
+        return self._portal.call(self._robot.rest)

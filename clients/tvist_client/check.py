@@ -1,0 +1,126 @@
+"""Is there a robot, and does it work? A real handshake, not a port scan."""
+
+import asyncio
+from collections.abc import Callable
+
+import msgspec
+
+from tvist_client.errors import ClientError, UnexpectedReplyError
+from tvist_client.robot import ENDPOINT, NAME, Robot
+from tvist_protocol.commands import MoveJ
+from tvist_protocol.errors import RefusedError, TvistError
+from tvist_protocol.stream import State
+from tvist_protocol.values import PROTOCOL_VERSION
+
+LISTEN_S = 0.5
+"""How long the states are listened to for their rate [s]."""
+STALE = "check"
+"""A token that names no lease."""
+
+
+class Finding(msgspec.Struct, frozen=True):
+    """One thing that was tried."""
+
+    what: str
+    ok: bool
+    said: str
+    """What came of it, for a person."""
+
+
+class Report(msgspec.Struct, frozen=True):
+    """What a check found."""
+
+    ok: bool
+    """Whether all is well."""
+    endpoint: str
+    robot: str
+    """Name of the robot."""
+    protocol: int | None
+    """Version of the protocol the robot speaks; null where it did not answer."""
+    state_rate_hz: float | None
+    """States a second, by their ticks [Hz]; null where time does not pass by itself, or none came."""
+    findings: list[Finding]
+    """Step by step; a step that fails is the last."""
+
+
+def check(endpoint: str = ENDPOINT, name: str = NAME) -> Report:
+    """Shake hands with a robot, see a state, and have a command refused. Changes nothing.
+
+    Args:
+        endpoint: Where the server listens, `tcp/<host>:<port>`.
+        name: The robot's name.
+    """
+    return asyncio.run(_Check(endpoint, name).run())
+
+
+class _Check:
+    def __init__(self, endpoint: str, name: str) -> None:
+        self.endpoint, self.name = endpoint, name
+        self.protocol: int | None = None
+        self.rate: float | None = None
+        self.findings: list[Finding] = []
+
+    async def run(self) -> Report:
+        step = "connect"
+        try:
+            async with await Robot.connect(self.endpoint, self.name) as robot:
+                self.passed(step, f"{self.name} at {self.endpoint}")
+                for step, run in (("info", self.info), ("state", self.state), ("refusal", self.refusal)):
+                    self.passed(step, await run(robot))
+        except TvistError as error:
+            self.findings.append(Finding(step, ok=False, said=str(error)))
+        ok = all(finding.ok for finding in self.findings)
+        return Report(ok, self.endpoint, self.name, self.protocol, self.rate, self.findings)
+
+    def passed(self, what: str, said: str) -> None:
+        self.findings.append(Finding(what, ok=True, said=said))
+
+    async def info(self, robot: Robot) -> str:
+        info = await robot.info()
+        self.protocol = info.protocol
+        if info.protocol != PROTOCOL_VERSION:
+            raise UnexpectedReplyError(
+                f"the robot speaks protocol {info.protocol}, this client {PROTOCOL_VERSION}: update one"
+            )
+        return f"{info.model}, {len(info.joints)} joints, clock {info.clock}, protocol {info.protocol}"
+
+    async def state(self, robot: Robot) -> str:
+        if await robot.clock() != "realtime":
+            if (await robot.info()).tick == 0:
+                return "none yet, since a client lets time pass and none has"
+            return f"tick {(await robot.state()).tick}; no rate, since a client lets time pass"
+        self.rate = await _rate(robot)
+        return f"{self.rate:.1f} Hz"
+
+    async def refusal(self, robot: Robot) -> str:
+        # Where it stands: even a server that obeyed would move nothing. Before the first tick nothing moves.
+        info = await robot.info()
+        ticks = await robot.clock() == "realtime" or info.tick > 0
+        here = tuple((await robot.state()).target_q) if ticks else (0.0,) * len(info.joints)
+        try:
+            await robot.request(MoveJ(token=STALE, q=here))
+        except RefusedError as error:
+            if error.reply.code in {"stale_token", "no_control"}:
+                return f"a command without control is refused: {error.reply.code}"
+            raise
+        raise ClientError("a command with a stale token was obeyed: the server does not guard control")
+
+
+async def _rate(robot: Robot) -> float:
+    """Ticks a second between the first and the last state of `LISTEN_S`."""
+    loop = asyncio.get_running_loop()
+    seen: list[tuple[int, float]] = []
+
+    def on_state(state: State) -> None:
+        seen.append((state.tick, loop.time()))
+
+    stop: Callable[[], None] = robot.on_state(on_state)
+    try:
+        await robot.advance(1)
+        await asyncio.sleep(LISTEN_S)
+    finally:
+        stop()
+    (first, began), (last, ended) = seen[0], seen[-1]
+    if last == first:
+        raise ClientError(f"one state came in {LISTEN_S:g} s: the robot stands still, or the link does")
+    return (last - first) / (ended - began)

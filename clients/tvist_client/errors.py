@@ -1,0 +1,68 @@
+"""What can go wrong at a client, and what to do about it.
+
+TvistError
+├── RefusedError             the robot refused a command, which changed nothing (of `tvist_protocol`)
+├── ProtocolError            a value cannot be sent: no number, no name (of `tvist_protocol`)
+└── ClientError
+    ├── NotConnectedError    nobody answers; also a ConnectionError
+    ├── AnswerTimeoutError   somebody is there and does not answer; also a TimeoutError
+    ├── MotionStoppedError   a motion ended before its target
+    ├── StreamStoppedError   the robot ended the stream of set-points
+    ├── UnexpectedReplyError the answer is none of this protocol
+    └── MisuseError          called when it makes no sense
+"""
+
+from tvist_protocol.errors import TvistError
+from tvist_protocol.stream import Event
+
+
+class ClientError(TvistError):
+    """Root of what a client raises of its own."""
+
+
+class NotConnectedError(ClientError, ConnectionError):
+    """There is no robot to talk to, or it has gone."""
+
+
+class AnswerTimeoutError(ClientError, TimeoutError):
+    """What was waited for did not come in time."""
+
+
+class UnexpectedReplyError(ClientError):
+    """An answer came that this client does not understand."""
+
+
+class MisuseError(ClientError):
+    """A call that makes no sense now; the sentence says what to do first."""
+
+
+class MotionStoppedError(ClientError):
+    """A motion ended before its target.
+
+    Attributes:
+        event: The robot's `motion_stopped`.
+    """
+
+    def __init__(self, event: Event) -> None:
+        super().__init__(event)
+        self.event = event
+
+    def __str__(self) -> str:
+        why = f": {self.event.why}" if self.event.why else ""
+        return f"motion {self.event.id} was stopped at tick {self.event.tick}{why}"
+
+
+class StreamStoppedError(ClientError):
+    """The robot ended the stream of set-points; `servo` begins a new one.
+
+    Attributes:
+        event: The robot's `stream_stopped`.
+    """
+
+    def __init__(self, event: Event) -> None:
+        super().__init__(event)
+        self.event = event
+
+    def __str__(self) -> str:
+        why = f": {self.event.why}" if self.event.why else ""
+        return f"the stream of set-points was ended at tick {self.event.tick}{why}"

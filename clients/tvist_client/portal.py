@@ -1,0 +1,84 @@
+"""An event loop in a thread, and the way into it from threads that may wait."""
+
+import asyncio
+import contextlib
+import threading
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import AbstractAsyncContextManager
+from typing import TypeVar
+
+from tvist_client.errors import NotConnectedError
+
+T = TypeVar("T")
+
+
+class Portal:
+    """Runs an event loop in a thread of its own.
+
+    The thread is a daemon's: a program that forgets to close ends all the same.
+    """
+
+    def __init__(self) -> None:
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever, name="tvist-client", daemon=True)
+        self._thread.start()
+        self.closed = False
+
+    def call(self, function: Callable[[], Awaitable[T]]) -> T:
+        """Await what a function gives, on the loop, while this thread waits; Ctrl-C cancels it."""
+        if self.closed:
+            raise NotConnectedError("the connection is closed: open another one")
+
+        async def awaited() -> T:
+            return await function()
+
+        future = asyncio.run_coroutine_threadsafe(awaited(), self._loop)
+        try:
+            return future.result()
+        except BaseException:
+            future.cancel()
+            raise
+
+    def run(self, function: Callable[[], T]) -> T:
+        """Call a function that does not wait, on the loop."""
+
+        async def called() -> T:
+            return function()
+
+        return self.call(called)
+
+    def subscription(self, subscribe: Callable[[], Callable[[], None]]) -> Callable[[], None]:
+        """Call a function that gives a function to undo it; both run on the loop."""
+        undo = self.run(subscribe)
+        return lambda: self.run(undo)
+
+    @contextlib.contextmanager
+    def enter(self, context: AbstractAsyncContextManager[T]) -> Iterator[T]:
+        """Enter an asynchronous context manager, and leave it with the block's error where there is one."""
+        value = self.call(context.__aenter__)
+        try:
+            yield value
+        except BaseException as error:
+            kind, raised, trace = type(error), error, error.__traceback__
+            if not self.call(lambda: context.__aexit__(kind, raised, trace)):
+                raise
+        else:
+            self.call(lambda: context.__aexit__(None, None, None))
+
+    def close(self) -> None:
+        """End loop and thread; a second call does nothing."""
+        if self.closed:
+            return
+        self.call(self._cancel_others)
+        self.closed = True
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.run_until_complete(self._loop.shutdown_default_executor())
+        self._loop.close()
+
+    @staticmethod
+    async def _cancel_others() -> None:
+        others = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in others:
+            task.cancel()
+        await asyncio.gather(*others, return_exceptions=True)

@@ -1,0 +1,304 @@
+"""A robot as a client sees it: what it is, what it tells, and control over it."""
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable
+from types import TracebackType
+from typing import Self, TypeVar
+
+from tvist_client.arm import Arm
+from tvist_client.errors import ClientError, MisuseError, NotConnectedError, UnexpectedReplyError
+from tvist_client.feed import Feed
+from tvist_client.motion import Motion, Motions
+from tvist_client.stream import Stream
+from tvist_client.transports.base import Transport
+from tvist_client.transports.zenoh import ZenohTransport
+from tvist_protocol.codec import (
+    decode_event,
+    decode_info,
+    decode_reply,
+    decode_state,
+    decode_telemetry,
+    decode_truth,
+    encode,
+)
+from tvist_protocol.commands import Command, ReleaseControl, Stop, TakeControl
+from tvist_protocol.errors import ProtocolError, RefusedError
+from tvist_protocol.info import Clock, Info
+from tvist_protocol.modes import RuntimeState
+from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.stream import Event, State, Telemetry, Truth
+
+ENDPOINT = "tcp/127.0.0.1:7447"
+NAME = "ur5e"
+ANSWER_S = 10.0
+"""How long a command may take [s]."""
+STATE_S = 5.0
+"""How long the stream of states may pause [s]; in lockstep the last one is told again every second."""
+BUFFER = 5000
+"""Messages an iterator holds: 10 s of states."""
+CHUNK = 50
+"""Ticks to let pass between two looks at whether a motion has ended: a tenth of a second."""
+MAX_STEP = 1000
+"""Ticks a `simulation.step` may have."""
+
+
+class Robot:
+    """One robot, over a transport that is open, which `close` closes.
+
+    Attributes:
+        motions: Motions by number, this client's and others'.
+    """
+
+    def __init__(self, transport: Transport) -> None:
+        self._transport = transport
+        self._clock: Clock | None = None
+        self._arm: Arm | None = None
+        self._states: Feed[State] = Feed(transport, "state", decode_state, once_a_tick=True)
+        self._events: Feed[Event] = Feed(transport, "event", decode_event, once_a_tick=False)
+        self._truths: Feed[Truth] = Feed(transport, "truth", decode_truth, once_a_tick=True)
+        self._telemetries: Feed[Telemetry] = Feed(transport, "telemetry", decode_telemetry, once_a_tick=False)
+        self.motions = Motions(self._until_ended)
+        # Before any command is sent, since an event may come before the answer.
+        self._events.listen(self.motions.on_event)
+        transport.on_lost(self._on_lost)
+
+    @classmethod
+    async def connect(cls, endpoint: str = ENDPOINT, name: str = NAME) -> Self:
+        """Connect over Zenoh and shake hands.
+
+        Args:
+            endpoint: Where the server listens, `tcp/<host>:<port>`.
+            name: The robot's name.
+
+        Raises:
+            NotConnectedError: Nobody listens there, or no robot of that name is there.
+        """
+        robot = cls(await ZenohTransport.open(endpoint, name))
+        try:
+            await robot.info()
+        except BaseException:
+            await robot.close()
+            raise
+        return robot
+
+    @classmethod
+    def over(cls, transport: Transport) -> Self:
+        """Talk to a robot over any transport that is open, which `close` closes."""
+        return cls(transport)
+
+    async def close(self) -> None:
+        """End the connection; iterators end too."""
+        for feed in (self._states, self._events, self._truths, self._telemetries):
+            feed.finish()
+        self.motions.fail(NotConnectedError("the connection was closed"))
+        await self._transport.close()
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    # ------------------------------------------------------------------ what it is and what it tells
+
+    async def info(self) -> Info:
+        """Ask what the robot is and how it is set up."""
+        info = _understood(decode_info, await self._transport.info())
+        self._clock = info.clock
+        return info
+
+    async def clock(self) -> Clock:
+        """Who lets time pass, asked once."""
+        return self._clock or (await self.info()).clock
+
+    async def state(self) -> State:
+        """The present state: in real time the next to come, otherwise the last, since time stands still.
+
+        Raises:
+            MisuseError: No tick has passed yet, or in a robot in process none since this client listens.
+            AnswerTimeoutError: None came within `STATE_S`.
+        """
+        self._states.subscribe()
+        clock = await self.clock()
+        if clock == "realtime":
+            return await self._next_state()
+        if self._states.latest is not None:
+            return self._states.latest
+        # Over the network the last state is told again every second, in process it is not.
+        if clock == "free" or (await self.info()).tick == 0:
+            raise MisuseError("no tick has passed that could be told of: take control and advance(1)")
+        return await self._next_state()
+
+    def states(self, buffer: int = BUFFER) -> Stream[State]:
+        """Every state from now on, once a tick; a slow reader loses the oldest, counted in `dropped`.
+
+        Args:
+            buffer: How many may wait.
+        """
+        return self._states.stream(buffer)
+
+    def events(self, buffer: int = BUFFER) -> Stream[Event]:
+        """Every event from now on."""
+        return self._events.stream(buffer)
+
+    def on_state(self, callback: Callable[[State], object]) -> Callable[[], None]:
+        """Have a callback called with every state; the function returned ends that. It may not wait."""
+        return self._states.listen(callback)
+
+    def on_event(self, callback: Callable[[Event], object]) -> Callable[[], None]:
+        """As `on_state`, with every event."""
+        return self._events.listen(callback)
+
+    def on_truth(self, callback: Callable[[Truth], object]) -> Callable[[], None]:
+        """As `on_state`, with what no robot can know, where the server tells it."""
+        return self._truths.listen(callback)
+
+    def on_telemetry(self, callback: Callable[[Telemetry], object]) -> Callable[[], None]:
+        """As `on_state`, with the server's own figures, once a second."""
+        return self._telemetries.listen(callback)
+
+    # ------------------------------------------------------------------ commands
+
+    async def request(self, command: Command, timeout_s: float = ANSWER_S) -> Accepted | Done:
+        """Send any command.
+
+        Args:
+            command: The command, with its token where it has one.
+            timeout_s: How long the robot may take [s].
+
+        Raises:
+            RefusedError: The robot refused it, which changed nothing.
+            NotConnectedError: Nobody answers.
+            AnswerTimeoutError: No answer came in time.
+            ProtocolError: The command holds what cannot be sent.
+        """
+        reply = _understood(decode_reply, await self._transport.request(encode(command), timeout_s))
+        if isinstance(reply, Refused):
+            raise RefusedError(reply)
+        return reply
+
+    def watch(self) -> None:
+        """Begin to listen to the states, before anything is sent that causes one."""
+        self._states.subscribe()
+
+    def put_setpoint(self, data: bytes) -> None:
+        """Send an encoded set-point; `Arm.servo` does it."""
+        self._transport.put_setpoint(data)
+
+    async def stop(self) -> None:
+        """Bring the arm to rest now; anyone may, without control."""
+        await self.request(Stop())
+
+    @contextlib.asynccontextmanager
+    async def control(self, client: str, *, lease_s: float = 30.0) -> AsyncIterator[Arm]:
+        """Hold control for as long as the block lasts.
+
+        The client's presence is announced first, so that its going ends control at once; in real time the
+        lease is kept alive in the background.
+
+        Args:
+            client: Who asks: shown to others.
+            lease_s: How long control lasts without a sign of life [s].
+
+        Raises:
+            RefusedError: Another client holds control; its name is in the sentence.
+        """
+        clock = await self.clock()
+        await self._transport.announce(client)
+        try:
+            accepted = await self.request(TakeControl(client=client, lease_s=float(lease_s)))
+            if not isinstance(accepted, Accepted) or accepted.token is None:
+                raise UnexpectedReplyError(f"take_control was answered by {accepted}, without a token")
+            arm = self._arm = Arm(self, accepted.token)
+            alive = None
+            if clock == "realtime":
+                alive = asyncio.create_task(arm.keep_alive_every((accepted.lease_s or lease_s) / 3))
+            try:
+                yield arm
+            finally:
+                if alive is not None:
+                    alive.cancel()
+                    await asyncio.wait([alive])
+                if self._arm is arm:
+                    self._arm = None
+                # Control that is lost, or a robot that has gone, needs no release.
+                with contextlib.suppress(RefusedError, ClientError):
+                    await self.request(ReleaseControl(token=arm.token))
+        finally:
+            await self._transport.withdraw(client)
+
+    # ------------------------------------------------------------------ time
+
+    async def advance(self, ticks: int) -> int:
+        """Let ticks pass: by steps in lockstep and free, by waiting in real time.
+
+        Args:
+            ticks: How many control periods, at least 1.
+
+        Returns:
+            The last tick that passed; its state has arrived.
+
+        Raises:
+            MisuseError: Not in real time, and this client does not hold control.
+        """
+        if await self.clock() == "realtime":
+            last = (await self._next_state()).tick + ticks
+            while (tick := (await self._next_state()).tick) < last:
+                pass
+            return tick
+        if self._arm is None:
+            raise MisuseError("time passes here for who holds control: `async with robot.control(…)` first")
+        tick = 0
+        for first in range(0, ticks, MAX_STEP):
+            tick = await self._arm.step(min(MAX_STEP, ticks - first))
+        return tick
+
+    async def until(self, tick: int) -> State:
+        """Wait until the state of a tick has arrived, without letting time pass."""
+        self._states.subscribe()
+        latest = self._states.latest
+        if latest is not None and latest.tick >= tick:
+            return latest
+        return await self._states.next(lambda state: state.tick >= tick, STATE_S)
+
+    async def rest(self) -> State:
+        """Let time pass until the shaped reference rests; the arm may still ring.
+
+        Returns:
+            The first state seen that says so.
+        """
+        while True:
+            if await self.clock() == "realtime":
+                state = await self._next_state()
+            else:
+                state = await self.until(await self.advance(CHUNK))
+            if state.runtime_state == RuntimeState.STOPPED:
+                return state
+
+    async def _until_ended(self, motion: Motion) -> None:
+        if await self.clock() == "realtime":
+            await motion.wait_event()
+        while not motion.ended:
+            await self.advance(CHUNK)
+
+    async def _next_state(self) -> State:
+        return await self._states.next(lambda _: True, STATE_S)
+
+    def _on_lost(self, error: NotConnectedError) -> None:
+        for feed in (self._states, self._events, self._truths, self._telemetries):
+            feed.fail(error)
+        self.motions.fail(error)
+
+
+T = TypeVar("T")
+
+
+def _understood(decode: Callable[[bytes], T], data: bytes) -> T:
+    try:
+        return decode(data)
+    except ProtocolError as error:
+        why = f"the robot's answer is not understood, maybe of a newer protocol: update the client ({error})"
+        raise UnexpectedReplyError(why) from error

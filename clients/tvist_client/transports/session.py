@@ -1,0 +1,63 @@
+"""Zenoh sessions of a client: how they are opened, and that none outlives the process."""
+
+import contextlib
+import json
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import zenoh
+
+from tvist_client.errors import NotConnectedError
+
+CONFIG: Mapping[str, Any] = {
+    "mode": "client",
+    # The endpoint is named: nobody has to be looked for.
+    "scouting/multicast/enabled": False,
+    "transport/shared_memory/enabled": False,
+}
+"""Of a session: path to value."""
+
+
+def open_session(endpoint: str) -> zenoh.Session:
+    """Open a session. Blocks while it connects.
+
+    Raises:
+        NotConnectedError: Nobody listens there.
+    """
+    config = zenoh.Config()
+    try:
+        for path, value in {**CONFIG, "connect/endpoints": [endpoint]}.items():
+            config.insert_json5(path, json.dumps(value))
+    except zenoh.ZError as error:
+        why = (
+            f"{endpoint!r} is no endpoint: it has the form tcp/<host>:<port>, for instance tcp/127.0.0.1:7447"
+        )
+        raise NotConnectedError(why) from error
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError as error:
+        why = f"nobody answers at {endpoint}: check that the server runs and listens there (`tvist serve`)"
+        raise NotConnectedError(why) from error
+    _OPEN.add(session)
+    return session
+
+
+def close_session(session: zenoh.Session) -> None:
+    """Close a session. Blocks for some milliseconds."""
+    _OPEN.discard(session)
+    with contextlib.suppress(zenoh.ZError):
+        session.close()  # type: ignore[no-untyped-call]
+
+
+_OPEN: set[zenoh.Session] = set()
+
+
+def _close_all() -> None:
+    for session in tuple(_OPEN):
+        close_session(session)
+
+
+# A session left open can hang the process at its end; `atexit` comes too late, after threads were joined.
+_register: Callable[[Callable[[], None]], None] = threading._register_atexit  # type: ignore[attr-defined]  # noqa: SLF001
+_register(_close_all)

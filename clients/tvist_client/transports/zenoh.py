@@ -1,0 +1,244 @@
+"""A robot on the network, over Zenoh.
+
+Callbacks run in Zenoh's own threads, directly (`indirect=False`): messages keep their order across topics,
+and no thread of Python's has to be joined at the end. They make bytes of payloads; the loop does the rest.
+"""
+
+import asyncio
+from collections.abc import Callable, Mapping
+from functools import partial
+
+import zenoh
+from zenoh.handlers import Callback
+
+from tvist_client.errors import AnswerTimeoutError, ClientError, NotConnectedError, UnexpectedReplyError
+from tvist_client.transports.base import Topic, Transport
+from tvist_client.transports.mailbox import Mailbox, wake
+from tvist_client.transports.session import close_session, open_session
+from tvist_protocol import keys
+
+ENCODING = zenoh.Encoding("application/msgpack")
+KEYS: Mapping[Topic, Callable[[str], str]] = {
+    "state": keys.state,
+    "event": keys.event,
+    "truth": keys.truth,
+    "telemetry": keys.telemetry,
+}
+FIND_S = 1.0
+"""How long a robot may take to show itself once there is a link [s]; it takes some milliseconds."""
+INFO_S = 10.0
+"""How long `info` may take [s]."""
+
+
+class ZenohTransport(Transport):
+    """A way to one robot over Zenoh. `open` makes one.
+
+    Args:
+        session: An open session, which `close` closes.
+        endpoint: Where it is connected to, for sentences.
+        robot: The robot's name.
+    """
+
+    def __init__(self, session: zenoh.Session, endpoint: str, robot: str) -> None:
+        self._session = session
+        self._endpoint = endpoint
+        self._robot = robot
+        self._loop = asyncio.get_running_loop()
+        self._mailbox = Mailbox(self._loop)
+        self._alive = asyncio.Event()
+        self._closed = False
+        self._pending: set[asyncio.Future[bytes]] = set()
+        self._lost_callbacks: list[Callable[[NotConnectedError], None]] = []
+        self._tokens: dict[str, zenoh.LivelinessToken] = {}
+        session.liveliness().declare_subscriber(
+            keys.alive(robot), Callback(self._on_alive, indirect=False), history=True
+        )
+        self._setpoints = session.declare_publisher(
+            keys.setpoint(robot), encoding=ENCODING, priority=zenoh.Priority.REAL_TIME, express=True
+        )
+
+    @classmethod
+    async def open(cls, endpoint: str, robot: str) -> "ZenohTransport":
+        """Connect to an endpoint and find the robot there.
+
+        Args:
+            endpoint: Where the server listens, `tcp/127.0.0.1:7447`.
+            robot: The robot's name.
+
+        Raises:
+            NotConnectedError: Nobody listens there, or no robot of that name is there.
+            ProtocolError: `robot` cannot be a robot's name.
+        """
+        keys.check_robot_name(robot)
+        transport = cls(await asyncio.to_thread(open_session, endpoint), endpoint, robot)
+        try:
+            await transport._find()
+        except BaseException:
+            await transport.close()
+            raise
+        return transport
+
+    @property
+    def dropped(self) -> int:
+        """Messages dropped because the event loop was busy for too long."""
+        return self._mailbox.dropped
+
+    async def request(self, data: bytes, timeout_s: float) -> bytes:
+        """Send a command as a query and wait for the reply."""
+        return await self._get(keys.command(self._robot), data, timeout_s)
+
+    def put_setpoint(self, data: bytes) -> None:
+        """Put a set-point: 20 µs, and dropped where the link is congested."""
+        if self._closed:
+            raise self._gone()
+        self._setpoints.put(data)
+
+    async def info(self) -> bytes:
+        """Ask what the robot is."""
+        return await self._get(keys.info(self._robot), None, INFO_S)
+
+    def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
+        """Subscribe to a topic."""
+        if self._closed:
+            raise self._gone()
+        key = KEYS[topic](self._robot)
+        droppable = topic in {"state", "truth"}
+
+        def on_sample(sample: zenoh.Sample) -> None:
+            # Anyone may put on a key with a wildcard, which arrives here too.
+            if str(sample.key_expr) == key:
+                self._mailbox.put(callback, sample.payload.to_bytes(), droppable=droppable)
+
+        self._session.declare_subscriber(key, Callback(on_sample, indirect=False))
+
+    def on_lost(self, callback: Callable[[NotConnectedError], None]) -> None:
+        """Have a callback called when the robot's liveliness token goes."""
+        self._lost_callbacks.append(callback)
+
+    async def announce(self, client: str) -> None:
+        """Declare the client's liveliness token. It reaches the robot before any command sent later."""
+        if self._closed:
+            raise self._gone()
+        self._tokens[client] = self._session.liveliness().declare_token(keys.client(self._robot, client))
+
+    async def withdraw(self, client: str) -> None:
+        """Undeclare the client's liveliness token."""
+        token = self._tokens.pop(client, None)
+        if token is not None and not self._closed:
+            token.undeclare()  # type: ignore[no-untyped-call]
+
+    async def close(self) -> None:
+        """Close the session; what is waited for fails."""
+        if self._closed:
+            return
+        self._closed = True
+        self._fail_pending(self._gone())
+        await asyncio.to_thread(close_session, self._session)
+
+    async def _get(self, key: str, data: bytes | None, timeout_s: float) -> bytes:
+        """Query one key, and have the first answer.
+
+        Zenoh ends a query that nobody hears at once and without a word, one that is heard and not answered at
+        its timeout with an error, and one whose link breaks at once and again without a word.
+        """
+        if self._closed:
+            raise self._gone()
+        answer: asyncio.Future[bytes] = self._loop.create_future()
+        self._pending.add(answer)
+        nobody = NotConnectedError(
+            f"nobody answers for robot {self._robot!r} at {self._endpoint}: check that the server still runs"
+        )
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            wake(self._loop, partial(_settle, answer, self._outcome(reply, timeout_s)))
+
+        def on_end() -> None:
+            wake(self._loop, partial(_settle, answer, nobody))
+
+        try:
+            # The default quality of service: its queue is not the states', which so cannot hold up an answer.
+            self._session.get(
+                key,
+                Callback(on_reply, on_end, indirect=False),
+                payload=data,
+                encoding=ENCODING if data is not None else None,
+                timeout=timeout_s,
+            )
+            return await answer
+        except zenoh.ZError as error:
+            raise self._gone() from error
+        finally:
+            self._pending.discard(answer)
+
+    def _outcome(self, reply: zenoh.Reply, timeout_s: float) -> bytes | ClientError:
+        if reply.ok is not None:
+            return reply.ok.payload.to_bytes()
+        why = reply.err.payload.to_bytes() if reply.err is not None else b""
+        if why == b"Timeout":
+            return AnswerTimeoutError(
+                f"robot {self._robot!r} at {self._endpoint} did not answer within {timeout_s:g} s: "
+                "it hangs, or needs longer"
+            )
+        return UnexpectedReplyError(f"not a robot's answer but an error: {why!r:.80}")
+
+    def _on_alive(self, sample: zenoh.Sample) -> None:
+        there = sample.kind == zenoh.SampleKind.PUT
+        wake(self._loop, self._alive.set if there else self._lose)
+
+    def _lose(self) -> None:
+        self._alive.clear()
+        if self._closed:
+            return
+        error = self._gone()
+        self._fail_pending(error)
+        for callback in tuple(self._lost_callbacks):
+            callback(error)
+
+    def _gone(self) -> NotConnectedError:
+        if self._closed:
+            return NotConnectedError("the connection is closed: open another one")
+        return NotConnectedError(
+            f"robot {self._robot!r} at {self._endpoint} has gone: this client finds it again when it is back"
+        )
+
+    def _fail_pending(self, error: ClientError) -> None:
+        for answer in tuple(self._pending):
+            _settle(answer, error)
+
+    async def _find(self) -> None:
+        """Wait until the robot shows itself."""
+        try:
+            async with asyncio.timeout(FIND_S):
+                await self._alive.wait()
+        except TimeoutError:
+            robots = await self._robots()
+            there = f"those there are {', '.join(robots)}" if robots else "no robot is there"
+            why = f"there is no robot {self._robot!r} at {self._endpoint}; {there}: check name and endpoint"
+            raise NotConnectedError(why) from None
+
+    async def _robots(self) -> list[str]:
+        """Names of the robots that can be reached."""
+        names: list[str] = []
+        ended = asyncio.Event()
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                names.append(str(reply.ok.key_expr).split("/")[1])
+
+        self._session.liveliness().get(
+            keys.ANY_ALIVE,
+            Callback(on_reply, partial(wake, self._loop, ended.set), indirect=False),
+            timeout=FIND_S,
+        )
+        await ended.wait()
+        return sorted(names)
+
+
+def _settle(answer: asyncio.Future[bytes], outcome: bytes | ClientError) -> None:
+    """Give an answer to whoever waits for it; the first one counts."""
+    if answer.done():
+        return
+    if isinstance(outcome, bytes):
+        answer.set_result(outcome)
+    else:
+        answer.set_exception(outcome)

@@ -1,0 +1,144 @@
+"""Robots, cycles and controllers for the tests of the server."""
+
+import msgspec
+import numpy as np
+
+from tvist_plant.description import RobotDescription, load
+from tvist_plant.plant import PERIOD
+from tvist_protocol import commands as c
+from tvist_protocol.calibration import Calibration, calibration_of
+from tvist_server.controller import Controller
+from tvist_server.cycle import ControlCycle
+from tvist_server.setup import Setup, body, paper_payload
+from tvist_server.trajectory import Limits
+from tvist_shaping.catalogue import shaper
+from tvist_shaping.estimators.polynomial import Polynomial
+from tvist_shaping.filter import TvistFilter
+
+UR5E = load("ur5e")
+Q1, Q2, Q3 = (np.array(UR5E.poses[name]) for name in ("Q1", "Q2", "Q3"))
+PAPER = Limits(1.5, 2.0, 100.0)
+H = PERIOD
+ROUNDING = 1e-8
+"""What rounding makes of a second difference: 4 ε·2π/h² = 1.4e-9 [rad/s^2]."""
+
+
+def cut(joints: int) -> RobotDescription:
+    """The first joints of a UR5e, the disc on the last of them."""
+    replace = msgspec.structs.replace
+    names = UR5E.robot.joints[:joints]
+    changes = {"robot": replace(UR5E.robot, model=f"UR5e-{joints}", joints=names)}
+    for table in ("kinematics", "links", "limits", "drives"):
+        values = getattr(UR5E, table)
+        shorter = {key: value[:joints] for key, value in each(values) if isinstance(value, tuple)}
+        changes[table] = replace(values, **shorter)
+    flexible = UR5E.link_flexibility
+    kept = [number for number in flexible.links if number < joints]
+    changes["link_flexibility"] = replace(
+        flexible, links=tuple(kept), stiffness=flexible.stiffness[: len(kept)]
+    )
+    changes["poses"] = {name: pose[:joints] for name, pose in UR5E.poses.items()}
+    return replace(UR5E, **changes)
+
+
+def each(struct):
+    return [(key, getattr(struct, key)) for key in struct.__struct_fields__]
+
+
+POLYNOMIAL = {
+    "joints": (1, 2),
+    "basis": "trigonometric",
+    "degree": 1,
+    # 1, then cos and sin of shoulder and elbow: 6.7 Hz at Q1 and Q2, 15 Hz at Q3, and back on the way.
+    "f_d_coefficients": (10.0, 1.5, 0.0, -1.8, 3.0),
+    "zeta_coefficients": (0.25, 0.0, 0.0, 0.09, 0.0),
+    "f_d_range": (5.0, 16.0),
+    "zeta_range": (0.05, 0.45),
+}
+
+
+def calibration(mass: float = 5.0, robot: str = "UR5e", name: str = "test", **polynomial) -> Calibration:
+    spread = {"median": 1.0, "p90": 2.0}
+    return calibration_of(
+        {
+            "name": name,
+            "robot": robot,
+            "payload": {"mass": mass, "com": [0.0, 0.0, 0.0405], "inertia": [0.006, 0, 0, 0.006, 0, 0.006]},
+            "polynomial": POLYNOMIAL | polynomial,
+            "provenance": {
+                "command": "by hand",
+                "version": "0",
+                "seed": 0,
+                "configurations": 1,
+                "ring_downs": 1,
+                "rejected": 0,
+                "measured_f_d_range": [6.0, 15.0],
+                "measured_zeta_range": [0.1, 0.35],
+                "residual_f_d_percent": spread,
+                "residual_zeta_percent": spread,
+                "cross_validated_f_d_percent": spread,
+                "cross_validated_zeta_percent": spread,
+            },
+        }
+    )
+
+
+def cycle(name: str = "zv", q=Q1, estimator=None, seed: int = 0) -> ControlCycle:
+    payload = body(paper_payload(UR5E))
+    tvist = TvistFilter(shaper(name), estimator or Polynomial(**POLYNOMIAL), joints=6)
+    return ControlCycle(UR5E, tvist, q=np.array(q), declared=payload, carried=payload, seed=seed)
+
+
+class NoArm:
+    """Stands for the arm where only its reference matters."""
+
+    def step(self, command):
+        return command
+
+
+def without_arm(line: ControlCycle) -> ControlCycle:
+    line.arm = NoArm()
+    return line
+
+
+def setup(description: RobotDescription = UR5E, **changes) -> Setup:
+    start = {"q": description.poses["Q1"], "payload": paper_payload(description), "calibration": None}
+    return Setup(description=description, **({"clock": "free"} | start | changes))
+
+
+class Robot:
+    """A controller, the lease on it, and what came out of it."""
+
+    def __init__(self, description: RobotDescription = UR5E, *, lease_s: float = 30.0, **changes) -> None:
+        self.controller = Controller(setup(description, **changes))
+        self.token = self.controller.receive(c.TakeControl(client="a", lease_s=lease_s)).token
+        self.states, self.events = [], []
+
+    def send(self, kind, **fields):
+        if "token" in kind.__struct_fields__:
+            fields.setdefault("token", self.token)
+        return self.controller.receive(kind(**fields))
+
+    def setpoint(self, sequence, q, **fields):
+        setpoint = c.Setpoint(**({"token": self.token, "sequence": sequence, "q": tuple(q)} | fields))
+        self.controller.receive_setpoint(setpoint)
+
+    def tick(self, count: int = 1):
+        for _ in range(count):
+            state, events = self.controller.tick()
+            self.states.append(state)
+            self.events += events
+        return state
+
+    def until_rest(self, most: int = 5000):
+        for _ in range(most):
+            self.tick()
+            if self.controller.cycle.at_rest:
+                return self.states[-1]
+        raise AssertionError("still moving")
+
+    def kinds(self):
+        return [event.kind for event in self.events]
+
+    def column(self, name):
+        return np.array([getattr(state, name) for state in self.states])

@@ -1,0 +1,5 @@
+"""`python -m tvist_cli` is `tvist`."""
+
+from tvist_cli.main import main
+
+main()

@@ -1,0 +1,60 @@
+"""`tvist record`: record a served robot from outside."""
+
+import asyncio
+import contextlib
+import signal
+from pathlib import Path
+
+from tvist_cli.failure import Failure, told
+from tvist_cli.output import err, print_json
+
+
+def record(
+    file: Path,
+    *,
+    endpoint: str = "tcp/127.0.0.1:7447",
+    name: str = "ur5e",
+    seconds: float | None = None,
+    json: bool = False,
+) -> None:
+    """Record states, events and, where it is told, truth of a served robot as MCAP, until Control+C.
+
+    What only the server knows, the commands, is not in it: `tvist replay` needs a recording of `tvist serve --record`.
+
+    Args:
+        file: MCAP file to write.
+        endpoint: Zenoh endpoint of the robot.
+        name: Its name.
+        seconds: End by itself after this time.
+        json: Print one JSON object at the end.
+    """
+    from tvist_client.robot import Robot
+    from tvist_server.recording import Recorder, RecordingError
+
+    async def run() -> tuple[int, int]:
+        ticks: list[int] = []
+        ended = asyncio.Event()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            asyncio.get_running_loop().add_signal_handler(number, ended.set)
+        async with await Robot.connect(endpoint, name) as robot:
+            with Recorder(file, await robot.info(), {}) as recorder:
+                robot.on_state(recorder.state)
+                robot.on_state(lambda state: ticks.append(state.tick))
+                robot.on_event(recorder.event)
+                robot.on_truth(recorder.truth)
+                err.print(f"recording {name} into {file}; Control+C ends it")
+                with contextlib.suppress(TimeoutError):
+                    await asyncio.wait_for(ended.wait(), seconds)
+            if recorder.error is not None:
+                raise Failure(recorder.error)
+            if not ticks:
+                raise Failure(f"{name} told no state: is it in lockstep, with nobody stepping it?")
+            missing = ticks[-1] - ticks[0] + 1 - len(ticks)
+            return len(ticks), missing + recorder.dropped
+
+    with told(RecordingError):
+        states, lost = asyncio.run(run())
+    if json:
+        print_json({"file": str(file), "states": states, "lost": lost})
+    else:
+        err.print(f"{states} states recorded, {lost} lost")

@@ -1,0 +1,67 @@
+"""`tvist watch`: what a robot is doing, live in the terminal."""
+
+import asyncio
+import contextlib
+from typing import TYPE_CHECKING
+
+from rich.console import Group
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from tvist_cli.failure import told
+from tvist_cli.output import out, print_json
+
+if TYPE_CHECKING:
+    from tvist_protocol.stream import Event, State
+
+
+def watch(
+    endpoint: str = "tcp/127.0.0.1:7447", *, name: str = "ur5e", seconds: float | None = None, json: bool = False
+) -> None:
+    """Show joints, tool accelerometer, estimates and events of a served robot until Control+C.
+
+    Args:
+        endpoint: Zenoh endpoint of the robot.
+        name: Its name.
+        seconds: End by itself after this time.
+        json: Print each event, and the state ten times a second, as a JSON object a line.
+    """
+    from tvist_client.robot import Robot
+
+    async def run() -> None:
+        async with await Robot.connect(endpoint, name) as robot:
+            events: list[Event] = []
+            robot.on_event(events.append)
+            robot.on_event(print_json if json else lambda event: None)
+            with contextlib.nullcontext() if json else Live(console=out, refresh_per_second=10) as live:
+                async for state in robot.states(buffer=1):
+                    if live is not None:
+                        live.update(_screen(state, events[-5:]))
+                    else:
+                        print_json(state)
+                    await asyncio.sleep(0.1)
+
+    with told(), contextlib.suppress(TimeoutError):
+        asyncio.run(asyncio.wait_for(run(), seconds))
+
+
+def _screen(state: "State", events: "list[Event]") -> Group:
+    joints = Table(show_edge=False, pad_edge=False)
+    for column in ("joint", "reference rad", "target rad", "actual rad", "target rad/s²", "moment N m"):
+        joints.add_column(column, justify="right")
+    for number in range(len(state.actual_q)):
+        joints.add_row(
+            str(number),
+            *(f"{values[number]: .4f}" for values in (state.reference_q, state.target_q, state.actual_q)),
+            f"{state.target_qdd[number]: .3f}",
+            f"{state.actual_moment[number]: .1f}",
+        )
+    x, y, z = state.actual_tool_accelerometer
+    estimates = ", ".join(f"{f:.2f} Hz ζ {d:.3f}" for f, d in zip(state.estimated_f_d, state.estimated_zeta, strict=True))
+    return Group(
+        Text(f"tick {state.tick}   {state.timestamp:.3f} s   missed {state.missed_ticks}   estimated {estimates}"),
+        joints,
+        Text(f"tool accelerometer {x: .2f} {y: .2f} {z: .2f} m/s²   shaper delay {1e3 * state.shaper_delay:.1f} ms"),
+        *(Text(f"tick {e.tick}: {e.kind} {e.id or ''} {e.why or ''}", style="dim") for e in events),
+    )
