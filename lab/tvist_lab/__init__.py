@@ -1,0 +1,1 @@
+"""Experiments, written as clients: identification, the paper's, metrics, figures, replays, benchmarks."""

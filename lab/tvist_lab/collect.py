@@ -5,9 +5,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from tvist_client.robot import Robot
-from tvist_protocol.stream import Event, State, Truth
-
 from tvist_lab.recordings import Recording
+from tvist_protocol.stream import Event, State, Truth
 
 
 @dataclass

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tvist_lab.mcap_file import RecordingFile
 from tvist_protocol.commands import Setpoint
 from tvist_protocol.errors import TvistError
 from tvist_protocol.journal import Entry, message_of
@@ -11,8 +12,6 @@ from tvist_protocol.stream import Event, State, Truth
 from tvist_server.controller import Controller
 from tvist_server.recording import Recorder
 from tvist_server.setup import Setup
-
-from tvist_lab.mcap_file import RecordingFile
 
 
 class ReplayError(TvistError):
@@ -66,9 +65,13 @@ def replay_file(content: RecordingFile, output: Path | None = None) -> Replay:
         ValueError: What it says of the start is wrong.
     """
     if content.start is None:
-        raise ReplayError("the recording does not say how its robot started: only tvist serve --record writes that")
+        raise ReplayError(
+            "the recording does not say how its robot started: only tvist serve --record writes that"
+        )
     if (content.dropped or {}).get("journal"):
-        raise ReplayError("the recorder dropped messages of its journal: no equal run can be made of what is left")
+        raise ReplayError(
+            "the recorder dropped messages of its journal: no equal run can be made of what is left"
+        )
     done = replay(setup := Setup.from_builtins(content.start), content.journal, content.states)
     if output is not None:
         _write(setup, content, done, output)

@@ -57,7 +57,9 @@ async def _connect(process: asyncio.subprocess.Process, endpoint: str, name: str
             return await Robot.connect(endpoint, name)
         except ClientError as error:
             if process.returncode is not None:
-                raise ServedError(f"tvist serve ended with exit code {process.returncode}: {_last(told)}") from error
+                raise ServedError(
+                    f"tvist serve ended with exit code {process.returncode}: {_last(told)}"
+                ) from error
             if asyncio.get_running_loop().time() > deadline:
                 raise ServedError(f"tvist serve does not answer on {endpoint}: {error}") from error
             await asyncio.sleep(0.05)

@@ -95,6 +95,9 @@ class NoArm:
     def step(self, command):
         return command
 
+    def reset(self, command, **_):
+        return command
+
 
 def without_arm(line: ControlCycle) -> ControlCycle:
     line.arm = NoArm()

@@ -18,7 +18,8 @@ class Failure(Exception):  # noqa: N818  what a person calls it
 @contextmanager
 def told(*errors: type[Exception], code: int = 1) -> Iterator[None]:
     """Errors of these kinds, and those of client and protocol, become a failure with their sentence."""
+    kinds: tuple[type[Exception], ...] = (*errors, ClientError, TvistError)
     try:
         yield
-    except (*errors, ClientError, TvistError) as error:
+    except kinds as error:
         raise Failure(str(error), code=code) from error

@@ -23,7 +23,10 @@ def main() -> None:
     ):  # fmt: skip
         app.command(f"tvist_cli.commands.{name}:{name}", name=name)
     try:
-        app()
+        app(exit_on_error=False, print_error=False)
+    except cyclopts.CycloptsError as error:
+        print(f"tvist: {' '.join(str(error).split())}", file=sys.stderr)
+        sys.exit(2)
     except Failure as failure:
         print(f"tvist: {failure}", file=sys.stderr)
         sys.exit(failure.code)

@@ -1,6 +1,7 @@
 """What commands print: tables and progress for people on stderr and stdout, one JSON object for machines."""
 
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -9,10 +10,17 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-out = Console(highlight=False)
+WIDTH = 120
+"""Columns where there is no terminal to ask."""
+out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH)
 """Results."""
-err = Console(stderr=True, highlight=False)
+err = Console(stderr=True, highlight=False, width=None if sys.stderr.isatty() else WIDTH)
 """Progress and messages: nothing of it mixes with `--json`."""
+
+
+def say(message: str) -> None:
+    """A message for a person, in one line however long: it may stand in a log, or hold a path to be copied."""
+    err.print(message, soft_wrap=True, markup=False)
 
 
 def print_json(value: Any) -> None:
@@ -21,19 +29,19 @@ def print_json(value: Any) -> None:
 
 
 @contextmanager
-def progress(total: int, what: str) -> Iterator[Progress]:
-    """A bar on stderr with one task, number 0."""
+def progress(total: int, what: str) -> Iterator[Callable[[int, str | None], None]]:
+    """A bar on stderr; the function given advances it by a number of steps and may rename what is being done."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=err, transient=True) as bar:
-        bar.add_task(what, total=total)
-        yield bar
+        task = bar.add_task(what, total=total)
+        yield lambda steps, name: bar.update(task, advance=steps, description=name or what)
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Print a table: text to the left, numbers to the right."""
     drawn = Table(title=title, title_justify="left", title_style="bold", show_edge=False, pad_edge=False)
     for number, column in enumerate(columns):
-        drawn.add_column(column, justify="left" if number == 0 else "right")
+        drawn.add_column(column, no_wrap=number == 0, justify="left" if number == 0 else "right")
     for row in rows:
         drawn.add_row(*row)
     out.print(drawn)

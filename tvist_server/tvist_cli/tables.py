@@ -15,15 +15,8 @@ def print_paper(result: dict[str, Any]) -> None:
     table(
         "Table 1, lowest mode with 5 kg",
         ("pose", "f_d Hz, paper", "identified", "true", "ζ, paper", "identified", "true"),
-        [
-            (
-                name,
-                number(theirs["configurations"][name]["f_d_hz"], 1), number(row["f_d_hz"], 2), number(row.get("true_f_d_hz"), 2),
-                number(theirs["configurations"][name]["zeta"], 2), number(row["zeta"]), number(row.get("true_zeta")),
-            )
-            for name, row in result["table_1"].items()
-        ],
-    )  # fmt: skip
+        [_mode(name, theirs["configurations"][name], row) for name, row in result["table_1"].items()],
+    )
     rows = []
     for motion, ours in result["table_2"].items():
         for kind in ("unshaped", "shaped"):
@@ -39,9 +32,8 @@ def print_paper(result: dict[str, Any]) -> None:
         rows,
     )
     for motion, methods in result["baselines"].items():
-        best = min(
-            (name for name in methods if methods[name]["still_after_ms"] is not None),
-            key=lambda name: methods[name]["still_after_ms"],
+        first = min(
+            (row["still_after_ms"] for row in methods.values() if row["still_after_ms"] is not None),
             default=None,
         )
         table(
@@ -49,7 +41,7 @@ def print_paper(result: dict[str, Any]) -> None:
             ("method", "delay ms", "RV m/s²", "peak m/s²", "less peak %", "still after ms", "peak q̈ / limit"),
             [
                 (
-                    ("waiting (unshaped)" if name == "unshaped" else name) + (" ← first still" if name == best else ""),
+                    _label(result, name) + (" ← first still" if row["still_after_ms"] == first else ""),
                     number(row["delay_ms"], 0), number(row["residual_vibration_m_s2"]), number(row["peak_m_s2"]),
                     number(row["peak_reduction_percent"], 1), number(row["still_after_ms"], 0),
                     number(row["peak_acceleration_ratio"]),
@@ -61,6 +53,18 @@ def print_paper(result: dict[str, Any]) -> None:
         out.print(note)
 
 
+def _mode(name: str, paper: dict[str, Any], row: dict[str, float]) -> tuple[str, ...]:
+    return (
+        name,
+        number(paper["f_d_hz"], 1),
+        number(row["f_d_hz"], 2),
+        number(row.get("true_f_d_hz"), 2),
+        number(paper["zeta"], 2),
+        number(row["zeta"]),
+        number(row.get("true_zeta")),
+    )
+
+
 def _figures(row: dict[str, float | None]) -> tuple[str, ...]:
     overshoot = row["overshoot_m"]
     return (
@@ -70,3 +74,7 @@ def _figures(row: dict[str, float | None]) -> tuple[str, ...]:
         "–" if overshoot is None else f"{overshoot:.1e}",
         number(row["residual_vibration_m_s2"]),
     )
+
+
+def _label(result: dict[str, Any], name: str) -> str:
+    return "waiting, unshaped" if name == "unshaped" else str(result["methods"][name])

@@ -13,7 +13,6 @@ from tvist_protocol.errors import ProtocolError
 from tvist_protocol.journal import Entry, entry_of
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.stream import Event, State, Truth
-
 from tvist_server.about import info_of
 from tvist_server.controller import Controller
 
@@ -118,6 +117,8 @@ class Host:
         for _ in range(command.ticks):
             setpoint = next(setpoints, None)
             if setpoint is not None:
-                self._receive_setpoint(Setpoint(token=command.token, sequence=setpoint.sequence, q=setpoint.q))
+                self._receive_setpoint(
+                    Setpoint(token=command.token, sequence=setpoint.sequence, q=setpoint.q)
+                )
             self.tick()
         return reply

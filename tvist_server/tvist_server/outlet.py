@@ -13,7 +13,6 @@ from typing import Protocol
 from tvist_protocol.codec import encode
 from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, State, Telemetry, Truth
-
 from tvist_server.gateways.base import Gateway, Topic
 
 log = logging.getLogger(__name__)

@@ -10,10 +10,9 @@ from collections.abc import Callable
 
 from tvist_plant.plant import PERIOD
 from tvist_protocol.stream import Telemetry
-
 from tvist_server.about import info_of
 from tvist_server.clock import Clock, Lockstep, Punctuality, Realtime
-from tvist_server.config import ServeConfig
+from tvist_server.config import ConfigError, ServeConfig
 from tvist_server.controller import Controller
 from tvist_server.gateways.zenoh import ZenohGateway
 from tvist_server.host import Host
@@ -39,7 +38,10 @@ class Server:
 
     def __init__(self, config: ServeConfig) -> None:
         setup = config.setup()
-        self.controller = Controller(setup)
+        try:
+            self.controller = Controller(setup)
+        except ValueError as error:
+            raise ConfigError(str(error)) from error
         lockstep = setup.clock != "realtime"
         self.recorder = None
         if config.record is not None:
@@ -62,7 +64,10 @@ class Server:
                 setup.name, config.listen, self, lockstep=lockstep, truth=setup.truth
             )
         except Exception:
-            self._close_recorder()
+            if self.recorder is not None:
+                self.recorder.close()
+                # It is ours and empty; left there it would stand in the way of the next attempt.
+                self.recorder.path.unlink(missing_ok=True)
             raise
 
     # ------------------------------------------------------------------ the desk: what gateways ask for
@@ -107,7 +112,7 @@ class Server:
         gc.unfreeze()
 
     async def run(self, ready: Callable[[], None]) -> None:
-        """Serve until SIGINT or SIGTERM.
+        """Serve until SIGINT or SIGTERM, or until the controller fails; then `failure` says why.
 
         Args:
             ready: Called once the robot ticks and answers.
@@ -117,11 +122,16 @@ class Server:
             loop.add_signal_handler(number, ended.set)
         self.start()
         ready()
-        while not ended.is_set():
+        while not ended.is_set() and self.failure is None:
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(ended.wait(), 1.0)
             self._outlet.telemetry(self._telemetry(self.clock.punctuality()))
         self.close()
+
+    @property
+    def failure(self) -> str | None:
+        """Why the robot ticks no more, where it does not."""
+        return self._host.failure
 
     def _telemetry(self, punctuality: Punctuality | None) -> Telemetry:
         controller, counters = self.controller, self.controller.counters
@@ -136,8 +146,8 @@ class Server:
             missed_ticks=counters.missed_ticks,
             dropped_states=self._outlet.dropped,
             recorder_dropped=self.recorder.dropped if self.recorder is not None else 0,
-            setpoints_received=counters.setpoints_received,
-            setpoints_refused=counters.setpoints_refused,
+            setpoints_received=counters.setpoints_received + self._gateway.setpoints_refused,
+            setpoints_refused=counters.setpoints_refused + self._gateway.setpoints_refused,
             setpoints_late=late,
             setpoints_lost=lost,
             setpoints_limited=limited,

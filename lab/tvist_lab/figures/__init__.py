@@ -7,4 +7,13 @@ from tvist_lab.figures.residual import figure_16
 from tvist_lab.figures.sensitivity import figure_4
 from tvist_lab.figures.style import save
 
-__all__ = ["Recorded", "figure_4", "figure_7", "figure_16", "identified_figure", "motion_figure", "observed_figure", "save"]
+__all__ = [
+    "Recorded",
+    "figure_4",
+    "figure_7",
+    "figure_16",
+    "identified_figure",
+    "motion_figure",
+    "observed_figure",
+    "save",
+]

@@ -3,15 +3,20 @@
 import msgspec
 import numpy as np
 from matplotlib.figure import Figure
-from tvist_protocol.calibration import Calibration
-from tvist_shaping import Polynomial
 
 from tvist_lab.figures.style import SHAPED, THIRD, UNSHAPED, legend, panels, title
 from tvist_lab.recordings import Floats
+from tvist_protocol.calibration import Calibration
+from tvist_shaping import Polynomial
 
 
 def identified_figure(
-    calibration: Calibration, q: Floats, f_d: Floats, zeta: Floats, true_f_d: Floats | None, true_zeta: Floats | None
+    calibration: Calibration,
+    q: Floats,
+    f_d: Floats,
+    zeta: Floats,
+    true_f_d: Floats | None,
+    true_zeta: Floats | None,
 ) -> Figure:
     """Estimated against measured (f_d, ζ), a point a configuration, and against the truth where it is known.
 
@@ -33,8 +38,18 @@ def identified_figure(
         ends = [float(np.min(measured)), float(np.max(measured))]
         panel.plot(ends, ends, color=THIRD, linewidth=1.0, label="equal")
         if true is not None:
-            panel.plot(true, estimate, ".", color=UNSHAPED, markersize=5, alpha=0.7, label="against the true lowest mode")
-        panel.plot(measured, estimate, ".", color=SHAPED, markersize=5, alpha=0.8, label="against the ring-down")
+            panel.plot(
+                true,
+                estimate,
+                ".",
+                color=UNSHAPED,
+                markersize=5,
+                alpha=0.7,
+                label="against the true lowest mode",
+            )
+        panel.plot(
+            measured, estimate, ".", color=SHAPED, markersize=5, alpha=0.8, label="against the ring-down"
+        )
         panel.set(xlabel=f"Measured or true {name}", ylabel=f"Calibration's {name}")
     title(axes[0], f"{calibration.name}: {len(q)} configurations")
     legend(figure, axes[0])

@@ -2,14 +2,15 @@
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
+
+from tvist_lab.recordings import Floats
 from tvist_protocol.calibration import PolynomialModel, Spread
 from tvist_shaping import terms
 
-from tvist_lab.recordings import Floats
-
-BASIS = "trigonometric"
+BASIS: Literal["trigonometric"] = "trigonometric"
 """Polynomials in the sines and cosines of the joint angles: they repeat with every turn and never run away."""
 FOLDS = 10
 """Parts the measurements are cut into for cross-validation."""

@@ -1,23 +1,24 @@
 """From ring-downs all over the workspace to a calibration."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import version
 
 import msgspec
 import numpy as np
-from tvist_client.errors import ClientError
-from tvist_client.robot import Arm, Robot
-from tvist_protocol.calibration import Calibration, Provenance, Spread
-from tvist_protocol.errors import RefusedError
-from tvist_protocol.info import Info
-from tvist_shaping import Polynomial
 
+from tvist_client.arm import Arm
+from tvist_client.errors import ClientError
+from tvist_client.robot import Robot
 from tvist_lab.collect import collect
 from tvist_lab.identification.fit import Fit, check_count, fit_polynomials, spread
 from tvist_lab.identification.ring_downs import Jog, measure
 from tvist_lab.recordings import Floats
 from tvist_lab.workspace import IDENTIFIED
+from tvist_protocol.calibration import Calibration, Provenance, Spread
+from tvist_protocol.errors import RefusedError
+from tvist_protocol.info import Info
+from tvist_shaping import Polynomial
 
 CONFIGURATIONS = 160
 REPEATS = 3
@@ -25,7 +26,7 @@ DEGREE = 2
 ANCHOR_WEIGHT = 6.0
 """Weight of a pose the user names, against one of a configuration spread over the workspace [-]."""
 
-Progress = Callable[[int, int], None]
+Progress = Callable[[], None]
 
 
 class IdentificationError(ClientError):
@@ -46,7 +47,7 @@ class Plan:
     """Of the polynomials."""
     seed: int = 0
     """Of the spread."""
-    jog: Jog = Jog()
+    jog: Jog = field(default_factory=Jog)
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,13 @@ class Identification:
 
 
 async def identify(
-    robot: Robot, arm: Arm, plan: Plan, *, name: str, command: str, progress: Progress = lambda done, all_: None
+    robot: Robot,
+    arm: Arm,
+    plan: Plan,
+    *,
+    name: str,
+    command: str,
+    progress: Progress,
 ) -> Identification:
     """Identify a robot as section 3.3 of the paper does, as a client.
 
@@ -127,9 +134,11 @@ async def identify(
             truths.append(await _true_mode(robot))
         else:
             rejected += 1
-        progress(number + 1, len(q))
+        progress()
     if not kept:
-        raise IdentificationError("no ring-down could be fitted: does the arm move, and is its accelerometer read?")
+        raise IdentificationError(
+            "no ring-down could be fitted: does the arm move, and is its accelerometer read?"
+        )
     named = sum(number < len(plan.anchors) for number in kept)
     f_d, zeta = np.array(values).T
     q, weights = q[kept], weights[kept]

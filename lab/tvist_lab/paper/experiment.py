@@ -4,14 +4,31 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from tvist_client.robot import Arm, Robot
-from tvist_protocol.info import Info
 
+from tvist_client.arm import Arm
+from tvist_client.robot import Robot
 from tvist_lab.collect import collect
-from tvist_lab.metrics import MotionResult, Runs, measure, motions, peak_acceleration, peak_after_stop, still_after
-from tvist_lab.paper.methods import EqualDuration, Fixed, FrozenAtEnd, Method, TimeVarying, Unshaped, robust_over
+from tvist_lab.metrics import (
+    MotionResult,
+    Runs,
+    measure,
+    motions,
+    peak_acceleration,
+    peak_after_stop,
+    still_after,
+)
+from tvist_lab.paper.methods import (
+    EqualDuration,
+    Fixed,
+    FrozenAtEnd,
+    Method,
+    TimeVarying,
+    Unshaped,
+    robust_over,
+)
 from tvist_lab.paper.published import MOTIONS, pose
 from tvist_lab.recordings import Recording
+from tvist_protocol.info import Info
 
 BEFORE = 0.1
 """Time recorded before a motion [s]."""
@@ -46,6 +63,8 @@ class Experiment:
     """Pose to its lowest mode: as estimated, and the truth where the robot tells it."""
     judged: dict[tuple[str, str], list[Judged]] = field(default_factory=dict)
     """(motion, method) to its runs."""
+    labels: dict[str, str] = field(default_factory=dict)
+    """Method to its name for people."""
     first: dict[tuple[str, str], Recording] = field(default_factory=dict)
     """(motion, method) to the recording of its first run, for figures."""
 
@@ -110,7 +129,7 @@ async def run(robot: Robot, arm: Arm, motion: str, method: Method, seed: int) ->
 
 
 async def experiment(
-    robot: Robot, arm: Arm, *, runs: int, seed: int, baselines: bool, progress: Progress = lambda done: None
+    robot: Robot, arm: Arm, *, runs: int, seed: int, baselines: bool, progress: Progress
 ) -> Experiment:
     """Every motion by every method.
 
@@ -139,7 +158,7 @@ def fixed_baselines(info: Info, delay: float) -> Sequence[Method]:
         return [EqualDuration(delay)]
     f_d, zeta = info.calibration.f_d_range, info.calibration.zeta_range
     robust = [
-        Fixed(name, *robust_over(name, f_d, zeta), name=f"fixed_{name}", label=f"fixed {name.upper()} over the workspace")
+        Fixed(name, *robust_over(name, f_d, zeta), name=f"fixed_{name}", label=f"fixed {name.upper()}")
         for name in ("mzv", "ei2", "ei3")
     ]
     return [EqualDuration(delay), FrozenAtEnd(), *robust]
@@ -154,6 +173,7 @@ async def _repeat(
     robot: Robot, arm: Arm, done: Experiment, motion: str, method: Method, runs: int, progress: Progress
 ) -> None:
     key = (motion, method.name)
+    done.labels[method.name] = method.label
     for number in range(runs):
         recording = await run(robot, arm, motion, method, seed=1000 * done.seed + number)
         done.first.setdefault(key, recording)

@@ -19,9 +19,11 @@ def as_dict(done: Experiment) -> dict[str, Any]:
         "shaper": "zv",
         "estimator": "polynomial",
         "calibration": None if done.info.calibration is None else done.info.calibration.name,
+        "f_d_range_hz": None if done.info.calibration is None else done.info.calibration.f_d_range,
         "table_1": done.table_1,
         "table_2": table_2(runs),
         "baselines": {motion: _methods(done, motion) for motion in MOTIONS},
+        "methods": done.labels,
         "notes": table_notes(runs),
     }
 
@@ -29,9 +31,7 @@ def as_dict(done: Experiment) -> dict[str, Any]:
 def _methods(done: Experiment, motion: str) -> dict[str, dict[str, float | None]]:
     """Every method that ran, the unshaped one first: who only waits is measured by it too."""
     unshaped = done.judged[motion, "unshaped"]
-    return {
-        method: _row(judged, unshaped) for (ran, method), judged in done.judged.items() if ran == motion
-    }
+    return {method: _row(judged, unshaped) for (ran, method), judged in done.judged.items() if ran == motion}
 
 
 def _row(judged: list[Judged], unshaped: list[Judged]) -> dict[str, float | None]:

@@ -1,9 +1,18 @@
 """`tvist analyze`: measure the motions of a recording."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tvist_cli.failure import told
-from tvist_cli.output import err, number, out, print_json, table
+from tvist_cli.output import number, out, print_json, say, table
+
+if TYPE_CHECKING:
+    from tvist_lab.metrics import MotionResult
+
+COLUMNS = (
+    "motion", "start s", "stop s", "delay ms", "stabil. ms", "cycle ms", "overshoot m", "RV m/s²", "still after ms",
+    "f_d Hz", "ζ",
+)  # fmt: skip
 
 
 def analyze(file: Path, *, figures: Path | None = None, json: bool = False) -> None:
@@ -25,27 +34,35 @@ def analyze(file: Path, *, figures: Path | None = None, json: bool = False) -> N
     found = motions(recording)
     results = [measure(recording, motion) for motion in found]
     if content.note:
-        err.print(f"{file}: {content.note}")
+        say(f"{file}: {content.note}")
     if figures is not None:
         figures.mkdir(parents=True, exist_ok=True)
         for index, motion in enumerate(found, 1):
-            err.print(str(save(observed_figure(f"motion {index}", (recording, motion)), figures / f"motion_{index}.png")))
+            drawn = observed_figure(f"motion {index}", (recording, motion))
+            say(str(save(drawn, figures / f"motion_{index}.png")))
     if json:
-        print_json({"file": str(file), "motions": [result.as_dict() for result in results], "note": content.note})
+        print_json(
+            {"file": str(file), "motions": [result.as_dict() for result in results], "note": content.note}
+        )
         return
-    table(
-        f"{file}: {len(results)} motions",
-        ("motion", "start s", "stop s", "delay ms", "stabil. ms", "cycle ms", "overshoot m", "RV m/s²", "still after ms", "f_d Hz", "ζ"),
-        [
-            (
-                str(index),
-                number(r.start_s), number(r.stop_s), number(r.delay_ms, 1), number(r.stabilisation_ms, 1),
-                number(r.cycle_ms, 1), "–" if r.overshoot_m is None else f"{r.overshoot_m:.1e}",
-                number(r.residual_vibration_m_s2), number(r.still_after_ms, 0), number(r.f_d_hz, 2), number(r.zeta),
-            )
-            for index, r in enumerate(results, 1)
-        ],
-    )  # fmt: skip
+    table(f"{file}: {len(results)} motions", COLUMNS, [_row(index, r) for index, r in enumerate(results, 1)])
     for index, result in enumerate(results, 1):
         for name, note in result.notes.items():
             out.print(f"motion {index}, {name}: {note}")
+
+
+def _row(index: int, result: "MotionResult") -> tuple[str, ...]:
+    overshoot = result.overshoot_m
+    return (
+        str(index),
+        number(result.start_s),
+        number(result.stop_s),
+        number(result.delay_ms, 1),
+        number(result.stabilisation_ms, 1),
+        number(result.cycle_ms, 1),
+        "–" if overshoot is None else f"{overshoot:.1e}",
+        number(result.residual_vibration_m_s2),
+        number(result.still_after_ms, 0),
+        number(result.f_d_hz, 2),
+        number(result.zeta),
+    )

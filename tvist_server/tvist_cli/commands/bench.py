@@ -17,7 +17,11 @@ def bench(*, seconds: float = 10.0, json: bool = False) -> None:
         print_json(result)
         return
     flat = {key: value for key, value in result.items() if not isinstance(value, dict)}
-    table("in this process, one core", ("what", "figure"), [(key, f"{value:.4g}") for key, value in flat.items()])
+    table(
+        "in this process, one core",
+        ("what", "figure"),
+        [(key, f"{value:.4g}") for key, value in flat.items()],
+    )
     for key, values in result.items():
         if isinstance(values, dict):
             table(key, ("what", "figure"), [(name, f"{value:.4g}") for name, value in values.items()])

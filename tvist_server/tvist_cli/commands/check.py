@@ -1,8 +1,7 @@
 """`tvist check`: is a robot there, and well?"""
 
-import sys
-
-from tvist_cli.output import print_json
+from tvist_cli.failure import Failure
+from tvist_cli.output import out, print_json
 
 
 def check(endpoint: str = "tcp/127.0.0.1:7447", *, name: str = "ur5e", json: bool = False) -> None:
@@ -19,6 +18,9 @@ def check(endpoint: str = "tcp/127.0.0.1:7447", *, name: str = "ur5e", json: boo
     if json:
         print_json(report)
     else:
-        print(report.sentence())
-    if not report.ok:
-        sys.exit(1)
+        for finding in report.findings:
+            if finding.ok:
+                out.print(f"ok  {finding.what:<8} {finding.said}")
+    for finding in report.findings:
+        if not finding.ok:
+            raise Failure(f"{finding.what} failed: {finding.said}")

@@ -21,7 +21,7 @@ def demo(*, output: Path = Path("tvist-demo"), seed: int = 0, json: bool = False
     with progress(count(1, baselines=False), "starting a robot") as bar, told(DemoError, OSError):
 
         def advance(what: str) -> None:
-            bar.update(0, advance=1, description=what)
+            bar(1, what)
 
         result = run_demo(output, seed, advance)
     if json:
@@ -31,7 +31,9 @@ def demo(*, output: Path = Path("tvist-demo"), seed: int = 0, json: bool = False
         out.print(result.verdict)
         for path in (result.recording, *result.figures):
             out.print(f"  {path}")
-        out.print("next: tvist serve, then tvist move Q2 in another terminal; or clients/examples/01_bare_client.py")
+        out.print(
+            "next: tvist serve, then tvist move Q2 in another terminal; or clients/examples/01_bare_client.py"
+        )
     if not result.equal:
         err.print(result.verdict)
         raise Failure("the recording and its replay do not agree")

@@ -2,6 +2,7 @@
 
 import asyncio
 import sys
+from contextlib import AsyncExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -48,7 +49,8 @@ def identify(
         raise Failure("configurations and repeats must be at least 1", code=2)
     from tvist_client.robot import Robot
     from tvist_lab.identification.fit import FitError
-    from tvist_lab.identification.identify import Plan, identify as run
+    from tvist_lab.identification.identify import Plan
+    from tvist_lab.identification.identify import identify as run
     from tvist_lab.in_process import free_setup, robot_in_process
     from tvist_plant.description import DescriptionError, load
     from tvist_protocol.calibration import calibration_to_json
@@ -56,21 +58,34 @@ def identify(
 
     with told(DescriptionError, ConfigError, code=2):
         description = load(robot if endpoint is None else "ur5e")
-        anchors = [_pose(text, description.poses, description.joints) for text in at or list(description.poses)]
+        anchors = [
+            _pose(text, description.poses, description.joints) for text in at or list(description.poses)
+        ]
         setup = None
         if endpoint is None:
-            content = {"robot": robot, "payload": payload, "calibration": "none", "clock": "free", "seed": seed, "truth": True}
+            content = {
+                "robot": robot,
+                "payload": payload,
+                "calibration": "none",
+                "clock": "free",
+                "seed": seed,
+                "truth": True,
+            }
             setup = free_setup(from_mapping(content, "options"))
     plan = Plan(configurations=configurations, anchors=tuple(anchors), repeats=repeats, seed=seed)
     command = " ".join(["tvist", *sys.argv[1:]])[:500]
 
     async def measure() -> "Identification":
-        connection = Robot.connect(endpoint, name=robot) if setup is None else robot_in_process(setup)
-        with progress(configurations + len(anchors), "ring-downs") as bar:
-            async with connection as client, client.control("identify") as arm:
+        async with AsyncExitStack() as stack:
+            if endpoint is not None:
+                client = await stack.enter_async_context(await Robot.connect(endpoint, name=robot))
+            elif setup is not None:
+                client = await stack.enter_async_context(robot_in_process(setup))
+            arm = await stack.enter_async_context(client.control("identify"))
+            with progress(configurations + len(anchors), "ring-downs") as bar:
                 return await run(
                     client, arm, plan, name=name or output.stem, command=command,
-                    progress=lambda done, _: bar.update(0, completed=done),
+                    progress=lambda: bar(1, None),
                 )  # fmt: skip
 
     with told(FitError, OSError):
@@ -80,7 +95,10 @@ def identify(
         from tvist_lab.figures import identified_figure, save
 
         figures.mkdir(parents=True, exist_ok=True)
-        err.print(str(save(identified_figure(done.calibration, done.q, done.f_d, done.zeta, done.true_f_d, done.true_zeta), figures / "identification.png")))
+        drawn = identified_figure(
+            done.calibration, done.q, done.f_d, done.zeta, done.true_f_d, done.true_zeta
+        )
+        err.print(str(save(drawn, figures / "identification.png")))
     _report(done, output, json=json)
 
 
@@ -92,7 +110,9 @@ def _pose(text: str, poses: dict[str, tuple[float, ...]], joints: int) -> tuple[
     except ValueError:
         angles = ()
     if len(angles) != joints:
-        raise Failure(f"at is {text!r}: must be one of {', '.join(poses)}, or {joints} angles with commas", code=2)
+        raise Failure(
+            f"at is {text!r}: must be one of {', '.join(poses)}, or {joints} angles with commas", code=2
+        )
     return angles
 
 
@@ -128,7 +148,11 @@ def _report(done: "Identification", output: Path, *, json: bool) -> None:
         ("against", "f_d median %", "p90 %", "ζ median %", "p90 %"),
         [
             _row("its own measurements", how.residual_f_d_percent, how.residual_zeta_percent),
-            _row("measurements it did not see", how.cross_validated_f_d_percent, how.cross_validated_zeta_percent),
+            _row(
+                "measurements it did not see",
+                how.cross_validated_f_d_percent,
+                how.cross_validated_zeta_percent,
+            ),
             *([_row(done.against, done.error_f_d, done.error_zeta)] if done.true_f_d is not None else []),
         ],
     )

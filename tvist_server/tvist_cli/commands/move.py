@@ -37,7 +37,9 @@ def move(
         q = poses[target] if target in poses else tuple(float(angle) for angle in target.split(","))
     except ValueError:
         known = ", ".join(poses)
-        raise Failure(f"target is {target!r}: must be one of {known}, or joint angles with commas", code=2) from None
+        raise Failure(
+            f"target is {target!r}: must be one of {known}, or joint angles with commas", code=2
+        ) from None
 
     async def run() -> tuple[int, int]:
         async with await Robot.connect(endpoint, name) as robot, robot.control("tvist move") as arm:

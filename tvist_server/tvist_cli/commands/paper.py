@@ -19,6 +19,7 @@ def paper(
     figures: Path | None = None,
     calibration: str = "ur5e_5kg",
     baselines: bool = True,
+    markdown: Path | None = None,
     json: bool = False,
 ) -> None:
     """Run the paper's three motions, unshaped and shaped, as fast as they compute; print its tables beside ours.
@@ -29,6 +30,7 @@ def paper(
         figures: Folder for figures 4, 7, 12, 13, 14 and 16.
         calibration: Calibration that comes with the package, or path of one.
         baselines: Run what the method has to be compared with, too.
+        markdown: File for a page with all tables and where each figure comes from.
         json: Print one JSON object.
     """
     if runs < 1:
@@ -45,10 +47,12 @@ def paper(
         with progress(count(runs, baselines=baselines), "motions") as bar:
 
             def advance(what: str) -> None:
-                bar.update(0, advance=1, description=what)
+                bar(1, what)
 
             async with robot_in_process(setup) as robot, robot.control("paper") as arm:
-                return await experiment(robot, arm, runs=runs, seed=seed, baselines=baselines, progress=advance)
+                return await experiment(
+                    robot, arm, runs=runs, seed=seed, baselines=baselines, progress=advance
+                )
 
     done = asyncio.run(run())
     if figures is not None:
@@ -57,6 +61,11 @@ def paper(
         for path in draw(done, figures, all_figures=True):
             err.print(str(path))
     result = as_dict(done)
+    if markdown is not None:
+        from tvist_lab.paper.markdown import page
+
+        command = f"tvist paper --runs {runs} --seed {seed} --markdown {markdown}"
+        markdown.write_text(page(result, command), encoding="utf-8")
     if json:
         print_json(result)
     else:

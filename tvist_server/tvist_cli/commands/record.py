@@ -6,7 +6,7 @@ import signal
 from pathlib import Path
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import err, print_json
+from tvist_cli.output import print_json, say
 
 
 def record(
@@ -42,7 +42,7 @@ def record(
                 robot.on_state(lambda state: ticks.append(state.tick))
                 robot.on_event(recorder.event)
                 robot.on_truth(recorder.truth)
-                err.print(f"recording {name} into {file}; Control+C ends it")
+                say(f"recording {name} into {file}; Control+C ends it")
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(ended.wait(), seconds)
             if recorder.error is not None:
@@ -57,4 +57,4 @@ def record(
     if json:
         print_json({"file": str(file), "states": states, "lost": lost})
     else:
-        err.print(f"{states} states recorded, {lost} lost")
+        say(f"{states} states recorded, {lost} lost")

@@ -5,7 +5,7 @@ import time
 from typing import Any
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import err
+from tvist_cli.output import say
 
 
 def serve(
@@ -50,30 +50,32 @@ def serve(
     from tvist_plant.plant import is_compiled
 
     if not is_compiled():
-        err.print("compiling the arm's equations, once: this takes some seconds")
+        say("compiling the arm's equations, once: this takes some seconds")
     from tvist_server.config import ConfigError, from_mapping, read_toml
-    from tvist_server.gateways.zenoh import GatewayError
+    from tvist_server.gateways.base import GatewayError
     from tvist_server.recording import RecordingError
     from tvist_server.server import Server
 
-    with told(ConfigError, GatewayError, RecordingError):
-        with told(ConfigError, code=2):
-            content = {} if config is None else read_toml(config)
-            content |= {key: value for key, value in given.items() if value is not None}
-            checked = from_mapping(content, "configuration" if config is None else f"configuration {config}")
-        server = Server(checked)
+    with told(ConfigError, code=2):
+        content = {} if config is None else read_toml(config)
+        content |= {key: value for key, value in given.items() if value is not None}
+        checked = from_mapping(content, "configuration" if config is None else f"configuration {config}")
+        with told(GatewayError, RecordingError):
+            server = Server(checked)
 
     def ready() -> None:
         took = time.monotonic() - began
         setup = server.controller.setup
-        err.print(
+        say(
             f"{setup.name} ({setup.description.robot.model}, {setup.payload.mass:g} kg, shaper {setup.shaper}) "
             f"listens on {', '.join(checked.listen)}, clock {setup.clock}; ready after {took:.1f} s. Control+C ends it."
         )
 
     asyncio.run(server.run(ready))
+    if server.failure is not None:
+        raise Failure(server.failure)
     if server.recorder is not None:
         if server.recorder.error is not None:
             raise Failure(server.recorder.error)
         note = f", {server.recorder.dropped} messages dropped" if server.recorder.dropped else ""
-        err.print(f"recorded into {checked.record}{note}")
+        say(f"recorded into {checked.record}{note}")

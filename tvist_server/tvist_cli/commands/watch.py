@@ -17,7 +17,11 @@ if TYPE_CHECKING:
 
 
 def watch(
-    endpoint: str = "tcp/127.0.0.1:7447", *, name: str = "ur5e", seconds: float | None = None, json: bool = False
+    endpoint: str = "tcp/127.0.0.1:7447",
+    *,
+    name: str = "ur5e",
+    seconds: float | None = None,
+    json: bool = False,
 ) -> None:
     """Show joints, tool accelerometer, estimates and events of a served robot until Control+C.
 
@@ -33,7 +37,8 @@ def watch(
         async with await Robot.connect(endpoint, name) as robot:
             events: list[Event] = []
             robot.on_event(events.append)
-            robot.on_event(print_json if json else lambda event: None)
+            if json:
+                robot.on_event(print_json)
             with contextlib.nullcontext() if json else Live(console=out, refresh_per_second=10) as live:
                 async for state in robot.states(buffer=1):
                     if live is not None:
@@ -58,10 +63,16 @@ def _screen(state: "State", events: "list[Event]") -> Group:
             f"{state.actual_moment[number]: .1f}",
         )
     x, y, z = state.actual_tool_accelerometer
-    estimates = ", ".join(f"{f:.2f} Hz ζ {d:.3f}" for f, d in zip(state.estimated_f_d, state.estimated_zeta, strict=True))
+    estimates = ", ".join(
+        f"{f:.2f} Hz ζ {d:.3f}" for f, d in zip(state.estimated_f_d, state.estimated_zeta, strict=True)
+    )
     return Group(
-        Text(f"tick {state.tick}   {state.timestamp:.3f} s   missed {state.missed_ticks}   estimated {estimates}"),
+        Text(
+            f"tick {state.tick}   {state.timestamp:.3f} s   missed {state.missed_ticks}   estimated {estimates}"
+        ),
         joints,
-        Text(f"tool accelerometer {x: .2f} {y: .2f} {z: .2f} m/s²   shaper delay {1e3 * state.shaper_delay:.1f} ms"),
+        Text(
+            f"tool accelerometer {x: .2f} {y: .2f} {z: .2f} m/s²   shaper delay {1e3 * state.shaper_delay:.1f} ms"
+        ),
         *(Text(f"tick {e.tick}: {e.kind} {e.id or ''} {e.why or ''}", style="dim") for e in events),
     )

@@ -6,7 +6,6 @@ from typing import Literal
 from tvist_protocol.codec import encode
 from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, State, Truth
-
 from tvist_server.controller import Controller
 from tvist_server.host import Host
 from tvist_server.setup import Setup
@@ -26,7 +25,7 @@ class LoopbackHost:
         self.entries: list[Entry] = []
         """What reached the controller: with the setup, all that a replay needs."""
         self._host = Host(self.controller, self)
-        self._callbacks: dict[Topic, list[Callable[[bytes], None]]] = {}
+        self._callbacks: dict[Topic, list[Callable[[bytes], object]]] = {}
 
     def request(self, client: str, data: bytes) -> bytes:  # noqa: ARG002  a network's door knows no client either
         """Carry out a command; its encoded reply."""
@@ -40,7 +39,7 @@ class LoopbackHost:
         """What the controller says of itself."""
         return self._host.info()
 
-    def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> Callable[[], None]:
+    def subscribe(self, topic: Topic, callback: Callable[[bytes], object]) -> Callable[[], None]:
         """Have every message of a topic; the function returned ends that."""
         callbacks = self._callbacks.setdefault(topic, [])
         callbacks.append(callback)

@@ -9,7 +9,9 @@ from tvist_server.trajectory.base import Floats, Limits
 class Limiter:
     """Follows a position signal exactly while that is within the limits; catches up time-optimally otherwise.
 
-    The jerk limit shapes the catching up; what keeps the limits of velocity and acceleration passes as it is.
+    Each joint by itself. A joint that is behind moves relative to the signal: to where that is, at the velocity
+    and acceleration it has there, so that a signal in motion is caught up with, too. The jerk limit shapes the
+    catching up; what keeps the limits of velocity and acceleration passes as it is.
 
     Args:
         q: Position at rest to start from, shape (n,) [rad].
@@ -19,64 +21,82 @@ class Limiter:
 
     TOLERANCE = 1e-6
     """Share of a limit that rounding may exceed [-]."""
+    ADVANTAGE = 0.01
+    """Share of the velocity limit by which one that is behind may always be faster than what it follows [-]."""
+    AUTHORITY = 0.1
+    """Share of the acceleration limit that is always left for catching up [-]."""
 
     def __init__(self, q: Floats, limits: Limits, period: float) -> None:
         n = len(q)
         self._limits, self._period = limits, period
         self.q, self.qd, self.qdd = np.array(q, dtype=float), np.zeros(n), np.zeros(n)
-        self._step = np.zeros(n)  # the last one, in position
+        self._step, self._signal_qd = np.zeros((2, n))  # displacement of the last tick; velocity of the signal
+        self._behind = np.zeros(n, dtype=bool)
         self._generator = ruckig.Ruckig(n, period)
         self._request, self._result = ruckig.InputParameter(n), ruckig.OutputParameter(n)
-        self._request.max_velocity = [limits.velocity] * n
-        self._request.max_acceleration = [limits.acceleration] * n
+        self._request.target_position = self._request.target_velocity = [0.0] * n
         self._request.max_jerk = [limits.jerk] * n
         self._request.synchronization = ruckig.Synchronization.No
-        self.limited = False
+
+    @property
+    def limited(self) -> bool:
+        """Whether the reference is not where the signal is."""
+        return bool(self._behind.any())
 
     def follow(self, q: Floats, qd: Floats) -> Floats:
         """One tick towards a position that itself moves.
 
         Args:
-            q: Where the stream is, shape (n,) [rad].
+            q: Where the signal is, shape (n,) [rad].
             qd: How fast it moves there, shape (n,) [rad/s].
 
         Returns:
-            Where the reference is, shape (n,) [rad]; `limited` tells whether that is not q.
+            Where the reference is, shape (n,) [rad].
         """
-        h = self._period
+        h, limits, room = self._period, self._limits, 1.0 + self.TOLERANCE
+        most = (1.0 - self.AUTHORITY) * limits.acceleration
+        signal_qdd = np.clip((qd - self._signal_qd) / h, -most, most)
+        self._signal_qd = qd
         step = q - self.q
         velocity, acceleration = step / h, (step - self._step) / (h * h)
-        room = 1.0 + self.TOLERANCE
-        self.limited = bool(
-            np.abs(velocity).max() > room * self._limits.velocity
-            or np.abs(acceleration).max() > room * self._limits.acceleration
-        )
-        if not self.limited:
-            # A motion continued from here has the second difference q̈ at its first tick.
-            self.q, self.qd, self.qdd = q, velocity + 0.5 * h * acceleration, acceleration
-            self._step = step
-            return q
-        before = self.q
-        try:
-            self._catch_up(q, qd)
-        except (ruckig.RuckigError, ValueError):  # it would take more than 7600 s
-            self._brake()
-        self._step = self.q - before
+        fits = (np.abs(velocity) <= room * limits.velocity) & (np.abs(acceleration) <= room * limits.acceleration)
+        # One that is behind must not jump at the signal with a velocity that it then cannot take back.
+        following = (qd - velocity) / h + 0.5 * signal_qdd
+        fits &= ~self._behind | (np.abs(following) <= limits.acceleration)
+        self._behind = ~fits
+        # A motion continued from this state has the second difference q̈ at its first tick.
+        passed = q, velocity + 0.5 * h * acceleration, acceleration
+        if self._behind.any():
+            try:
+                caught_up = self._catch_up(q, qd, signal_qdd)
+            except (ruckig.RuckigError, ValueError):  # it would take more than 7600 s
+                caught_up = self._brake()
+            passed = tuple(np.where(fits, here, there) for here, there in zip(passed, caught_up, strict=True))
+        self._step = passed[0] - self.q
+        self.q, self.qd, self.qdd = passed
         return self.q
 
-    def _catch_up(self, q: Floats, qd: Floats) -> None:
-        request, result = self._request, self._result
-        limits = self._limits
-        request.current_position = self.q.tolist()
-        request.current_velocity = self.qd.tolist()
-        request.current_acceleration = np.clip(self.qdd, -limits.acceleration, limits.acceleration).tolist()
-        request.target_position = q.tolist()
-        request.target_velocity = np.clip(qd, -limits.velocity, limits.velocity).tolist()
+    def _catch_up(self, q: Floats, qd: Floats, qdd: Floats) -> tuple[Floats, Floats, Floats]:
+        """State after a tick of the time-optimal way onto a signal that goes on with this acceleration."""
+        request, result, limits, h = self._request, self._result, self._limits, self._period
+        fastest = (1.0 - self.ADVANTAGE) * limits.velocity
+        qd = np.clip(qd, -fastest, fastest)
+        request.current_position = (self.q - (q - h * (qd - 0.5 * h * qdd))).tolist()
+        request.current_velocity = (self.qd - (qd - h * qdd)).tolist()
+        present = np.clip(self.qdd, -limits.acceleration, limits.acceleration)
+        request.current_acceleration = (present - qdd).tolist()
+        request.max_velocity = (limits.velocity - qd).tolist()
+        request.min_velocity = (-limits.velocity - qd).tolist()
+        request.max_acceleration = (limits.acceleration - qdd).tolist()
+        request.min_acceleration = (-limits.acceleration - qdd).tolist()
         self._generator.update(request, result)
-        self.q, self.qd = np.array(result.new_position), np.array(result.new_velocity)
-        self.qdd = np.array(result.new_acceleration)
+        return (
+            q + np.array(result.new_position),
+            qd + np.array(result.new_velocity),
+            qdd + np.array(result.new_acceleration),
+        )
 
-    def _brake(self) -> None:
+    def _brake(self) -> tuple[Floats, Floats, Floats]:
         h, limit = self._period, self._limits.acceleration
-        self.qdd = np.clip(-self.qd / h, -limit, limit)
-        self.q, self.qd = self.q + h * (self.qd + 0.5 * h * self.qdd), self.qd + h * self.qdd
+        qdd = np.clip(-self.qd / h, -limit, limit)
+        return self.q + h * (self.qd + 0.5 * h * qdd), self.qd + h * qdd, qdd

@@ -50,6 +50,11 @@ class Stop(Trajectory):
         return self.at(self._ticks * self._period)[0]
 
     @property
+    def velocity(self) -> Floats:
+        """At the last reference, shape (n,) [rad/s]."""
+        return self.at(self._ticks * self._period)[1]
+
+    @property
     def finished(self) -> bool:
         """Whether every joint rests."""
         return self._ticks * self._period >= self.duration

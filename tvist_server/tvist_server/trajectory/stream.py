@@ -8,7 +8,7 @@ from tvist_server.trajectory.base import Floats, Limits, Trajectory
 from tvist_server.trajectory.limiter import Limiter
 from tvist_server.trajectory.stop import Stop
 
-LONGEST_RAMP = 0.1
+LONGEST_RAMP = 0.02
 """Longest time that taking back an acceleration may last, whatever the jerk limit: the arm moves on [s]."""
 
 
@@ -38,8 +38,8 @@ class SetpointStream(Trajectory):
         self._limiter = Limiter(self._rest, self.limits, period)
         self._waiting: dict[int, Floats] = {}
         self._nodes: list[_Node] = []
-        # Play-out position in sequence numbers: an exact origin and a small offset.
-        self._origin, self._offset = 0, 0.0
+        # Play-out position in sequence numbers: an exact origin, a lead and ticks since.
+        self._origin, self._lead, self._ticks = 0, 0.0, 0
         self._pause: Stop | None = None
         self.sequence: int | None = None
         """Newest set-point that reached the reference."""
@@ -55,7 +55,7 @@ class SetpointStream(Trajectory):
 
     def offer(self, sequence: int, q: Floats) -> bool:
         """Take a set-point; False where it comes too late to be played, or the room to wait is full."""
-        known = self.sequence is not None and sequence <= self.sequence
+        known = bool(self._nodes) and sequence <= self._nodes[-1].sequence
         if known or sequence in self._waiting or len(self._waiting) >= self.MAX_WAITING:
             self.late += 1
             return False
@@ -65,7 +65,7 @@ class SetpointStream(Trajectory):
     def next(self) -> Floats:
         """Reference of the next tick."""
         if self._nodes:
-            self._offset += self._stride
+            self._ticks += 1
         elif self._waiting:
             first = min(self._waiting)
             self._play_from(first)
@@ -89,9 +89,14 @@ class SetpointStream(Trajectory):
         """Position, velocity and acceleration of the reference, each of shape (n,)."""
         return self._limiter.q, self._limiter.qd, self._limiter.qdd
 
+    @property
+    def _offset(self) -> float:
+        """Play-out position less origin; rounded, so that it meets whole numbers where it should."""
+        return round(self._lead + self._ticks * self._stride, 9)
+
     def _play_from(self, sequence: int) -> None:
         """Put the play-out position where a set-point that has just come belongs."""
-        self._origin, self._offset = sequence, 0.0 if self._direct else -1.0
+        self._origin, self._lead, self._ticks = sequence, 0.0 if self._direct else -1.0, 0
 
     def _admit(self) -> None:
         """Move set-points whose time has come from waiting to nodes."""
@@ -132,7 +137,7 @@ class SetpointStream(Trajectory):
             self._pause = Stop(
                 *self.state, acceleration=limits.acceleration, jerk=limits.jerk, period=self._period
             )
-        return self._pause.next(), np.zeros_like(self._rest)
+        return self._pause.next(), self._pause.velocity * self._stream_period
 
 
 @dataclass(frozen=True)

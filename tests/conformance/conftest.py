@@ -1,0 +1,34 @@
+"""Served robots, and sessions with them that know nothing of our packages."""
+
+import pytest
+
+from .served import Served
+from .wire import Wire
+
+
+@pytest.fixture(scope="module")
+def realtime():
+    """A robot in real time that tells no truth."""
+    with Served() as served:
+        yield served
+
+
+@pytest.fixture(scope="module")
+def lockstep():
+    """A robot whose time a client steps, and that tells the truth."""
+    with Served("--clock", "lockstep", "--truth") as served:
+        yield served
+
+
+@pytest.fixture
+def live(realtime):
+    """A session with the robot in real time."""
+    with Wire(realtime.endpoint) as wire:
+        yield wire
+
+
+@pytest.fixture
+def stepped(lockstep):
+    """A session with the robot in lockstep."""
+    with Wire(lockstep.endpoint) as wire:
+        yield wire

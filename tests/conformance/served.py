@@ -1,0 +1,108 @@
+"""`tvist serve`, as a user starts it: a process, a free port, and what it says on stderr."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+
+PATIENCE = 60.0
+"""How long a robot may take to listen [s]: the very first start compiles the arm's equations."""
+NOISE = ("Traceback", "leaked", "nanobind", "Exception ignored", "Fatal Python error", "panicked")
+"""What no process says that ended well."""
+
+
+def free_endpoint():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+class Served:
+    """A robot in a process of its own."""
+
+    def __init__(self, *options, name="ur5e", endpoint=None):
+        self.name, self.endpoint = name, endpoint or free_endpoint()
+        self.lines = []
+        self.began = time.monotonic()
+        self._news = threading.Condition()
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "tvist_cli", "serve", "--listen", self.endpoint, "--name", name, *options],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        )
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def wait_until_ready(self):
+        """Wait until it says that it listens; how long that took [s]."""
+
+        def said():
+            return any("listens on" in line for line in self.lines) or not self._reader.is_alive()
+
+        with self._news:
+            listens = self._news.wait_for(said, PATIENCE) and "listens on" in self.said
+        if not listens:
+            self.kill()
+            raise AssertionError(f"tvist serve did not come up: {self.said}")
+        return time.monotonic() - self.began
+
+    @property
+    def said(self):
+        return "".join(self.lines)
+
+    def end(self, number=signal.SIGTERM):
+        """Send a signal and wait for the end; exit code, and how long it took [s]."""
+        sent = time.monotonic()
+        self.process.send_signal(number)
+        code = self.process.wait(PATIENCE)
+        took = time.monotonic() - sent
+        self._reader.join(PATIENCE)
+        return code, took
+
+    def wait(self):
+        """Wait for it to end by itself; the exit code."""
+        code = self.process.wait(PATIENCE)
+        self._reader.join(PATIENCE)
+        return code
+
+    def kill(self):
+        """Make sure that it is gone, and its pipe closed."""
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait(PATIENCE)
+        self._reader.join(PATIENCE)
+        self.process.stderr.close()
+
+    def assert_quiet(self):
+        """Nothing on stderr that looks like an error nobody foresaw."""
+        assert not [word for word in NOISE if word in self.said], self.said
+
+    def __enter__(self):
+        try:
+            self.wait_until_ready()
+        except BaseException:
+            self.kill()
+            raise
+        return self
+
+    def __exit__(self, *error):
+        try:
+            if self.process.poll() is None:
+                code, _ = self.end()
+                assert code == 0, self.said
+            self.assert_quiet()
+        finally:
+            self.kill()
+
+    def _read(self):
+        for line in self.process.stderr:
+            with self._news:
+                self.lines.append(line)
+                self._news.notify_all()
+        with self._news:
+            self._news.notify_all()

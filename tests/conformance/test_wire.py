@@ -1,0 +1,218 @@
+"""The contract over the wire, seen by a client that has only eclipse-zenoh and msgpack."""
+
+import json
+import time
+from pathlib import Path
+
+import jsonschema
+import msgpack
+import pytest
+
+from .wire import PLAYING, Q1, STATE_FIELDS, STOPPED, TICK, Wire
+
+Q_NEAR = [angle + 0.1 for angle in Q1]
+SCHEMAS = Path(__file__).parents[2] / "protocol" / "schemas"
+
+
+def validate(message):
+    schema = json.loads((SCHEMAS / f"{message['type']}.json").read_text(encoding="utf-8"))
+    jsonschema.validate(message, schema)
+    undocumented = set(message) - set(schema["properties"])
+    assert not undocumented, f"{message['type']} has fields that no schema names: {undocumented}"
+
+
+def ticks_of(messages):
+    return [message["tick"] for message in messages]
+
+
+class TestStates:
+    def test_in_real_time_every_tick_comes_once_and_in_order_with_its_timestamp(self, live):
+        live.listen("state")
+        first = live.wait("state")
+        last = live.until(first["tick"] + 500)
+        states = list(live.received["state"])[: 1 + last["tick"] - first["tick"]]
+        assert ticks_of(states) == list(range(first["tick"], last["tick"] + 1))
+        assert all(state["timestamp"] == state["tick"] * TICK for state in states)
+
+    def test_in_lockstep_come_exactly_the_ticks_asked_for(self, stepped):
+        stepped.listen("state", "truth")
+        with stepped.control() as token:
+            before = stepped.step(token, 1)["tick"]
+            after = stepped.step(token, 250)["tick"]
+            stepped.wait("truth", lambda truth: truth["tick"] == after)
+        assert after == before + 250
+        for topic in ("state", "truth"):
+            ticks = [tick for tick in ticks_of(stepped.received[topic]) if tick >= before]
+            assert list(dict.fromkeys(ticks)) == list(range(before, after + 1)), topic
+        assert all(state["timestamp"] == state["tick"] * TICK for state in stepped.received["state"])
+
+    def test_a_state_has_the_fields_of_the_interface_and_no_other(self, live):
+        state = live.state()
+        assert set(state) == STATE_FIELDS
+        joints = (name for name in STATE_FIELDS if name.endswith(("_q", "_qd", "_qdd", "_moment")))
+        assert all(len(state[name]) == 6 for name in joints)
+
+    def test_at_rest_the_accelerometer_feels_gravity_and_the_modes_are_normal(self, live):
+        state = live.state()
+        assert sum(a * a for a in state["actual_tool_accelerometer"]) ** 0.5 == pytest.approx(9.81, abs=0.3)
+        assert (state["robot_mode"], state["safety_mode"], state["runtime_state"]) == (7, 1, STOPPED)
+        assert state["setpoint_sequence"] is None
+
+    def test_a_late_subscriber_in_lockstep_gets_the_last_state_within_about_a_second(self, lockstep, stepped):
+        with stepped.control() as token:
+            last = stepped.step(token, 3)
+            with Wire(lockstep.endpoint) as late:
+                began = time.monotonic()
+                late.listen("state")
+                assert late.wait("state", timeout=3.0) == last
+                assert time.monotonic() - began < 1.5
+
+
+class TestMotion:
+    def test_events_come_as_started_then_done_and_the_arm_is_there(self, live):
+        live.listen("state", "event")
+        with live.control() as token:
+            answer = live.command("move_j", token=token, q=Q_NEAR)
+            assert answer["type"] == "accepted"
+            done = live.wait("event", lambda event: event["kind"] == "motion_done")
+            still = live.until(done["tick"])
+        events = [event for event in live.received["event"] if event.get("id") == answer["id"]]
+        assert [event["kind"] for event in events] == ["motion_started", "motion_done"]
+        assert events[0]["tick"] < events[1]["tick"]
+        assert still["target_q"] == pytest.approx(Q_NEAR, abs=1e-6)
+        moving = [s for s in live.received["state"] if events[0]["tick"] < s["tick"] < done["tick"]]
+        assert {state["runtime_state"] for state in moving} == {PLAYING}
+        assert still["runtime_state"] == STOPPED
+
+    def test_a_stop_without_a_token_ends_the_motion_in_one_motion_stopped(self, live):
+        live.listen("state", "event")
+        with live.control() as token:
+            answer = live.command("move_j", token=token, q=[1.0, *Q1[1:]])
+            live.wait("state", lambda state: state["target_qd"][0] > 0.3)
+            assert live.command("stop") == {"type": "done"}
+            live.wait("event", lambda event: event["kind"] == "motion_stopped" and event["id"] == answer["id"])
+            rest = live.next("state", lambda state: state["runtime_state"] == STOPPED)
+        assert 0.0 < rest["target_q"][0] < 0.9
+        ends = [e for e in live.received["event"] if e.get("id") == answer["id"] and e["kind"] != "motion_started"]
+        assert len(ends) == 1
+
+    def test_a_stream_is_played_and_its_sequence_is_told(self, stepped):
+        with stepped.control() as token:
+            assert stepped.command("servo_start", token=token) == {"type": "done"}
+            setpoints = [{"sequence": n, "q": [Q1[0] + 1e-5 * n, *Q1[1:]]} for n in range(100)]
+            state = stepped.step(token, 100, setpoints=setpoints)
+            assert state["setpoint_sequence"] == 99
+            assert state["reference_q"][0] == pytest.approx(99e-5, abs=1e-9)
+            assert stepped.command("servo_stop", token=token) == {"type": "done"}
+
+
+class TestControl:
+    def test_one_client_holds_control_and_its_name_is_told_to_another(self, live):
+        with live.control("first") as token:
+            assert live.info()["control"] == "first"
+            refused = live.command("take_control", client="second")
+            assert (refused["type"], refused["code"]) == ("refused", "no_control")
+            assert "first" in refused["why"]
+            assert live.command("keep_alive", token=token) == {"type": "done"}
+        assert live.info()["control"] is None
+
+    def test_the_lease_granted_is_told(self, live):
+        answer = live.command("take_control", client="short", lease_s=12.5)
+        assert answer.keys() == {"type", "token", "lease_s"}
+        assert answer["lease_s"] == 12.5
+        assert isinstance(answer["token"], str)
+        assert live.command("release_control", token=answer["token"]) == {"type": "done"}
+
+    def test_a_refusal_is_a_reply_with_code_where_why_and_limit(self, live):
+        refused = live.command("move_j", token="", q=Q1)  # `raw` asserts that it is no reply_err
+        assert refused.keys() == {"type", "code", "where", "why", "limit"}
+        assert (refused["type"], refused["code"], refused["where"]) == ("refused", "no_control", "token")
+
+    def test_time_can_be_stepped_only_where_it_does_not_pass_by_itself(self, live):
+        with live.control() as token:
+            refused = live.command("simulation.step", token=token, ticks=1)
+        assert (refused["type"], refused["code"]) == ("refused", "wrong_mode")
+
+    def test_a_reset_puts_the_arm_there_at_rest_and_keeps_lease_and_tick(self, stepped):
+        with stepped.control() as token:
+            before = stepped.step(token, 5)["tick"]
+            answer = stepped.command("simulation.reset", token=token, q=Q_NEAR, seed=7)
+            assert answer == {"type": "done", "tick": before}
+            state = stepped.step(token, 1)
+        assert state["tick"] == before + 1
+        assert state["target_q"] == Q_NEAR
+        assert state["target_qd"] == [0.0] * 6
+
+
+class TestWhatIsSaid:
+    def test_every_kind_of_message_agrees_with_its_schema(self, stepped):
+        stepped.listen("state", "event", "truth", "telemetry")
+        with stepped.control() as token:
+            said = [stepped.info(), stepped.command("keep_alive", token="stale")]
+            said.append(stepped.command("move_j", token=token, q=Q_NEAR))
+            stepped.step(token, 100)
+            said.append(stepped.command("stop"))
+            stepped.step(token, 200)
+            said.append(stepped.command("set_shaper", token=token, name="zvd"))
+            stepped.step(token, 1)
+            stepped.wait("telemetry")
+        for messages in stepped.received.values():
+            said += messages
+        kinds = {message["type"] for message in said}
+        assert kinds == {"info", "refused", "accepted", "done", "state", "event", "truth", "telemetry"}
+        for message in {json.dumps(message): message for message in said}.values():
+            validate(message)
+
+    def test_info_says_protocol_model_joints_limits_rate_and_how_it_is_set_up(self, live):
+        info = live.info()
+        assert (info["name"], info["protocol"], info["model"], info["clock"]) == ("ur5e", 1, "UR5e", "realtime")
+        assert info["rate_hz"] == 500.0
+        assert len(info["joints"]) == len(info["limits"]["position"]) == 6
+        assert info["payload"]["mass"] == 5.0
+        assert info["calibration"]["fits_payload"] is True
+        assert (info["shaper"], info["estimator"]) == ("zv", "polynomial")
+        assert {"none", "zv", "zvd", "ei", "mzv", "ei2", "ei3"} <= set(info["shapers"])
+
+    def test_telemetry_comes_once_a_second_and_tells_five_hundred_ticks_in_it(self, live):
+        live.listen("telemetry")
+        live.wait("telemetry")
+        first, second = live.next("telemetry"), live.next("telemetry")
+        assert 450 <= second["tick"] - first["tick"] <= 600
+        assert second["ticks_per_second"] == pytest.approx(500.0, rel=0.1)
+
+    def test_truth_is_told_only_where_the_server_was_asked_to(self, live, stepped):
+        live.listen("state", "truth")
+        live.until(live.wait("state")["tick"] + 100)
+        assert live.received["truth"] == []
+        stepped.listen("truth")
+        with stepped.control() as token:
+            tick = stepped.step(token, 2)["tick"]
+        truth = stepped.wait("truth", lambda truth: truth["tick"] == tick)
+        assert truth["timestamp"] == tick * TICK
+        assert truth["f_d"][0] == pytest.approx(6.7, rel=0.05)
+
+    def test_the_server_declares_its_liveliness(self, live):
+        keys = [str(reply.ok.key_expr) for reply in live.session.liveliness().get("tvist/*/alive", timeout=5.0)]
+        assert keys == ["tvist/ur5e/alive"]
+
+
+def test_a_message_may_come_on_no_key_but_its_own(live):
+    with live.control() as token:
+        setpoint = msgpack.packb({"type": "setpoint", "token": token, "sequence": 0, "q": Q1})
+        refused = live.raw(setpoint)
+        assert (refused["code"], refused["where"]) == ("unknown_type", "type")
+
+
+def test_two_robots_on_one_machine_do_not_hear_each_other(stepped, live):
+    with stepped.control("same") as first, live.control("same"):
+        tick = stepped.step(first, 1)["tick"]
+        live.state()
+        assert stepped.info()["tick"] == tick
+
+
+def test_a_client_that_reconnects_under_its_own_name_gets_a_new_lease_and_the_old_one_is_stale(realtime, live):
+    old = live.command("take_control", client="again")["token"]
+    with Wire(realtime.endpoint) as other, other.control("again") as new:
+        assert new != old
+        refused = live.command("keep_alive", token=old)
+        assert (refused["type"], refused["code"]) == ("refused", "stale_token")

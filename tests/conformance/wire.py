@@ -1,0 +1,158 @@
+"""A client of the wire alone, as somebody would write it who has read only INTERFACE: eclipse-zenoh and msgpack."""
+
+import json
+import threading
+from contextlib import contextmanager
+
+import msgpack
+import zenoh
+from zenoh.handlers import Callback
+
+PATIENCE = 15.0
+"""How long to wait for what must come [s]; the machine may be busy."""
+TICK = 0.002
+STATE_FIELDS = {
+    "type", "tick", "timestamp", "robot_mode", "safety_mode", "runtime_state", "setpoint_sequence", "reference_q",
+    "target_q", "target_qd", "target_qdd", "target_moment", "actual_q", "actual_qd", "actual_moment",
+    "actual_TCP_pose", "actual_TCP_speed", "actual_tool_accelerometer", "speed_scaling", "estimated_f_d",
+    "estimated_zeta", "shaper_delay", "missed_ticks",
+}  # fmt: skip
+Q1 = [0.0, -2.4540, 2.3080, -1.4249, -1.5708, 0.0]
+STOPPED, PLAYING = 1, 2
+
+
+class Wire:
+    """A Zenoh session with one robot. Keeps every message of the topics it listens to."""
+
+    def __init__(self, endpoint, robot="ur5e"):
+        config = zenoh.Config()
+        for path, value in {
+            "mode": "client",
+            "connect/endpoints": [endpoint],
+            "scouting/multicast/enabled": False,
+        }.items():
+            config.insert_json5(path, json.dumps(value))
+        self.robot = robot
+        self.received = {}
+        self._news = threading.Condition()
+        self._declared = []
+        self.session = zenoh.open(config)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.session.close()
+
+    def key(self, leaf):
+        return f"tvist/{self.robot}/{leaf}"
+
+    # ---------------------------------------------------------------- what the robot puts
+
+    def listen(self, *topics):
+        for topic in topics:
+            if topic in self.received:
+                continue
+            messages = self.received[topic] = []
+
+            def take(sample, messages=messages):
+                assert str(sample.encoding) == "application/msgpack"
+                message = msgpack.unpackb(sample.payload.to_bytes())
+                with self._news:
+                    messages.append(message)
+                    self._news.notify_all()
+
+            self._declared.append(
+                self.session.declare_subscriber(self.key(topic), Callback(take, indirect=False))
+            )
+        return self
+
+    def wait(self, topic, wanted=lambda message: True, *, since=0, timeout=PATIENCE):
+        """The first message from number `since` on that is wanted; it may have come already."""
+        messages, looked = self.received[topic], since
+        found = None
+
+        def there():
+            nonlocal looked, found
+            while looked < len(messages):
+                message = messages[looked]
+                looked += 1
+                if wanted(message):
+                    found = message
+                    return True
+            return False
+
+        with self._news:
+            if not self._news.wait_for(there, timeout):
+                raise AssertionError(
+                    f"no such {topic} within {timeout} s; {len(messages)} came, the last {messages[-1:]}"
+                )
+        return found
+
+    def next(self, topic, wanted=lambda message: True, **options):
+        """The first message to come from now on that is wanted."""
+        return self.wait(topic, wanted, since=len(self.received[topic]), **options)
+
+    def state(self):
+        """The next state."""
+        self.listen("state")
+        return self.next("state")
+
+    def until(self, tick):
+        """The state of a tick, or the first after it."""
+        return self.wait("state", lambda state: state["tick"] >= tick)
+
+    # ---------------------------------------------------------------- what a client sends
+
+    def ask(self, key, payload=None, timeout=PATIENCE):
+        """Every reply to a query, decoded; each must be `reply`, in MessagePack."""
+        answers = []
+        for reply in self.session.get(key, payload=payload, timeout=timeout):
+            assert reply.ok is not None, f"answered by reply_err: {reply.err.payload.to_bytes()!r}"
+            assert str(reply.ok.encoding) == "application/msgpack"
+            answers.append(msgpack.unpackb(reply.ok.payload.to_bytes()))
+        return answers
+
+    def raw(self, payload):
+        """The one answer to bytes on the command key."""
+        (answer,) = self.ask(self.key("command"), payload)
+        return answer
+
+    def command(self, type, **fields):  # noqa: A002  the wire's name
+        """The one answer to a command."""
+        return self.raw(msgpack.packb({"type": type, **fields}))
+
+    def info(self):
+        (answer,) = self.ask(self.key("info"))
+        return answer
+
+    def put(self, payload, leaf="setpoint"):
+        self.session.put(self.key(leaf), payload)
+
+    def setpoint(self, **fields):
+        self.put(msgpack.packb({"type": "setpoint", **fields}))
+
+    def announce(self, client):
+        """The optional liveliness token of a client."""
+        self._declared.append(self.session.liveliness().declare_token(self.key(f"client/{client}")))
+
+    # ---------------------------------------------------------------- control
+
+    @contextmanager
+    def control(self, client="wire", **fields):
+        """Hold control; the token. Whatever moves at the end is stopped."""
+        answer = self.command("take_control", client=client, **fields)
+        assert answer["type"] == "accepted", answer
+        token = answer["token"]
+        try:
+            yield token
+        finally:
+            self.command("simulation.reset", token=token, q=Q1, seed=0, shaper="zv")
+            self.command("release_control", token=token)
+
+    def step(self, token, ticks, **fields):
+        """Let ticks pass in lockstep; the last one's state."""
+        self.listen("state")
+        answer = self.command("simulation.step", token=token, ticks=ticks, **fields)
+        assert answer["type"] == "done", answer
+        return self.until(answer["tick"])

@@ -1,0 +1,248 @@
+"""Differentiator, inverse dynamics, joint controllers and kinematics, each against another way."""
+
+import msgspec
+import numpy as np
+import pytest
+
+from tvist_plant.description import Payload
+from tvist_server.control.differentiator import Differentiator, Target
+from tvist_server.control.inverse_dynamics import InverseDynamics
+from tvist_server.control.joint_controllers import JointControllers
+from tvist_server.control.kinematics import ForwardKinematics, rotation_vector
+from tvist_server.setup import body, paper_payload
+
+from .robots import Q1, Q2, Q3, UR5E, H, cut
+
+# ---------------------------------------------------------------- differentiator
+
+
+def parabola(tick):
+    """1.1 - 0.7 t + 1.3 t² and another joint."""
+    time = H * tick
+    return np.array([1.1 - 0.7 * time + 1.3 * time**2, -2.0 + 0.5 * time])
+
+
+def test_on_a_parabola_position_velocity_and_acceleration_are_those_of_the_tick_before():
+    differentiator = Differentiator(parabola(-2), H)
+    for tick in range(-1, 50):
+        target = differentiator.update(parabola(tick))
+    time = H * 48
+    assert (target.q == parabola(48)).all()
+    assert target.qd == pytest.approx([-0.7 + 2.6 * time, 0.5], abs=1e-12)
+    assert target.qdd == pytest.approx([2.6, 0.0], abs=1e-9)
+
+
+def test_the_newest_state_goes_on_with_the_same_second_difference():
+    differentiator = Differentiator(parabola(-2), H)
+    for tick in range(-1, 50):
+        differentiator.update(parabola(tick))
+    newest = differentiator.newest
+    assert (newest.q == parabola(49)).all()
+    following = newest.q + H * newest.qd + 0.5 * H**2 * newest.qdd
+    assert differentiator.update(following).qdd == pytest.approx(newest.qdd, abs=1e-9)
+    assert following == pytest.approx(parabola(50), abs=1e-14)
+
+
+def test_on_a_parabola_the_newest_state_is_its_own():
+    differentiator = Differentiator(parabola(0), H)
+    for tick in range(1, 5):
+        differentiator.update(parabola(tick))
+    assert differentiator.newest.qd == pytest.approx([-0.7 + 2.6 * 4 * H, 0.5], abs=1e-12)
+
+
+def test_at_rest_it_is_zero_to_the_bit():
+    differentiator = Differentiator(Q3, H)
+    for _ in range(5):
+        target = differentiator.update(Q3.copy())
+    for state in (target, differentiator.newest):
+        assert (state.q == Q3).all()
+        assert not state.qd.any()
+        assert not state.qdd.any()
+
+
+# ---------------------------------------------------------------- an arm by the textbook
+
+
+def frames(description, q):
+    """Frames of base and links by products of Denavit-Hartenberg matrices."""
+    kinematics, pose = description.kinematics, np.eye(4)
+    out = [pose]
+    for theta, a, d, alpha in zip(q, kinematics.a, kinematics.d, kinematics.alpha, strict=True):
+        ct, st, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+        link = [[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st], [0, sa, ca, d], [0, 0, 0, 1]]
+        pose = pose @ np.array(link)
+        out.append(pose)
+    return out
+
+
+def tensor(values):
+    xx, xy, xz, yy, yz, zz = values
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def bodies(description, payload):
+    """Number of the link, mass, centre of mass and inertia of everything that moves."""
+    links = description.links
+    yield from zip(range(1, description.joints + 1), links.mass, links.com, links.inertia, strict=True)
+    yield description.joints, payload.mass, payload.com, payload.inertia
+
+
+def mass_matrix_and_gravity(description, payload, q):
+    """M = Σ m Jᵥᵀ Jᵥ + J_ωᵀ R I Rᵀ J_ω and g = Σ m Jᵥᵀ (0, 0, 9.81) with geometric Jacobians."""
+    poses, n = frames(description, q), description.joints
+    M, g = np.zeros((n, n)), np.zeros(n)
+    for link, mass, com, inertia in bodies(description, payload):
+        R = poses[link][:3, :3]
+        centre = poses[link][:3, 3] + R @ np.array(com)
+        J_v, J_w = np.zeros((2, 3, n))
+        for joint in range(link):
+            axis, origin = poses[joint][:3, 2], poses[joint][:3, 3]
+            J_v[:, joint], J_w[:, joint] = np.cross(axis, centre - origin), axis
+        M += mass * J_v.T @ J_v + J_w.T @ R @ tensor(inertia) @ R.T @ J_w
+        g += mass * J_v.T @ [0.0, 0.0, 9.81]
+    return M, g
+
+
+def lagrange(description, payload, q, qd, qdd):
+    """τ = M q̈ + Ṁ q̇ - ∂(½ q̇ᵀM q̇)/∂q + g, derivatives of M by central differences."""
+    M, g = mass_matrix_and_gravity(description, payload, q)
+    step = 1e-5
+
+    def slope(direction):
+        more = mass_matrix_and_gravity(description, payload, q + step * direction)[0]
+        less = mass_matrix_and_gravity(description, payload, q - step * direction)[0]
+        return (more - less) / (2 * step)
+
+    gradient = np.array([0.5 * qd @ slope(axis) @ qd for axis in np.eye(len(q))])
+    return M @ qdd + slope(qd) @ qd - gradient + g
+
+
+@pytest.mark.parametrize("joints", [1, 2, 5, 6])
+def test_torques_are_those_of_lagrange(joints):
+    description = cut(joints)
+    payload = Payload(mass=3.0, com=(0.05, -0.02, 0.08), inertia=(0.01, 0.001, 0.0, 0.012, 0.0, 0.008))
+    dynamics, random = InverseDynamics(description, payload), np.random.default_rng(joints)
+    for _ in range(10):
+        q, qd, qdd = random.uniform(-3, 3, (3, joints))
+        expected = lagrange(description, payload, q, qd, qdd)
+        assert dynamics.torque(q, qd, qdd) == pytest.approx(expected, abs=2e-7)
+        assert dynamics.gravity(q) == pytest.approx(mass_matrix_and_gravity(description, payload, q)[1], abs=1e-10)
+
+
+def test_torques_are_the_callers_own():
+    dynamics = InverseDynamics(UR5E, UR5E.payload)
+    first = dynamics.torque(Q1, Q2, Q3)
+    kept = first.copy()
+    dynamics.torque(Q3, Q1, Q2)
+    assert (first == kept).all()
+
+
+# ---------------------------------------------------------------- joint controllers
+
+
+def commanded(description, *targets):
+    """Last of several drive commands, with torque and gravity as inverse dynamics gives them."""
+    dynamics = InverseDynamics(description, body(paper_payload(description)))
+    controllers = JointControllers(description, H)
+    for target in targets:
+        torque, gravity = dynamics.torque(target.q, target.qd, target.qdd), dynamics.gravity(target.q)
+        command = controllers.command(target, torque, gravity)
+    return command, torque, gravity
+
+
+def test_the_feed_forward_has_rotor_inertia_and_a_share_of_coulomb_friction():
+    drives = UR5E.drives
+    target = Target(Q1, np.array([0.5, -0.5, 0.01, 0.0, 1.0, -0.02]), np.array([1.0, -2.0, 0.0, 3.0, 0.5, 0.1]))
+    command, torque, _ = commanded(UR5E, target)
+    rotors = np.array(drives.rotor_inertia) * target.qdd
+    friction = 0.8 * np.array(drives.coulomb_friction) * np.tanh(target.qd / 0.02)
+    assert command.torque == pytest.approx(torque + rotors + friction, rel=1e-14)
+
+
+def test_where_friction_is_linear_all_of_it_is_fed_forward():
+    clean = UR5E.clean()
+    target = Target(Q1, np.full(6, 0.3), np.zeros(6))
+    command, torque, _ = commanded(clean, target)
+    viscous = np.array(clean.drives.coulomb_friction) / clean.drives.friction_width
+    assert command.torque == pytest.approx(torque + 0.3 * viscous, rel=1e-14)
+
+
+def test_the_motor_leads_by_a_share_of_the_gears_wind_up_and_gravitys_own_is_left():
+    drives, still = UR5E.drives, np.zeros(6)
+    moving = Target(Q1 + 0.1, still, np.array([1.0, -2.0, 0.5, 0.0, 0.0, 2.0]))
+    command, torque, gravity = commanded(UR5E, Target(Q1, still, still), moving)
+    lead = np.array(drives.windup_feedforward) * (torque - gravity) / np.array(drives.gear_stiffness)
+    assert command.q == pytest.approx(moving.q + lead, abs=1e-15)
+    assert command.qd == pytest.approx(lead / H, abs=1e-12)
+    assert np.abs(lead).max() > 1e-5
+
+
+def test_at_rest_the_command_is_the_position_and_gravity():
+    still = np.zeros(6)
+    command, _, gravity = commanded(UR5E, Target(Q3, still, still))
+    assert command.q == pytest.approx(Q3, abs=1e-15)
+    assert command.qd == pytest.approx(still, abs=1e-12)
+    assert command.torque == pytest.approx(gravity, abs=1e-12)
+
+
+def test_a_reset_forgets_the_wind_up():
+    controllers, still = JointControllers(UR5E, H), np.zeros(6)
+    controllers.command(Target(Q1, still, still), np.full(6, 50.0), still)
+    controllers.reset()
+    assert not controllers.command(Target(Q1, still, still), still, still).qd.any()
+
+
+# ---------------------------------------------------------------- kinematics
+
+
+def rodrigues(vector):
+    angle = np.linalg.norm(vector)
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = vector / angle
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+
+
+POSTURES = [Q1, Q2, Q3, np.zeros(6), *np.random.default_rng(1).uniform(-3, 3, (10, 6))]
+
+
+@pytest.mark.parametrize("q", POSTURES)
+def test_the_pose_is_the_product_of_denavit_hartenberg(q):
+    """Rotation vectors lose half the digits near a half turn, where Q1 to Q3 are."""
+    pose, _ = ForwardKinematics(UR5E).tool(q, np.zeros(6))
+    expected = frames(UR5E, q)[-1]
+    assert pose[:3] == pytest.approx(expected[:3, 3], abs=1e-12)
+    assert rodrigues(np.array(pose[3:])) == pytest.approx(expected[:3, :3], abs=1e-7)
+    assert np.linalg.norm(pose[3:]) <= np.pi + 1e-9
+
+
+@pytest.mark.parametrize("joints", [1, 2, 5, 6])
+def test_the_speed_is_the_pose_s_change(joints):
+    description, random = cut(joints), np.random.default_rng(joints)
+    kinematics, step = ForwardKinematics(description), 1e-6
+    q, qd = random.uniform(-3, 3, (2, joints))
+    _, speed = kinematics.tool(q, qd)
+    after, before = frames(description, q + step * qd)[-1], frames(description, q - step * qd)[-1]
+    rate = (after - before) / (2 * step)
+    spin = rate[:3, :3] @ frames(description, q)[-1][:3, :3].T
+    assert speed[:3] == pytest.approx(rate[:3, 3], abs=1e-8)
+    assert speed[3:] == pytest.approx([spin[2, 1], spin[0, 2], spin[1, 0]], abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    "vector",
+    [(0, 0, 0), (1e-9, 0, 0), (0.3, -0.2, 1.1), (3.0, 0.5, -0.2), (np.pi - 1e-6, 0, 0), (0, 0, -3.1)],
+)
+def test_rotation_vectors(vector):
+    assert rotation_vector(rodrigues(np.array(vector, dtype=float))) == pytest.approx(vector, abs=1e-8)
+
+
+def test_a_half_turn_has_a_rotation_vector_of_that_length():
+    half_turn = np.diag([1.0, -1.0, -1.0])
+    assert np.abs(rotation_vector(half_turn)) == pytest.approx([np.pi, 0, 0], abs=1e-7)
+
+
+def test_the_payload_moves_no_kinematics():
+    other = msgspec.structs.replace(UR5E, payload=Payload())
+    assert ForwardKinematics(other).tool(Q3, Q1) == ForwardKinematics(UR5E).tool(Q3, Q1)

@@ -1,0 +1,323 @@
+"""The Zenoh gateway, between a desk that notes what it gets and plain Zenoh clients."""
+
+import json
+import queue
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+
+import msgpack
+import pytest
+import zenoh
+
+from tvist_protocol.codec import MAX_BYTES
+from tvist_server.gateways.base import GatewayError
+from tvist_server.gateways.zenoh import ZenohGateway
+
+WAIT = 10.0
+
+
+class NotingDesk:
+    """Notes what arrives, in order; answers at once, from another thread, unless it is told to hold."""
+
+    def __init__(self):
+        self.notes = queue.Queue()
+        self.held = []
+        self.hold = False
+
+    def request(self, data, reply):
+        self.notes.put(("request", data))
+        self._answer(reply, b"answer to " + data)
+
+    def setpoint(self, data):
+        self.notes.put(("setpoint", data))
+
+    def info(self, reply):
+        self.notes.put(("info", b""))
+        self._answer(reply, b"info")
+
+    def client_seen(self, name):
+        self.notes.put(("seen", name))
+
+    def client_gone(self, name):
+        self.notes.put(("gone", name))
+
+    def next(self):
+        return self.notes.get(timeout=WAIT)
+
+    def _answer(self, reply, data):
+        if self.hold:
+            self.held.append(lambda: reply(data))
+        else:
+            threading.Thread(target=reply, args=(data,)).start()
+
+
+def free_endpoint():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def connect(endpoint):
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    return zenoh.open(config)
+
+
+def replies(session, key, payload=None, timeout=WAIT):
+    return list(session.get(key, payload=payload, timeout=timeout))
+
+
+def refused(session, key, payload=None):
+    (reply,) = replies(session, key, payload)
+    assert reply.ok is not None
+    assert str(reply.ok.encoding) == "application/msgpack"
+    message = msgpack.unpackb(reply.ok.payload.to_bytes())
+    assert message["type"] == "refused"
+    assert message["code"] == "malformed"
+    return message
+
+
+def subscribe(session, key):
+    received = queue.Queue()
+    session.declare_subscriber(key, received.put)
+    return received
+
+
+@pytest.fixture
+def endpoint():
+    return free_endpoint()
+
+
+@pytest.fixture
+def desk():
+    return NotingDesk()
+
+
+@pytest.fixture
+def gateway(endpoint, desk):
+    gateway = ZenohGateway("ur5e", [endpoint], desk, lockstep=False, truth=False)
+    yield gateway
+    gateway.close()
+
+
+@pytest.fixture
+def lockstep_gateway(endpoint, desk):
+    gateway = ZenohGateway("ur5e", [endpoint], desk, lockstep=True, truth=True)
+    yield gateway
+    gateway.close()
+
+
+@pytest.fixture
+def session(endpoint, request):
+    request.getfixturevalue("lockstep_gateway" if "lockstep_gateway" in request.fixturenames else "gateway")
+    with connect(endpoint) as session:
+        yield session
+
+
+def test_a_command_reaches_the_desk_and_its_reply_the_client(gateway, desk, session):
+    (reply,) = replies(session, "tvist/ur5e/command", b"a command")
+    assert reply.ok.payload.to_bytes() == b"answer to a command"
+    assert str(reply.ok.encoding) == "application/msgpack"
+    assert desk.next() == ("request", b"a command")
+
+
+def test_info_is_asked_of_the_desk(gateway, desk, session):
+    (reply,) = replies(session, "tvist/ur5e/info")
+    assert reply.ok.payload.to_bytes() == b"info"
+
+
+def test_a_query_without_payload_is_refused(gateway, desk, session):
+    assert "payload" in refused(session, "tvist/ur5e/command")["why"]
+    assert desk.notes.empty()
+
+
+def test_five_megabytes_are_refused_without_the_desk_seeing_them(gateway, desk, session):
+    message = refused(session, "tvist/ur5e/command", bytes(5_000_000))
+    assert message["limit"] == MAX_BYTES
+    assert "5000000 bytes" in message["why"]
+    assert desk.notes.empty()
+
+
+@pytest.mark.parametrize("key", ["tvist/*/command", "tvist/ur5e/*mand", "tvist/**/command", "tvist/*/info"])
+def test_a_query_on_a_key_with_a_wildcard_is_refused(gateway, desk, session, key):
+    key = key.replace("*mand", "$*mand")
+    message = refused(session, key, b"a command")
+    assert message["where"] == "key"
+    assert key in message["why"]
+    assert desk.notes.empty()
+
+
+def test_a_setpoint_on_a_wildcard_key_or_too_large_is_counted_and_dropped(gateway, desk, session):
+    session.put("tvist/*/setpoint", b"wild")
+    session.put("tvist/**", b"wilder")
+    session.put("tvist/ur5e/setpoint", bytes(MAX_BYTES + 1))
+    session.put("tvist/ur5e/setpoint", b"good")
+    assert desk.next() == ("setpoint", b"good")
+    assert gateway.setpoints_refused == 3
+
+
+def test_a_client_is_seen_before_the_command_it_sends_next_and_its_going_is_seen(gateway, desk, endpoint):
+    for number in range(20):
+        client = connect(endpoint)
+        _token = client.liveliness().declare_token(f"tvist/ur5e/client/me {number}")
+        replies(client, "tvist/ur5e/command", b"take")
+        assert desk.next() == ("seen", f"me {number}")
+        assert desk.next() == ("request", b"take")
+        client.close()
+        assert desk.next() == ("gone", f"me {number}")
+
+
+def test_a_client_that_was_there_before_the_gateway_asked_is_seen(desk, endpoint, gateway):
+    with connect(endpoint) as client:
+        token = client.liveliness().declare_token("tvist/ur5e/client/early")
+        assert desk.next() == ("seen", "early")
+        token.undeclare()
+        assert desk.next() == ("gone", "early")
+
+
+def test_what_is_published_arrives_with_its_encoding(gateway, session):
+    received = subscribe(session, "tvist/ur5e/*")
+    replies(session, "tvist/ur5e/info")  # the subscription has passed
+    for topic in ("state", "event", "telemetry", "truth"):  # truth is not told here
+        gateway.publish(topic, topic.encode())
+    samples = [received.get(timeout=WAIT) for _ in range(3)]
+    assert {s.payload.to_string(): str(s.key_expr) for s in samples} == {
+        topic: f"tvist/ur5e/{topic}" for topic in ("state", "event", "telemetry")
+    }
+    assert {str(s.encoding) for s in samples} == {"application/msgpack"}
+
+
+def test_in_lockstep_events_states_and_truth_keep_their_order(lockstep_gateway, session):
+    received = queue.Queue()
+    direct = zenoh.handlers.Callback(received.put, indirect=False)
+    for topic in ("state", "event", "truth"):
+        session.declare_subscriber(f"tvist/ur5e/{topic}", direct)
+    replies(session, "tvist/ur5e/info")
+    sent = []
+    for tick in range(500):
+        for topic in ("event", "state", "truth"):
+            sent.append(f"{topic} {tick}")
+            lockstep_gateway.publish(topic, f"{topic} {tick}".encode())
+    assert [received.get(timeout=WAIT).payload.to_string() for _ in sent] == sent
+
+
+def test_nothing_is_served_before_alive_is_there_and_alive_goes_with_close(gateway, session):
+    seen = queue.Queue()
+    session.liveliness().declare_subscriber("tvist/*/alive", seen.put, history=True)
+    assert seen.get(timeout=WAIT).kind == zenoh.SampleKind.PUT
+    gateway.close()
+    assert seen.get(timeout=WAIT).kind == zenoh.SampleKind.DELETE
+
+
+def test_close_ends_what_is_unanswered_and_a_late_reply_goes_nowhere(gateway, desk, session):
+    desk.hold = True
+    pending = session.get("tvist/ur5e/command", payload=b"wait", timeout=60.0)
+    assert desk.next() == ("request", b"wait")
+    gateway.close()
+    assert list(pending) == []
+    desk.held[0]()
+    gateway.publish("state", b"nobody hears it")
+    gateway.close()
+
+
+def test_a_client_that_left_before_its_reply_disturbs_nobody(gateway, desk, session, endpoint):
+    desk.hold = True
+    impatient = connect(endpoint)
+    impatient.get("tvist/ur5e/command", payload=b"and away", timeout=60.0)
+    desk.next()
+    impatient.close()
+    desk.hold = False
+    desk.held[0]()
+    (reply,) = replies(session, "tvist/ur5e/command", b"still there?")
+    assert reply.ok is not None
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "sentence"),
+    [
+        ("nonsense", "an endpoint has the form tcp/<address>:<port>"),
+        ("tcp/127.0.0.1:99999", "a port is a number up to 65535"),
+        ("tcp/nowhere.invalid:7447", "there is no host of that name"),
+        ("tcp/192.0.2.1:7447", "no such address"),
+    ],
+)
+def test_an_endpoint_that_cannot_be_listened_on_is_one_clear_sentence(desk, endpoint, sentence):
+    with pytest.raises(GatewayError) as raised:
+        ZenohGateway("ur5e", [endpoint], desk, lockstep=False, truth=False)
+    assert endpoint in str(raised.value)
+    assert sentence in str(raised.value)
+
+
+def test_a_port_in_use_is_one_clear_sentence(gateway, desk, endpoint):
+    with pytest.raises(GatewayError, match=rf"^cannot listen on {endpoint}: the port is in use: stop"):
+        ZenohGateway("other", [endpoint], desk, lockstep=False, truth=False)
+
+
+READER = """
+import json, sys, zenoh
+config = zenoh.Config()
+config.insert_json5("mode", '"client"')
+config.insert_json5("connect/endpoints", json.dumps([sys.argv[1]]))
+config.insert_json5("scouting/multicast/enabled", "false")
+counts = {"state": 0, "event": 0}
+def on(sample):
+    counts[str(sample.key_expr).split("/")[2]] += 1
+    if sample.payload.to_bytes() == b"last":
+        print(json.dumps(counts), flush=True)
+with zenoh.open(config) as session:
+    direct = zenoh.handlers.Callback(on, indirect=False)
+    session.declare_subscriber("tvist/ur5e/state", direct)
+    session.declare_subscriber("tvist/ur5e/event", direct)
+    list(session.get("tvist/ur5e/info"))  # the subscriptions have passed
+    print("ready", flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_a_reader_that_stops_loses_states_but_no_event_and_never_holds_up_the_publisher(gateway, endpoint):
+    reader = subprocess.Popen(
+        [sys.executable, "-c", READER, endpoint], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    with reader:
+        assert reader.stdout.readline() == "ready\n"
+        reader.send_signal(signal.SIGSTOP)
+        began = time.monotonic()
+        for number in range(2000):
+            gateway.publish("state", bytes(9000))
+            if number % 10 == 0:
+                gateway.publish("event", bytes(100))
+        assert time.monotonic() - began < 4.0  # BLOCK holds up a single put for 5 s
+        reader.send_signal(signal.SIGCONT)
+        gateway.publish("event", b"last")
+        counts = json.loads(reader.stdout.readline())
+        assert counts["event"] == 201
+        assert counts["state"] < 2000
+        reader.stdin.close()
+
+
+FORGETFUL = """
+import sys, time, zenoh
+from tvist_server.gateways.zenoh import ZenohGateway
+class Desk:
+    def request(self, data, reply): reply(b"")
+    def setpoint(self, data): pass
+    def info(self, reply): reply(b"")
+    def client_seen(self, name): pass
+    def client_gone(self, name): pass
+gateway = ZenohGateway("ur5e", [sys.argv[1]], Desk(), lockstep=False, truth=False)
+gateway.publish("state", b"x")
+print("end of main")
+"""
+
+
+def test_a_process_that_forgets_to_close_ends_all_the_same(endpoint):
+    ended = subprocess.run(
+        [sys.executable, "-c", FORGETFUL, endpoint], capture_output=True, text=True, timeout=30, check=True
+    )
+    assert (ended.stdout, ended.stderr) == ("end of main\n", "")
