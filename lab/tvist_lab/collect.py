@@ -18,8 +18,15 @@ class Collected:
     truths: list[Truth] = field(default_factory=list)
 
     def recording(self) -> Recording:
-        """As columns."""
-        return Recording.from_states(self.states, self.events, self.truths)
+        """As columns, from the first to the last tick of which everything has arrived.
+
+        On a network the truth of a tick may come before or after its state.
+        """
+        states = self.states
+        if self.truths:
+            first, last = self.truths[0].tick, self.truths[-1].tick
+            states = [state for state in states if first <= state.tick <= last]
+        return Recording.from_states(states, self.events, self.truths)
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 import json
 import time
+from functools import cache
 from pathlib import Path
 
 import jsonschema
@@ -14,10 +15,15 @@ Q_NEAR = [angle + 0.1 for angle in Q1]
 SCHEMAS = Path(__file__).parents[2] / "protocol" / "schemas"
 
 
+@cache
+def schema_of(kind):
+    return jsonschema.Draft202012Validator(json.loads((SCHEMAS / f"{kind}.json").read_text(encoding="utf-8")))
+
+
 def validate(message):
-    schema = json.loads((SCHEMAS / f"{message['type']}.json").read_text(encoding="utf-8"))
-    jsonschema.validate(message, schema)
-    undocumented = set(message) - set(schema["properties"])
+    validator = schema_of(message["type"])
+    validator.validate(message)
+    undocumented = set(message) - set(validator.schema["properties"])
     assert not undocumented, f"{message['type']} has fields that no schema names: {undocumented}"
 
 
@@ -90,10 +96,14 @@ class TestMotion:
             answer = live.command("move_j", token=token, q=[1.0, *Q1[1:]])
             live.wait("state", lambda state: state["target_qd"][0] > 0.3)
             assert live.command("stop") == {"type": "done"}
-            live.wait("event", lambda event: event["kind"] == "motion_stopped" and event["id"] == answer["id"])
+            live.wait(
+                "event", lambda event: event["kind"] == "motion_stopped" and event["id"] == answer["id"]
+            )
             rest = live.next("state", lambda state: state["runtime_state"] == STOPPED)
         assert 0.0 < rest["target_q"][0] < 0.9
-        ends = [e for e in live.received["event"] if e.get("id") == answer["id"] and e["kind"] != "motion_started"]
+        ends = [
+            e for e in live.received["event"] if e.get("id") == answer["id"] and e["kind"] != "motion_started"
+        ]
         assert len(ends) == 1
 
     def test_a_stream_is_played_and_its_sequence_is_told(self, stepped):
@@ -165,7 +175,12 @@ class TestWhatIsSaid:
 
     def test_info_says_protocol_model_joints_limits_rate_and_how_it_is_set_up(self, live):
         info = live.info()
-        assert (info["name"], info["protocol"], info["model"], info["clock"]) == ("ur5e", 1, "UR5e", "realtime")
+        assert (info["name"], info["protocol"], info["model"], info["clock"]) == (
+            "ur5e",
+            1,
+            "UR5e",
+            "realtime",
+        )
         assert info["rate_hz"] == 500.0
         assert len(info["joints"]) == len(info["limits"]["position"]) == 6
         assert info["payload"]["mass"] == 5.0
@@ -192,7 +207,9 @@ class TestWhatIsSaid:
         assert truth["f_d"][0] == pytest.approx(6.7, rel=0.05)
 
     def test_the_server_declares_its_liveliness(self, live):
-        keys = [str(reply.ok.key_expr) for reply in live.session.liveliness().get("tvist/*/alive", timeout=5.0)]
+        keys = [
+            str(reply.ok.key_expr) for reply in live.session.liveliness().get("tvist/*/alive", timeout=5.0)
+        ]
         assert keys == ["tvist/ur5e/alive"]
 
 
@@ -210,7 +227,9 @@ def test_two_robots_on_one_machine_do_not_hear_each_other(stepped, live):
         assert stepped.info()["tick"] == tick
 
 
-def test_a_client_that_reconnects_under_its_own_name_gets_a_new_lease_and_the_old_one_is_stale(realtime, live):
+def test_a_client_that_reconnects_under_its_own_name_gets_a_new_lease_and_the_old_one_is_stale(
+    realtime, live
+):
     old = live.command("take_control", client="again")["token"]
     with Wire(realtime.endpoint) as other, other.control("again") as new:
         assert new != old

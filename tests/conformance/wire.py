@@ -1,6 +1,7 @@
 """A client of the wire alone, as somebody would write it who has read only INTERFACE: eclipse-zenoh and msgpack."""
 
 import json
+import math
 import threading
 from contextlib import contextmanager
 
@@ -17,8 +18,12 @@ STATE_FIELDS = {
     "actual_TCP_pose", "actual_TCP_speed", "actual_tool_accelerometer", "speed_scaling", "estimated_f_d",
     "estimated_zeta", "shaper_delay", "missed_ticks",
 }  # fmt: skip
-Q1 = [0.0, -2.4540, 2.3080, -1.4249, -1.5708, 0.0]
+Q1 = [0.0, -math.pi, 0.0, -math.pi / 2, 0.0, 0.0]
 STOPPED, PLAYING = 1, 2
+
+
+def _any(_):
+    return True
 
 
 class Wire:
@@ -67,7 +72,7 @@ class Wire:
             )
         return self
 
-    def wait(self, topic, wanted=lambda message: True, *, since=0, timeout=PATIENCE):
+    def wait(self, topic, wanted=_any, *, since=0, timeout=PATIENCE):
         """The first message from number `since` on that is wanted; it may have come already."""
         messages, looked = self.received[topic], since
         found = None
@@ -89,7 +94,7 @@ class Wire:
                 )
         return found
 
-    def next(self, topic, wanted=lambda message: True, **options):
+    def next(self, topic, wanted=_any, **options):
         """The first message to come from now on that is wanted."""
         return self.wait(topic, wanted, since=len(self.received[topic]), **options)
 

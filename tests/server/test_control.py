@@ -155,7 +155,8 @@ def test_the_feed_forward_has_rotor_inertia_and_a_share_of_coulomb_friction():
     target = Target(Q1, np.array([0.5, -0.5, 0.01, 0.0, 1.0, -0.02]), np.array([1.0, -2.0, 0.0, 3.0, 0.5, 0.1]))
     command, torque, _ = commanded(UR5E, target)
     rotors = np.array(drives.rotor_inertia) * target.qdd
-    friction = 0.8 * np.array(drives.coulomb_friction) * np.tanh(target.qd / 0.02)
+    share, width = drives.friction_feedforward, drives.friction_feedforward_width
+    friction = share * np.array(drives.coulomb_friction) * np.tanh(target.qd / width)
     assert command.torque == pytest.approx(torque + rotors + friction, rel=1e-14)
 
 

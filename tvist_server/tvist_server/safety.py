@@ -65,7 +65,8 @@ def plan_stop(
     return StopPlan(trajectory, acceleration, wanted is not None and acceleration != wanted)
 
 
-def _within(trajectory: Stop, dynamics: InverseDynamics, torque: Floats, samples: int = 12) -> bool:
-    # The very start is what the motion already asks for: only what follows is the stop's own doing.
-    times = np.linspace(0.0, trajectory.duration, samples + 1)[1:]
+def _within(trajectory: Stop, dynamics: InverseDynamics, torque: Floats) -> bool:
+    # The very start is what the motion already asks for: only what follows is the stop's own doing. Forty-eight
+    # moments, since torque peaks where a joint's ramp ends; widely spread ones first, which soon show an excess.
+    times = np.linspace(0.0, trajectory.duration, 49)[1:].reshape(6, 8).T.ravel()
     return all(bool((np.abs(dynamics.torque(*trajectory.at(time))) <= torque).all()) for time in times)

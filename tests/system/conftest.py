@@ -1,0 +1,38 @@
+"""Served robots, each a process of its own, and sessions with them."""
+
+import pytest
+
+from ..conformance.served import Served
+from ..conformance.wire import Wire
+
+
+@pytest.fixture(scope="module")
+def realtime():
+    """A robot in real time."""
+    with Served() as served:
+        yield served
+
+
+@pytest.fixture(scope="module")
+def lockstep():
+    """A robot whose time a client steps."""
+    with Served("--clock", "lockstep", "--truth") as served:
+        yield served
+
+
+@pytest.fixture
+def live(realtime):
+    """A session with the robot in real time."""
+    with Wire(realtime.endpoint) as wire:
+        yield wire
+
+
+@pytest.fixture
+def measured(request):
+    """Note a figure, `measured(what, value)`, that stands in the report (`pytest -rA` or `--junit-xml`)."""
+
+    def note(what, value):
+        request.node.user_properties.append((what, value))
+        print(f"{what}: {value}")
+
+    return note
