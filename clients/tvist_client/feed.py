@@ -116,8 +116,10 @@ class Feed(Generic[M]):
         self.latest = message
         for listener in tuple(self._listeners):
             self._call(listener, message)
-        for stream in tuple(self._streams):
-            stream.push(message)
+        # Asked first, since going through an empty weak set takes longer than decoding a state.
+        if self._streams:
+            for stream in tuple(self._streams):
+                stream.push(message)
         for waiting, wanted in tuple(self._waiting.items()):
             if not waiting.done() and wanted(message):
                 waiting.set_result(message)

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import sys
 import threading
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import AbstractAsyncContextManager
@@ -59,6 +60,9 @@ class Portal:
         try:
             yield value
         except BaseException as error:
+            if sys.is_finalizing():
+                # A block that nobody left, thrown away with the interpreter: the loop's thread runs no more.
+                raise
             kind, raised, trace = type(error), error, error.__traceback__
             if not self.call(lambda: context.__aexit__(kind, raised, trace)):
                 raise

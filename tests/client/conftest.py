@@ -4,7 +4,7 @@ import asyncio
 import queue
 import socket
 import threading
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import pytest
 from blockbuster import blockbuster_ctx
@@ -43,6 +43,7 @@ class FakeRobot:
 
     def __init__(self, clock="free"):
         self.clock = clock
+        self.protocol = 1
         self.tick = 0
         self.q = [0.0] * JOINTS
         self.token = None
@@ -74,7 +75,7 @@ class FakeRobot:
         return encode(
             Info(
                 name="ur5e",
-                protocol=1,
+                protocol=self.protocol,
                 version="0",
                 model="UR5e",
                 joints=[f"j{i}" for i in range(JOINTS)],
@@ -204,6 +205,7 @@ class Served:
         self.robot = robot
         self.endpoint = endpoint
         self._jobs = queue.SimpleQueue()
+        self._unanswered = []
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._gateway = ZenohGateway("ur5e", [endpoint], self, lockstep=robot.clock != "realtime", truth=True)
@@ -216,6 +218,8 @@ class Served:
             answered = self.robot.request("", data)
             if answered is not None:
                 reply(answered)
+            else:
+                self._unanswered.append(reply)  # what nobody holds Zenoh ends
 
         self.post(answer)
 
@@ -314,4 +318,5 @@ def note():
 @pytest.fixture
 def serving(endpoint):
     """Serve at the endpoint again."""
-    return lambda clock: serve(clock, endpoint)
+    with ExitStack() as stack:
+        yield lambda clock: stack.enter_context(serve(clock, endpoint))

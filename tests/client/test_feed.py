@@ -20,7 +20,7 @@ class Source:
     def __init__(self):
         self.callbacks = []
 
-    def subscribe(self, topic, callback):
+    def subscribe(self, _topic, callback):
         self.callbacks.append(callback)
 
     def put(self, data):

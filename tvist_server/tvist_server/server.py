@@ -7,6 +7,7 @@ import logging
 import signal
 import sys
 from collections.abc import Callable
+from threading import Thread
 
 from tvist_plant.plant import PERIOD
 from tvist_protocol.stream import Telemetry
@@ -22,6 +23,9 @@ from tvist_server.recording.recorder import Recorder
 log = logging.getLogger(__name__)
 
 Reply = Callable[[bytes], None]
+
+LEAVE = 0.6
+"""How long clients may take at the end to read what waits for them [s]."""
 
 
 class Server:
@@ -104,12 +108,21 @@ class Server:
         self.clock.start()
 
     def close(self) -> None:
-        """End in order: no more input, no more ticks, everything handed on, the recording closed."""
+        """End in order: no more ticks, the recording closed, what waits handed on, as far as clients take it."""
+        self._outlet.hurry()
         self.clock.close()
-        self._outlet.close()
-        self._gateway.close()
-        self._close_recorder()
+        if self.recorder is not None:
+            self.recorder.close()
+        leaving = Thread(target=self._leave, name="tvist-leave", daemon=True)
+        leaving.start()
+        leaving.join(LEAVE)
         gc.unfreeze()
+
+    def _leave(self) -> None:
+        """Leave the network. A client that has stopped reading can hold this up for ten seconds."""
+        self._outlet.close()
+        with contextlib.suppress(Exception):
+            self._gateway.close()
 
     async def run(self, ready: Callable[[], None]) -> None:
         """Serve until SIGINT or SIGTERM, or until the controller fails; then `failure` says why.
@@ -154,10 +167,6 @@ class Server:
             commands=counters.commands,
             refused=counters.refused,
         )
-
-    def _close_recorder(self) -> None:
-        if self.recorder is not None:
-            self.recorder.close()
 
     @staticmethod
     def _recorder_failed(why: str) -> None:

@@ -1,0 +1,82 @@
+"""No program hangs at its end: not one that forgets to close, not one that is interrupted."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+ASYNCHRONOUS = """
+import asyncio, sys
+from tvist_client import Robot
+async def main():
+    robot = await Robot.connect(sys.argv[1])
+    states = robot.states()
+    await anext(states)
+    print("end of main")
+asyncio.run(main())
+"""
+ABANDONED = """
+import asyncio, sys
+from tvist_client import Robot
+loop = asyncio.new_event_loop()
+robot = loop.run_until_complete(Robot.connect(sys.argv[1]))
+robot.on_state(print)
+loop.close()
+print("end of main")
+"""
+BLOCKING = """
+import sys
+from tvist_client.blocking import Robot
+robot = Robot.connect(sys.argv[1])
+states = robot.states()
+next(states)
+print("end of main")
+"""
+FAILING = """
+import sys
+from tvist_client.blocking import Robot
+robot = Robot.connect(sys.argv[1])
+control = robot.control("me")
+control.__enter__()
+raise SystemExit("end of main")
+"""
+INTERRUPTED = """
+import sys
+from tvist_client.blocking import Robot
+try:
+    with Robot.connect(sys.argv[1]) as robot, robot.control("me") as arm:
+        for state in robot.events():
+            print(state.why, flush=True)
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+@pytest.mark.parametrize("program", [ASYNCHRONOUS, ABANDONED, BLOCKING, FAILING])
+def test_a_program_that_forgets_to_close_ends_all_the_same(realtime, endpoint, program):
+    ended = subprocess.run(
+        [sys.executable, "-c", program, endpoint], capture_output=True, text=True, timeout=30, check=False
+    )
+    assert "end of main" in ended.stdout + ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+def test_an_interrupted_program_gives_control_back_and_ends(realtime, endpoint):
+    program = subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTED, endpoint],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    with program:
+        noted = None
+        while noted != "take_control":
+            noted = realtime.robot.notes.get(timeout=30.0)
+        realtime.post(lambda: realtime.robot.end_stream("it waits"))
+        while program.stdout.readline() != "it waits\n":
+            realtime.post(lambda: realtime.robot.end_stream("it waits"))
+        program.send_signal(signal.SIGINT)
+        out, err = program.communicate(timeout=30.0)
+    assert (out.splitlines()[-1], err, program.returncode) == ("interrupted", "", 0)
+    assert realtime.robot.holder is None
