@@ -64,7 +64,7 @@ def replay_file(content: RecordingFile, output: Path | None = None) -> Replay:
         ReplayError: The recording does not say how its robot started, or begins too late.
         ValueError: What it says of the start is wrong.
     """
-    if content.start is None:
+    if not content.start:  # a recording made from outside has an empty one
         raise ReplayError(
             "the recording does not say how its robot started: only tvist serve --record writes that"
         )

@@ -10,8 +10,8 @@ import numpy as np
 from msgspec import Meta, Struct
 
 Number = Annotated[float, Meta(ge=-1e7, le=1e7)]
-Positive = Annotated[float, Meta(gt=0.0, le=1e7)]
-NotNegative = Annotated[float, Meta(ge=0.0, le=1e7)]
+Positive = Annotated[float, Meta(gt=0, le=1e7)]
+NotNegative = Annotated[float, Meta(ge=0, le=1e7)]
 Vector3 = tuple[Number, Number, Number]
 Tensor = tuple[NotNegative, Number, Number, NotNegative, Number, NotNegative]
 """Symmetric 3x3: xx xy xz yy yz zz."""

@@ -61,7 +61,9 @@ def modes(flexible: FlexibleModel, linear: LinearPart, description: RobotDescrip
 
     chosen = np.flatnonzero(values.imag > 2.0 * np.pi * 0.1)
     chosen = chosen[np.argsort(values[chosen].imag)]
-    jacobian = pin.computeFrameJacobian(flexible.model, data, q, flexible.flange, pin.LOCAL_WORLD_ALIGNED)[:3]
+    jacobian = pin.computeFrameJacobian(
+        flexible.model, data, q, flexible.flange, pin.LOCAL_WORLD_ALIGNED
+    ).reshape(6, -1)[:3]
     drives = description.drives
     rigid = mass[np.ix_(flexible.joints, flexible.joints)]
     windup = np.array(drives.windup_feedforward) / np.array(drives.gear_stiffness)

@@ -51,6 +51,11 @@ class Served:
             raise AssertionError(f"tvist serve did not come up: {self.said}")
         return time.monotonic() - self.began
 
+    def wait_until_said(self, words):
+        """Wait until it says something on stderr."""
+        with self._news:
+            assert self._news.wait_for(lambda: words in self.said, PATIENCE), self.said
+
     @property
     def said(self):
         return "".join(self.lines)

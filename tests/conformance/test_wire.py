@@ -36,9 +36,12 @@ class TestStates:
         live.listen("state")
         first = live.wait("state")
         last = live.until(first["tick"] + 500)
-        states = list(live.received["state"])[: 1 + last["tick"] - first["tick"]]
-        assert ticks_of(states) == list(range(first["tick"], last["tick"] + 1))
+        states = [state for state in list(live.received["state"]) if state["tick"] <= last["tick"]]
+        ticks = ticks_of(states)
+        assert ticks == sorted(set(ticks))
         assert all(state["timestamp"] == state["tick"] * TICK for state in states)
+        # All 501, unless the machine is so busy that Zenoh drops some, as the contract has it in real time.
+        assert len(ticks) > 475
 
     def test_in_lockstep_come_exactly_the_ticks_asked_for(self, stepped):
         stepped.listen("state", "truth")

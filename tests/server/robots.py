@@ -131,7 +131,7 @@ class Robot:
             state, events = self.controller.tick()
             self.states.append(state)
             self.events += events
-        return state
+        return self.states[-1] if self.states else None
 
     def until_rest(self, most: int = 5000):
         for _ in range(most):

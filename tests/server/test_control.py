@@ -69,7 +69,12 @@ def frames(description, q):
     out = [pose]
     for theta, a, d, alpha in zip(q, kinematics.a, kinematics.d, kinematics.alpha, strict=True):
         ct, st, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
-        link = [[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st], [0, sa, ca, d], [0, 0, 0, 1]]
+        link = [
+            [ct, -st * ca, st * sa, a * ct],
+            [st, ct * ca, -ct * sa, a * st],
+            [0, sa, ca, d],
+            [0, 0, 0, 1],
+        ]
         pose = pose @ np.array(link)
         out.append(pose)
     return out
@@ -126,7 +131,9 @@ def test_torques_are_those_of_lagrange(joints):
         q, qd, qdd = random.uniform(-3, 3, (3, joints))
         expected = lagrange(description, payload, q, qd, qdd)
         assert dynamics.torque(q, qd, qdd) == pytest.approx(expected, abs=2e-7)
-        assert dynamics.gravity(q) == pytest.approx(mass_matrix_and_gravity(description, payload, q)[1], abs=1e-10)
+        assert dynamics.gravity(q) == pytest.approx(
+            mass_matrix_and_gravity(description, payload, q)[1], abs=1e-10
+        )
 
 
 def test_torques_are_the_callers_own():
@@ -152,7 +159,9 @@ def commanded(description, *targets):
 
 def test_the_feed_forward_has_rotor_inertia_and_a_share_of_coulomb_friction():
     drives = UR5E.drives
-    target = Target(Q1, np.array([0.5, -0.5, 0.01, 0.0, 1.0, -0.02]), np.array([1.0, -2.0, 0.0, 3.0, 0.5, 0.1]))
+    target = Target(
+        Q1, np.array([0.5, -0.5, 0.01, 0.0, 1.0, -0.02]), np.array([1.0, -2.0, 0.0, 3.0, 0.5, 0.1])
+    )
     command, torque, _ = commanded(UR5E, target)
     rotors = np.array(drives.rotor_inertia) * target.qdd
     share, width = drives.friction_feedforward, drives.friction_feedforward_width

@@ -13,6 +13,7 @@ from tvist_server.trajectory.limiter import Limiter
 
 from .robots import PAPER, ROUNDING, H
 
+
 def followed(limiter: Limiter, points) -> np.ndarray:
     """What comes out for a walk from rest; with each point goes the slope of the parabola through the last three."""
     out, before, last = [limiter.q], limiter.q, limiter.q

@@ -88,7 +88,7 @@ def test_no_stop_lasts_for_ever(wanted):
 
 
 def test_a_wish_that_would_end_beyond_the_joint_s_range_is_overruled():
-    q = Q3 + [6.0, 0, 0, 0, 0, 0] - [Q3[0], 0, 0, 0, 0, 0]
+    q = (6.0, *Q3[1:])
     stop = plan(q, [1.0, 0, 0, 0, 0, 0], np.zeros(6), 1.0)
     assert stop.limited
     assert stop.acceleration > 1.0

@@ -1,9 +1,8 @@
 """Served robots, each a process of its own, and sessions with them."""
 
 import pytest
-
-from ..conformance.served import Served
-from ..conformance.wire import Wire
+from tests.conformance.served import Served
+from tests.conformance.wire import Wire
 
 
 @pytest.fixture(scope="module")
@@ -29,10 +28,9 @@ def live(realtime):
 
 @pytest.fixture
 def measured(request):
-    """Note a figure, `measured(what, value)`, that stands in the report (`pytest -rA` or `--junit-xml`)."""
+    """Note a figure, `measured(what, value)`, that stands in the report whether the test passes or fails."""
 
     def note(what, value):
         request.node.user_properties.append((what, value))
-        print(f"{what}: {value}")
 
     return note

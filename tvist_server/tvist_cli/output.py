@@ -30,9 +30,9 @@ def print_json(value: Any) -> None:
 
 @contextmanager
 def progress(total: int, what: str) -> Iterator[Callable[[int, str | None], None]]:
-    """A bar on stderr; the function given advances it by a number of steps and may rename what is being done."""
+    """A bar on stderr, where that is a terminal; the function given advances it and may rename what is done."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=err, transient=True) as bar:
+    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
         task = bar.add_task(what, total=total)
         yield lambda steps, name: bar.update(task, advance=steps, description=name or what)
 

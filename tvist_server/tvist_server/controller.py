@@ -12,15 +12,14 @@ import numpy as np
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_protocol.calibration import Calibration
-from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import Accepted, Code, Done, Refused, Reply
 from tvist_protocol.stream import Event, EventKind, State, Truth
 from tvist_protocol.values import PROTOCOL_VERSION, Payload
 from tvist_server.calibrations import fits
 from tvist_server.choices import choose_estimator, choose_filter
-from tvist_server.control.kinematics import ForwardKinematics, rotation_vector
-from tvist_server.cycle import ControlCycle, Sample
+from tvist_server.cycle import ControlCycle
 from tvist_server.refusal import RefusalError, check_body, check_joints, check_motion
+from tvist_server.reporting import Reporter
 from tvist_server.session import NoControlError, Session
 from tvist_server.setup import Setup, body
 from tvist_server.trajectory import Limits, SetpointStream
@@ -28,8 +27,6 @@ from tvist_shaping.filter import TvistFilter
 
 STREAM_TIMEOUT = 0.25
 """A stream without set-points for this long is stopped [s]."""
-TRUE_MODES_EVERY = 50
-"""Ticks between two computations of the arm's true modes: an eigenvalue problem takes a good part of one."""
 
 
 @dataclass
@@ -78,14 +75,13 @@ class Controller:
             carried=body(setup.payload),
             seed=setup.seed,
         )
-        self._kinematics = ForwardKinematics(setup.description)
+        self._reporter = Reporter(setup.description)
         self._events: list[Event] = []
         self._seed = setup.seed
         self._motions = 0
         self._motion: int | None = None
         self._stream: SetpointStream | None = None
         self._stream_heard = 0.0
-        self._true_modes: dict[str, list[float]] = {}
         self._warn_of_payload()
 
     @property
@@ -151,59 +147,19 @@ class Controller:
             self._motion = None
         self.tick_number += 1
         events, self._events = self._events, []
-        return self._state(sample), events
+        state = self._reporter.state(
+            self.tick_number,
+            sample,
+            self.cycle.tvist,
+            moving=not self.cycle.at_rest,
+            setpoint_sequence=self._stream.sequence if self._stream else None,
+            missed_ticks=self.counters.missed_ticks,
+        )
+        return state, events
 
     def truth(self) -> Truth:
         """What no robot can know, after a tick."""
-        arm = self.cycle.arm
-        if not self._true_modes or self.tick_number % TRUE_MODES_EVERY == 0:
-            modes = arm.modes()
-            count = self.setup.description.joints
-            self._true_modes = {
-                "f_d": modes.f_d[:count].tolist(),
-                "zeta": modes.zeta[:count].tolist(),
-                "participation": modes.participation[:count].tolist(),
-            }
-        truth = arm.truth()
-        return Truth(
-            tick=self.tick_number,
-            timestamp=self.now,
-            motor_q=truth.motor_q.tolist(),
-            motor_qd=truth.motor_qd.tolist(),
-            gear_deflection=truth.gear_deflection.tolist(),
-            link_deflection=truth.link_deflection.tolist(),
-            flange_pose=truth.flange_position.tolist() + rotation_vector(truth.flange_rotation),
-            tool_acceleration=truth.specific_force.tolist(),
-            **self._true_modes,
-        )
-
-    def _state(self, sample: Sample) -> State:
-        target, measured, tvist = sample.target, sample.measured, self.cycle.tvist
-        pose, speed = self._kinematics.tool(measured.q, measured.qd)
-        return State(
-            tick=self.tick_number,
-            timestamp=self.now,
-            robot_mode=RobotMode.RUNNING.value,
-            safety_mode=SafetyMode.NORMAL.value,
-            runtime_state=(RuntimeState.STOPPED if self.cycle.at_rest else RuntimeState.PLAYING).value,
-            setpoint_sequence=self._stream.sequence if self._stream else None,
-            reference_q=sample.reference.tolist(),
-            target_q=target.q.tolist(),
-            target_qd=target.qd.tolist(),
-            target_qdd=target.qdd.tolist(),
-            target_moment=sample.torque.tolist(),
-            actual_q=measured.q.tolist(),
-            actual_qd=measured.qd.tolist(),
-            actual_moment=measured.moment.tolist(),
-            actual_TCP_pose=pose,
-            actual_TCP_speed=speed,
-            actual_tool_accelerometer=measured.accelerometer.tolist(),
-            speed_scaling=1.0,
-            estimated_f_d=tvist.f_d.tolist(),
-            estimated_zeta=tvist.zeta.tolist(),
-            shaper_delay=tvist.delay,
-            missed_ticks=self.counters.missed_ticks,
-        )
+        return self._reporter.truth(self.tick_number, self.cycle.arm)
 
     def _emit(
         self,
@@ -398,7 +354,7 @@ class Controller:
         if command.seed is not None:
             self._seed = command.seed
         self.cycle.reset(q, carried=carried, seed=self._seed)
-        self._true_modes = {}
+        self._reporter.forget_modes()
         return Done(tick=self.tick_number)
 
     def simulation_step(self, command: c.SimulationStep) -> Reply:

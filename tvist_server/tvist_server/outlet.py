@@ -21,6 +21,10 @@ MAX_WAITING = 2048
 """Messages that may wait, four seconds of states."""
 
 
+CLOSE_WAIT = 0.2
+"""How long the last messages may take at close [s]; a client that has stopped reading holds them up for 5 s."""
+
+
 class Recorder(Protocol):
     """What a recorder offers."""
 
@@ -50,7 +54,7 @@ class Outlet:
         self._lossless = lossless
         self._gateways: Sequence[Gateway] = ()
         self._queue: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
-        self._room = threading.BoundedSemaphore(MAX_WAITING)
+        self._room = threading.Semaphore(MAX_WAITING)
         self._last: State | None = None
         self.dropped = 0
         """Messages of a tick that found no room."""
@@ -61,11 +65,16 @@ class Outlet:
         self._gateways = gateways
         self._thread.start()
 
+    def hurry(self) -> None:
+        """Wait for nobody from now on: the robot is about to end, and a client may have stopped reading."""
+        self._lossless = False
+        self._room.release()  # whoever waits for room
+
     def close(self) -> None:
-        """Hand on what is waiting and end."""
+        """Hand on what is waiting, as far as that is quick, and end."""
         self._queue.put(None)
         if self._thread.is_alive():
-            self._thread.join()
+            self._thread.join(CLOSE_WAIT)
 
     def state(self, state: State) -> None:
         """Queue a state; the recorder's own queue takes it at once."""

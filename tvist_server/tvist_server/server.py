@@ -63,6 +63,8 @@ class Server:
             self.clock = Lockstep(self._host, self._outlet.repeat)
         else:
             self.clock = Realtime(self._host, PERIOD, config.speed)
+        self.left = True
+        """After `close`: whether the network is left. Zenoh may still wait for a client that has stopped reading."""
         try:
             self._gateway = ZenohGateway(
                 setup.name, config.listen, self, lockstep=lockstep, truth=setup.truth
@@ -116,6 +118,7 @@ class Server:
         leaving = Thread(target=self._leave, name="tvist-leave", daemon=True)
         leaving.start()
         leaving.join(LEAVE)
+        self.left = not leaving.is_alive()
         gc.unfreeze()
 
     def _leave(self) -> None:

@@ -23,7 +23,6 @@ def analyze(file: Path, *, figures: Path | None = None, json: bool = False) -> N
         figures: Folder for a figure of each motion.
         json: Print one JSON object.
     """
-    from tvist_lab.figures import observed_figure, save
     from tvist_lab.mcap_file import read
     from tvist_lab.metrics import measure, motions
     from tvist_lab.recordings import RecordingError
@@ -36,6 +35,8 @@ def analyze(file: Path, *, figures: Path | None = None, json: bool = False) -> N
     if content.note:
         say(f"{file}: {content.note}")
     if figures is not None:
+        from tvist_lab.figures import observed_figure, save
+
         figures.mkdir(parents=True, exist_ok=True)
         for index, motion in enumerate(found, 1):
             drawn = observed_figure(f"motion {index}", (recording, motion))

@@ -1,6 +1,7 @@
 """`tvist serve`: run a robot."""
 
 import asyncio
+import os
 import time
 from typing import Any
 
@@ -79,3 +80,6 @@ def serve(
             raise Failure(server.recorder.error)
         note = f", {server.recorder.dropped} messages dropped" if server.recorder.dropped else ""
         say(f"recorded into {checked.record}{note}")
+    if not server.left:
+        # Zenoh would wait for ten seconds, for a client that has stopped reading. All that is ours is closed.
+        os._exit(0)

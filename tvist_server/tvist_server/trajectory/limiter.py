@@ -30,7 +30,9 @@ class Limiter:
         n = len(q)
         self._limits, self._period = limits, period
         self.q, self.qd, self.qdd = np.array(q, dtype=float), np.zeros(n), np.zeros(n)
-        self._step, self._signal_qd = np.zeros((2, n))  # displacement of the last tick; velocity of the signal
+        self._step, self._signal_qd = np.zeros(
+            (2, n)
+        )  # displacement of the last tick; velocity of the signal
         self._behind = np.zeros(n, dtype=bool)
         self._generator = ruckig.Ruckig(n, period)
         self._request, self._result = ruckig.InputParameter(n), ruckig.OutputParameter(n)
@@ -59,25 +61,27 @@ class Limiter:
         self._signal_qd = qd
         step = q - self.q
         velocity, acceleration = step / h, (step - self._step) / (h * h)
-        fits = (np.abs(velocity) <= room * limits.velocity) & (np.abs(acceleration) <= room * limits.acceleration)
+        fits = (np.abs(velocity) <= room * limits.velocity) & (
+            np.abs(acceleration) <= room * limits.acceleration
+        )
         # One that is behind must not jump at the signal with a velocity that it then cannot take back.
         following = (qd - velocity) / h + 0.5 * signal_qdd
         fits &= ~self._behind | (np.abs(following) <= limits.acceleration)
         self._behind = ~fits
         # A motion continued from this state has the second difference q̈ at its first tick.
-        passed = q, velocity + 0.5 * h * acceleration, acceleration
+        state: Floats = np.stack((q, velocity + 0.5 * h * acceleration, acceleration))
         if self._behind.any():
             try:
                 caught_up = self._catch_up(q, qd, signal_qdd)
             except (ruckig.RuckigError, ValueError):  # it would take more than 7600 s
                 caught_up = self._brake()
-            passed = tuple(np.where(fits, here, there) for here, there in zip(passed, caught_up, strict=True))
-        self._step = passed[0] - self.q
-        self.q, self.qd, self.qdd = passed
+            state = np.where(fits, state, caught_up)
+        self._step = state[0] - self.q
+        self.q, self.qd, self.qdd = state
         return self.q
 
-    def _catch_up(self, q: Floats, qd: Floats, qdd: Floats) -> tuple[Floats, Floats, Floats]:
-        """State after a tick of the time-optimal way onto a signal that goes on with this acceleration."""
+    def _catch_up(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
+        """State, shape (3, n), after a tick of the way onto a signal that goes on with this acceleration."""
         request, result, limits, h = self._request, self._result, self._limits, self._period
         fastest = (1.0 - self.ADVANTAGE) * limits.velocity
         qd = np.clip(qd, -fastest, fastest)
@@ -90,13 +94,11 @@ class Limiter:
         request.max_acceleration = (limits.acceleration - qdd).tolist()
         request.min_acceleration = (-limits.acceleration - qdd).tolist()
         self._generator.update(request, result)
-        return (
-            q + np.array(result.new_position),
-            qd + np.array(result.new_velocity),
-            qdd + np.array(result.new_acceleration),
-        )
+        signal: Floats = np.stack((q, qd, qdd))
+        signal += (result.new_position, result.new_velocity, result.new_acceleration)
+        return signal
 
-    def _brake(self) -> tuple[Floats, Floats, Floats]:
+    def _brake(self) -> Floats:
         h, limit = self._period, self._limits.acceleration
         qdd = np.clip(-self.qd / h, -limit, limit)
-        return self.q + h * (self.qd + 0.5 * h * qdd), self.qd + h * qdd, qdd
+        return np.stack((self.q + h * (self.qd + 0.5 * h * qdd), self.qd + h * qdd, qdd))

@@ -1,0 +1,157 @@
+"""Configuration: what is wrong is said in one sentence that names the key."""
+
+import pytest
+
+from tvist_protocol.calibration import calibration_to_json
+from tvist_server.config import ConfigError, ServeConfig, from_mapping, read_toml
+from tvist_server.setup import Setup, paper_payload
+
+from .robots import Q1, Q3, UR5E, calibration, cut, setup
+
+
+def config(**values) -> ServeConfig:
+    return from_mapping({"calibration": "none", **values}, "tvist.toml")
+
+
+def sentence(action, *arguments):
+    with pytest.raises(ConfigError) as caught:
+        action(*arguments)
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+@pytest.mark.parametrize(
+    ("values", "named"),
+    [
+        ({"shapper": "zv"}, "shapper"),
+        ({"payload": -1.0}, "payload"),
+        ({"payload": float("nan")}, "payload"),
+        ({"payload": "5 kg"}, "payload"),
+        ({"speed": 0.0}, "speed"),
+        ({"speed": 1000.0}, "speed"),
+        ({"seed": -1}, "seed"),
+        ({"seed": 1.5}, "seed"),
+        ({"name": "UR 5"}, "name"),
+        ({"name": "a/b"}, "name"),
+        ({"clock": "real"}, "clock"),
+        ({"listen": "tcp/127.0.0.1:7447"}, "listen"),
+        ({"start": [0, "x"]}, "start"),
+        ({"truth": "yes"}, "truth"),
+    ],
+)
+def test_a_key_or_value_that_cannot_be(values, named):
+    text = sentence(lambda: config(**values))
+    assert text.startswith("tvist.toml: ")
+    assert named in text
+
+
+@pytest.mark.parametrize(
+    ("values", "named"),
+    [
+        ({"shaper": "zvdd"}, "did you mean 'zvd'"),
+        ({"robot": "ur55"}, "robot 'ur55'"),
+        ({"start": "Q9"}, "start is 'Q9': must be one of Q1, Q2, Q3"),
+        ({"start": "1,2,three"}, "start"),
+        ({"start": "1,2,3"}, "start has 3 angles"),
+        ({"start": "0,0,0,0,0,7"}, "q[5]"),
+        ({"start": "0,0,0,0,0,nan"}, "q[5]"),
+        ({"start": [0.0, 0.0]}, "start has 2 angles"),
+        ({"calibration": "nowhere.json"}, "calibration 'nowhere.json'"),
+        ({"calibration": "no\0where"}, "null"),
+    ],
+)
+def test_what_does_not_fit_the_rest(values, named):
+    assert named in sentence(config(**values).setup)
+
+
+def test_the_defaults_are_the_paper_s():
+    made = config().setup()
+    assert made.q == UR5E.poses["Q1"]
+    assert made.payload == paper_payload(UR5E)
+    assert (made.name, made.shaper, made.seed, made.clock, made.truth) == ("ur5e", "zv", 0, "realtime", False)
+
+
+@pytest.mark.parametrize("none", [None, "none"])
+def test_without_calibration_the_estimator_is_fixed(none):
+    made = config(calibration=none).setup()
+    assert made.calibration is None
+    f_d, zeta = made.estimator().estimate(Q1)
+    assert (f_d.tolist(), zeta.tolist()) == ([10.0], [0.2])
+
+
+@pytest.mark.parametrize("start", ["0.1,-1,2,0,0,0.5", " 0.1, -1, 2, 0, 0, 0.5", [0.1, -1, 2, 0, 0, 0.5]])
+def test_a_start_by_its_angles(start):
+    assert config(start=start).setup().q == (0.1, -1.0, 2.0, 0.0, 0.0, 0.5)
+
+
+def test_a_start_by_its_name():
+    assert config(start="Q3").setup().q == tuple(Q3)
+
+
+@pytest.mark.parametrize("mass", [0.0, 2.5])
+def test_another_payload_is_the_same_disc_in_less_steel(mass):
+    payload = config(payload=mass).setup().payload
+    assert payload.mass == mass
+    assert payload.com == UR5E.payload.com
+    assert payload.inertia == pytest.approx([value * mass / 5.0 for value in UR5E.payload.inertia])
+
+
+def test_a_calibration_file(tmp_path):
+    path = tmp_path / "mine.json"
+    path.write_bytes(calibration_to_json(calibration(name="mine")))
+    assert config(calibration=str(path)).setup().calibration.name == "mine"
+
+
+def test_a_calibration_of_another_robot(tmp_path):
+    path = tmp_path / "other.json"
+    path.write_bytes(calibration_to_json(calibration(robot="UR10e")))
+    text = sentence(config(calibration=str(path)).setup)
+    assert "UR10e" in text
+    assert "UR5e" in text
+
+
+@pytest.mark.parametrize("content", [b"", b"{}", b"\xff", b'{"name": "x", "colour": 1}'])
+def test_a_broken_calibration_file_is_named(tmp_path, content):
+    path = tmp_path / "broken.json"
+    path.write_bytes(content)
+    assert str(path) in sentence(config(calibration=str(path)).setup)
+
+
+def test_a_file_that_cannot_be_read_or_is_no_toml(tmp_path):
+    assert "nowhere.toml" in sentence(read_toml, "nowhere.toml")
+    assert str(tmp_path) in sentence(read_toml, str(tmp_path))
+    broken = tmp_path / "broken.toml"
+    broken.write_text("name = ")
+    assert "broken.toml" in sentence(read_toml, str(broken))
+    broken.write_bytes(b"\xff\xfe")
+    assert "broken.toml" in sentence(read_toml, str(broken))
+
+
+def test_a_file_is_read(tmp_path):
+    path = tmp_path / "tvist.toml"
+    path.write_text('shaper = "ei"\nseed = 7\nlisten = ["tcp/0.0.0.0:7447"]\n')
+    read = from_mapping(read_toml(str(path)), str(path))
+    assert (read.shaper, read.seed, read.listen) == ("ei", 7, ("tcp/0.0.0.0:7447",))
+
+
+@pytest.mark.parametrize("own", [None, calibration()])
+def test_a_setup_comes_back_from_its_recording(own):
+    made = setup(calibration=own, seed=3, truth=True, shaper="ei")
+    assert Setup.from_builtins(made.to_builtins()) == made
+
+
+@pytest.mark.parametrize("missing", ["description", "q", "payload", "calibration", "seed"])
+def test_a_recording_s_start_that_lacks_a_part(missing):
+    content = setup().to_builtins()
+    del content[missing]
+    with pytest.raises(ValueError, match=missing):
+        Setup.from_builtins(content)
+
+
+@pytest.mark.parametrize("joints", [1, 2, 5, 6])
+def test_a_setup_of_any_number_of_joints_is_checked_for_that_number(joints):
+    description = cut(joints)
+    setup(description).check()
+    with pytest.raises(ValueError, match=f"{joints} joints"):
+        setup(description, q=(0.0,) * (joints + 1)).check()

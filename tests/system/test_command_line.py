@@ -1,0 +1,308 @@
+"""The `tvist` program: one JSON object with `--json`, words for people without, one sentence when it goes wrong."""
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from tests.conformance.served import NOISE, PATIENCE, free_endpoint
+from tests.conformance.wire import Wire
+
+HERE = "0.1,-3.1,0.1,-1.5,0.1,0.1"
+
+
+class Ended:
+    """A program that has ended: its exit code, and what it said."""
+
+    def __init__(self, code, out, err):
+        self.code, self.out, self.err = code, out, err
+
+    @property
+    def json(self):
+        """The one JSON object on stdout."""
+        (line,) = self.out.splitlines()
+        value = json.loads(line)
+        assert isinstance(value, dict)
+        return value
+
+    def assert_failed(self, code, *words):
+        """With this exit code and one sentence on stderr in which these words stand."""
+        assert self.code == code, self.err
+        assert self.err.startswith("tvist: ")
+        assert self.err.count("\n") == 1, self.err
+        assert all(word in self.err for word in words), self.err
+        return self
+
+    def assert_done(self):
+        assert self.code == 0, self.err
+        assert not [word for word in NOISE if word in self.err], self.err
+        return self
+
+
+def python(*arguments, timeout=PATIENCE, cwd=None):
+    ended = subprocess.run(
+        [sys.executable, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        check=False,
+        cwd=cwd,
+    )
+    return Ended(ended.returncode, ended.stdout, ended.stderr)
+
+
+def tvist(*arguments, **options):
+    return python("-m", "tvist_cli", *arguments, **options)
+
+
+@pytest.fixture(scope="module")
+def recorded(realtime, tmp_path_factory):
+    """A recording that `tvist record` made of a motion, and what it said."""
+    path = tmp_path_factory.mktemp("recorded") / "seen.mcap"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tvist_cli", "record", path, "--endpoint", realtime.endpoint, "--json"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert "recording ur5e into" in process.stderr.readline()
+        assert tvist("move", HERE, "--endpoint", realtime.endpoint).code == 0
+        with Wire(realtime.endpoint) as wire:
+            wire.until(wire.state()["tick"] + 400)  # what rings after the motion
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=PATIENCE)
+        return path, Ended(process.returncode, out, err)
+    finally:
+        process.kill()
+        process.communicate(timeout=PATIENCE)
+
+
+class TestCheck:
+    def test_a_robot_in_real_time_is_well(self, realtime):
+        said = tvist("check", realtime.endpoint, "--json").assert_done().json
+        assert (said["ok"], said["robot"], said["protocol"]) == (True, "ur5e", 1)
+        assert said["state_rate_hz"] == pytest.approx(500.0, rel=0.05)
+
+    @pytest.mark.parametrize("ticks", [0, 5])
+    def test_a_robot_in_lockstep_is_well_and_has_no_rate(self, lockstep, ticks):
+        with Wire(lockstep.endpoint) as wire, wire.control() as token:
+            if ticks:
+                wire.step(token, ticks)
+        said = tvist("check", lockstep.endpoint, "--json").assert_done().json
+        assert said["ok"] is True
+        assert said["state_rate_hz"] is None
+
+    def test_people_get_a_line_for_each_thing_tried(self, realtime):
+        said = tvist("check", realtime.endpoint).assert_done().out
+        assert [line.split()[1] for line in said.splitlines()] == ["connect", "info", "state", "refusal"]
+
+    def test_nobody_there_is_a_sentence(self):
+        endpoint = free_endpoint()
+        tvist("check", endpoint).assert_failed(1, endpoint)
+        ended = tvist("check", endpoint, "--json").assert_failed(1, endpoint)
+        assert ended.json["ok"] is False
+
+    def test_a_wrong_name_is_a_sentence_that_says_which_there_are(self, realtime):
+        tvist("check", realtime.endpoint, "--name", "other").assert_failed(1, "'other'", "ur5e")
+
+    def test_a_machine_with_the_client_alone_can_check_too(self, realtime):
+        ended = python("-m", "tvist_client", "check", realtime.endpoint, "--json")
+        assert ended.assert_done().json["ok"] is True
+
+
+class TestRecordAndAnalyze:
+    def test_control_c_ends_the_recording_with_every_state_in_it(self, recorded):
+        path, ended = recorded
+        said = ended.assert_done().json
+        assert said["file"] == str(path)
+        assert said["lost"] == 0
+        assert said["states"] > 400
+
+    def test_it_ends_by_itself_after_the_time_asked_for(self, realtime, tmp_path):
+        path = tmp_path / "second.mcap"
+        ended = tvist("record", path, "--endpoint", realtime.endpoint, "--seconds", 1, "--json").assert_done()
+        assert ended.json["states"] == pytest.approx(500, rel=0.1)
+        assert path.stat().st_size > 0
+
+    def test_analyze_measures_the_motion(self, recorded):
+        said = tvist("analyze", recorded[0], "--json").assert_done().json
+        (motion,) = said["motions"]
+        assert motion["residual_vibration_m_s2"] is not None
+        assert 0.3 < motion["stop_s"] - motion["start_s"] < 3.0
+
+    def test_analyze_prints_a_table_for_people(self, recorded):
+        said = tvist("analyze", recorded[0]).assert_done().out
+        assert "RV m/s²" in said
+        assert not said.startswith("{")
+
+    def test_analyze_draws_a_figure_of_each_motion(self, recorded, tmp_path):
+        tvist("analyze", recorded[0], "--figures", tmp_path / "drawn").assert_done()
+        assert [path.name for path in (tmp_path / "drawn").iterdir()] == ["motion_1.png"]
+
+    def test_what_was_recorded_from_outside_cannot_be_replayed_and_says_why(self, recorded):
+        tvist("replay", recorded[0]).assert_failed(1, "serve --record")
+
+    def test_a_file_is_not_replaced(self, realtime, recorded):
+        tvist("record", recorded[0], "--endpoint", realtime.endpoint).assert_failed(1, "exists")
+
+    @pytest.mark.parametrize("command", ["analyze", "replay"])
+    def test_what_is_no_recording_is_a_sentence(self, command, tmp_path):
+        tvist(command, tmp_path / "nope.mcap").assert_failed(1, "nope.mcap")
+        (tmp_path / "text.mcap").write_text("hello", encoding="utf-8")
+        ended = tvist(command, tmp_path / "text.mcap", "--json").assert_failed(1, "no MCAP file")
+        assert ended.out == ""
+
+    def test_a_robot_in_lockstep_that_nobody_steps_is_recorded_once_and_not_for_ever(
+        self, lockstep, tmp_path
+    ):
+        with Wire(lockstep.endpoint) as wire, wire.control() as token:
+            wire.step(token, 1)
+        path = tmp_path / "still.mcap"
+        options = ("--endpoint", lockstep.endpoint, "--seconds", 1.5, "--json")
+        assert tvist("record", path, *options).assert_done().json["states"] == 1
+
+
+class TestMoveAndWatch:
+    def test_move_says_how_long_it_took(self, realtime):
+        said = (
+            tvist("move", "0,-3.0,0,-1.5,0,0", "--endpoint", realtime.endpoint, "--json").assert_done().json
+        )
+        assert said["seconds"] == pytest.approx((said["done_tick"] - said["started_tick"]) * 0.002)
+        assert "moved to" in tvist("move", HERE, "--endpoint", realtime.endpoint).assert_done().out
+
+    def test_a_target_outside_the_limits_is_the_robots_sentence(self, realtime):
+        ended = tvist("move", "9,0,0,0,0,0", "--endpoint", realtime.endpoint, "--json")
+        assert ended.assert_failed(1, "limit_position", "q[0]").out == ""
+
+    def test_a_robot_that_another_controls_is_a_sentence_with_its_name(self, realtime):
+        with Wire(realtime.endpoint) as wire, wire.control("somebody"):
+            tvist("move", HERE, "--endpoint", realtime.endpoint).assert_failed(1, "somebody")
+
+    def test_watch_prints_an_object_a_line(self, realtime):
+        ended = tvist("watch", realtime.endpoint, "--seconds", 1, "--json").assert_done()
+        states = [json.loads(line) for line in ended.out.splitlines()]
+        assert len(states) >= 3
+        assert {state["type"] for state in states} == {"state"}
+
+    def test_watch_ends_well_at_control_c(self, realtime):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "tvist_cli", "watch", realtime.endpoint, "--json"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=PATIENCE)
+        assert "Traceback" not in err
+        assert process.returncode in (0, 130)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("move",), "target"),
+        (("move", "there"), "target"),
+        (("move", "Q2", "--velocity", "fast"), "--velocity"),
+        (("analyze",), "file"),
+        (("dance",), "dance"),
+        (("check", "--colour"), "--colour"),
+        (("paper", "--runs", "0"), "runs"),
+        (("paper", "--calibration", "nope"), "calibration"),
+        (("identify", "--configurations", "0"), "configurations"),
+        (("identify", "--at", "there"), "at"),
+        (("identify", "--robot", "nope"), "robot"),
+    ],
+)
+def test_misuse_is_exit_code_2_and_a_sentence_that_names_it(arguments, named):
+    assert tvist(*arguments).assert_failed(2, named).out == ""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("move", "Q2", "--endpoint"), ("record", "never.mcap", "--endpoint"), ("watch",), ("identify",)],
+)
+def test_nobody_there_is_exit_code_1_and_a_sentence(arguments, tmp_path):
+    endpoint = free_endpoint()
+    assert tvist(*arguments, endpoint, cwd=tmp_path).assert_failed(1, "nobody answers", endpoint).out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_help_and_version_are_no_errors():
+    assert "serve" in tvist("--help").assert_done().out
+    assert tvist("--version").assert_done().out.strip().count(".") == 2
+
+
+@pytest.mark.slow
+def test_identify_reports_how_good_the_calibration_is_and_serve_takes_it(tmp_path):
+    path = tmp_path / "mine.json"
+    options = ("--configurations", 40, "--repeats", 1, "--output", path, "--json")
+    said = tvist("identify", *options, timeout=110).assert_done().json
+    assert {"configurations", "ring_downs", "error_f_d_percent", "error_zeta_percent"} <= said.keys()
+    assert said["ring_downs"] == said["configurations"]
+    assert said["error_f_d_percent"] < 10.0
+    content = json.loads(path.read_text(encoding="utf-8"))
+    assert content["name"] == "mine"
+    assert content["provenance"]["seed"] == 0
+
+
+@pytest.mark.nightly
+def test_identify_finds_the_same_calibration_over_the_network_as_in_process(lockstep, tmp_path):
+    options = ("--configurations", 37, "--repeats", 1, "--at", "Q1", "--json")
+    found = []
+    for name, endpoint in (("network", (lockstep.endpoint,)), ("process", ())):
+        path = tmp_path / f"{name}.json"
+        said = tvist("identify", *endpoint, *options, "--output", path, timeout=110).assert_done().json
+        assert said["configurations"] + said["rejected"] == 38
+        found.append(json.loads(path.read_text(encoding="utf-8"))["polynomial"])
+    assert found[0] == found[1]
+
+
+def test_too_few_configurations_for_a_fit_is_a_sentence(tmp_path):
+    ended = tvist("identify", "--configurations", 2, "--output", tmp_path / "never.json", "--json")
+    assert ended.assert_failed(1, "configurations").out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_the_demonstration_replays_equal_and_its_recording_gives_the_same_figures(tmp_path):
+    ended = tvist("demo", "--output", tmp_path / "demo", "--json", timeout=110, cwd=tmp_path).assert_done()
+    said = ended.json
+    assert said["replay_equal"] is True
+    assert said["recording_gives_same_figures"] is True
+    assert len(said["table_2"]) == 3
+    assert {path.suffix for path in (tmp_path / "demo").iterdir()} >= {".mcap", ".png"}
+    assert [path.name for path in tmp_path.iterdir()] == ["demo"]
+
+
+@pytest.mark.slow
+def test_the_paper_in_one_run_prints_its_tables(tmp_path):
+    said = tvist("paper", "--runs", 1, "--no-baselines", "--json", timeout=110).assert_done().json
+    assert {"seed", "runs", "shaper", "estimator", "table_1", "table_2", "baselines"} <= said.keys()
+    assert (said["seed"], said["runs"], said["shaper"]) == (0, 1, "zv")
+
+
+@pytest.mark.slow
+def test_the_bench_gives_its_figures():
+    said = tvist("bench", "--seconds", 0, "--json", timeout=110).assert_done().json
+    assert {"plant_us_per_tick", "cycle_us_per_tick", "realtime_factor"} <= said.keys()
+    assert said["realtime_factor"] > 5.0
+
+
+@pytest.mark.slow
+def test_the_bare_client_swings_the_arm_and_measures_what_comes_back(realtime):
+    example = Path(__file__).parents[2] / "clients" / "examples" / "01_bare_client.py"
+    ended = python(example, realtime.endpoint).assert_done()
+    assert ended.err == ""
+    trip, delay, acceleration = (
+        float(line.split(what)[1].split()[0])
+        for what in ("round trip", "→ target_q", "largest acceleration")
+        for line in ended.out.splitlines()
+        if what in line
+    )
+    assert 0.0 < trip < 50.0  # [ms]
+    assert 20.0 < delay < 120.0  # [ms]: ZV delays by a quarter of a period, 37 ms at Q1's 6.7 Hz, and a tick
+    assert 0.5 < acceleration < 8.0  # [rad/s²]

@@ -1,0 +1,135 @@
+"""Equal messages at equal ticks give bit-equal states: over the network in lockstep, and free in process."""
+
+import contextlib
+import math
+
+import msgspec
+import pytest
+from tests.conformance.served import Served
+from tests.conformance.wire import Q1
+
+from tvist_client.errors import StreamStoppedError
+from tvist_client.robot import Robot
+from tvist_lab.collect import collect
+from tvist_lab.in_process import free_setup, robot_in_process
+from tvist_protocol.errors import RefusedError
+
+NEAR = [0.3, -2.9, 0.2, -1.4, 0.1, -0.1]
+FAR = [1.2, -2.0, 1.0, -1.8, 0.4, 0.5]
+
+
+async def script(robot):
+    """A bit of everything that makes the arm move; what the robot told meanwhile."""
+    with collect(robot) as told:
+        async with robot.control("script") as arm:
+            await arm.reset(q=Q1, seed=3)
+            await arm.move_j(NEAR)
+            await arm.set_shaper("zvd")
+            motion = await arm.move_j(FAR, velocity=1.0, wait=False)
+            await robot.advance(300)
+            await arm.stop()
+            await robot.rest()
+            assert motion.stopped is not None
+            await arm.reset(q=NEAR, seed=4, shaper="ei")
+            async with arm.servo() as servo:
+                await servo.step_through(swing(n * 0.002) for n in range(600))
+            await arm.set_estimator("fixed", f_d=8.0, zeta=0.2)
+            with contextlib.suppress(
+                RefusedError, StreamStoppedError
+            ):  # the stream that the block ends is over
+                async with arm.servo(period=0.008) as servo:
+                    await servo.step_through(swing(n * 0.008) for n in range(100))
+                    await arm.stop(deceleration=3.0)
+            await robot.rest()
+            await arm.set_estimator("polynomial")
+            await arm.set_payload(3.0, (0.0, 0.0, 0.05), (0.01, 0.0, 0.0, 0.01, 0.0, 0.01))
+            await arm.move_j(Q1)
+            await robot.advance(200)
+    return told
+
+
+def swing(t):
+    """A sine that fades in, around NEAR."""
+    offset = 0.1 * min(1.0, t) ** 2 * math.sin(2.0 * math.pi * t)
+    return [angle + offset for angle in NEAR]
+
+
+async def in_lockstep():
+    with Served("--clock", "lockstep", "--truth") as served:
+        async with await Robot.connect(served.endpoint) as robot:
+            return await script(robot)
+
+
+async def in_process(**changes):
+    async with robot_in_process(free_setup(**changes)) as robot:
+        return await script(robot)
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """Each way once; kept for the module."""
+    return {}
+
+
+async def run(runs, name):
+    if name not in runs:
+        runs[name] = await (in_process() if name == "free" else in_lockstep())
+    return runs[name]
+
+
+def assert_equal(one, other):
+    assert [state.tick for state in one.states] == [state.tick for state in other.states]
+    for before, after in zip(one.states, other.states, strict=True):
+        if before != after:  # equality of floats: to the last bit, but for the sign of zero
+            names = [
+                name for name in before.__struct_fields__ if getattr(before, name) != getattr(after, name)
+            ]
+            pytest.fail(f"tick {before.tick}: {names} differ")
+    assert [msgspec.json.encode(state) for state in one.states] == [
+        msgspec.json.encode(s) for s in other.states
+    ]
+    assert one.events == other.events
+    assert one.truths == other.truths
+
+
+async def test_lockstep_over_the_network_and_free_in_process_give_bit_equal_states(runs):
+    assert_equal(await run(runs, "lockstep"), await run(runs, "free"))
+
+
+async def test_two_runs_in_lockstep_give_bit_equal_states(runs):
+    assert_equal(await run(runs, "lockstep"), await run(runs, "lockstep again"))
+
+
+async def test_two_runs_in_process_give_bit_equal_states(runs):
+    assert_equal(await run(runs, "free"), await in_process())
+
+
+async def test_every_tick_is_told_once_and_the_script_does_move_the_arm(runs):
+    told = await run(runs, "free")
+    ticks = [state.tick for state in told.states]
+    assert ticks == list(range(ticks[0], ticks[-1] + 1))
+    kinds = {event.kind for event in told.events}
+    assert {
+        "motion_started",
+        "motion_done",
+        "motion_stopped",
+        "stream_stopped",
+        "shaper_changed",
+        "warning",
+    } == kinds
+    assert max(state.target_q[0] for state in told.states) > 0.5
+
+
+async def test_another_seed_gives_other_noise_and_the_same_reference():
+    async def first_states(seed):
+        async with robot_in_process(free_setup(seed=seed)) as robot, robot.control("noise") as arm:
+            with collect(robot) as told:
+                await arm.move_j(NEAR, wait=False)
+                await robot.advance(100)
+        return told.states
+
+    one, other = await first_states(1), await first_states(2)
+    assert [state.target_q for state in one] == [state.target_q for state in other]
+    assert all(
+        a.actual_tool_accelerometer != b.actual_tool_accelerometer for a, b in zip(one, other, strict=True)
+    )

@@ -1,0 +1,364 @@
+"""How `tvist serve` ends, and how it does not begin."""
+
+import json
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import msgpack
+import pytest
+import zenoh
+from tests.conformance.served import PATIENCE, Served, free_endpoint
+from tests.conformance.wire import Wire
+
+from tvist_lab.mcap_file import read
+from tvist_lab.replay import replay_file
+
+SECOND = 1.0
+FAR = [1.5, -3.0, 0.2, -1.5, 0.1, 0.3]
+
+
+def refused_to_start(*options, endpoint=None):
+    """What `tvist serve` says when it does not begin, and its exit code."""
+    with_port = ("--listen", endpoint or free_endpoint())
+    ended = subprocess.run(
+        [sys.executable, "-m", "tvist_cli", "serve", *with_port, *map(str, options)],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert ended.stdout == ""
+    assert ended.stderr.count("\n") == 1, ended.stderr
+    assert ended.stderr.startswith("tvist: ")
+    return ended.returncode, ended.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_in_mid_motion_ends_it_in_a_second_with_the_recording_complete(number, tmp_path, measured):
+    path = tmp_path / "run.mcap"
+    with Served("--record", str(path), "--truth") as served:
+        with Wire(served.endpoint) as mover, Wire(served.endpoint) as watcher:
+            watcher.listen("state", "truth", "event")
+            mover.announce("mover")
+            token = mover.command("take_control", client="mover")["token"]
+            assert mover.command("set_shaper", token=token, name="zvd")["type"] == "done"
+            assert mover.command("move_j", token=token, q=FAR)["type"] == "accepted"
+            watcher.wait("state", lambda state: state["target_qd"][0] > 0.2)
+            code, took = served.end(number)
+            last = watcher.received["state"][-1]["tick"]
+        measured("from signal to exit [s]", round(took, 3))
+        assert code == 0
+        assert took < SECOND
+        served.assert_quiet()
+        assert f"recorded into {path}" in served.said
+    content = read(path)
+    assert content.complete
+    assert content.note is None
+    assert content.recording.missing_ticks == 0
+    assert content.states[-1].tick >= last
+    assert len(content.truths) == len(content.states)
+
+
+STOPPED_READER = """
+import json, os, signal, sys, zenoh
+config = zenoh.Config()
+config.insert_json5("mode", '"client"')
+config.insert_json5("connect/endpoints", json.dumps([sys.argv[1]]))
+session = zenoh.open(config)
+session.declare_subscriber("tvist/ur5e/state", lambda sample: None)
+next(iter(session.get("tvist/ur5e/info")))
+print("ready", flush=True)
+os.kill(os.getpid(), signal.SIGSTOP)
+"""
+
+
+@pytest.mark.parametrize("clock", ["realtime", "lockstep"])
+def test_a_client_that_has_stopped_reading_does_not_hold_up_the_end(clock, tmp_path, measured):
+    """Zenoh would wait ten seconds for it at close; in lockstep it stalls the publisher for five besides."""
+    path, ticks = tmp_path / "run.mcap", 6000  # more states than its socket holds
+    with Served(
+        "--clock", clock, *(["--speed", "4"] * (clock == "realtime")), "--record", str(path)
+    ) as served:
+        reader = subprocess.Popen(
+            [sys.executable, "-c", STOPPED_READER, served.endpoint], stdout=subprocess.PIPE
+        )
+        try:
+            assert reader.stdout.readline() == b"ready\n"
+            with Wire(served.endpoint) as wire:
+                token = wire.command("take_control", client="stepper")["token"]
+                assert wire.command("move_j", token=token, q=FAR)["type"] == "accepted"
+                wire.listen("state")
+                if clock == "lockstep":
+                    for _ in range(ticks // 1000):
+                        step = msgpack.packb({"type": "simulation.step", "token": token, "ticks": 1000})
+                        wire.session.get(wire.key("command"), payload=step, timeout=60.0)
+                    wire.until(500)
+                else:
+                    wire.until(ticks)
+                code, took = served.end()
+        finally:
+            reader.kill()
+            reader.wait(PATIENCE)
+            reader.stdout.close()
+        measured("from signal to exit [s]", round(took, 3))
+        assert code == 0
+        assert took < SECOND
+    assert read(path).complete
+
+
+def test_a_second_signal_while_it_ends_does_no_harm(tmp_path):
+    path = tmp_path / "run.mcap"
+    with Served("--record", str(path)) as served:
+        with Wire(served.endpoint) as wire:
+            wire.state()
+        served.process.send_signal(signal.SIGINT)
+        code, _ = served.end(signal.SIGTERM)
+        assert code == 0
+    assert read(path).complete
+
+
+def test_a_killed_server_leaves_a_recording_that_can_be_read_and_replays_equal(tmp_path):
+    path = tmp_path / "run.mcap"
+    with Served("--record", str(path)) as served:
+        with Wire(served.endpoint) as wire:
+            token = wire.command("take_control", client="mover")["token"]
+            wire.command("move_j", token=token, q=FAR)
+            last = wire.until(wire.state()["tick"] + 500)["tick"]
+        served.process.kill()
+        served.wait()
+    content = read(path)
+    assert not content.complete
+    assert "was not closed" in content.note
+    assert (
+        content.states[-1].tick > last - 200
+    )  # a chunk holds some 70 states, and the writer looks every 20 ms
+    assert replay_file(content).first_difference is None
+
+
+def test_a_disk_that_is_full_ends_the_recording_and_not_the_robot(tmp_path):
+    path = tmp_path / "run.mcap"
+    with Served("--record", str(path)) as served:
+        with Wire(served.endpoint) as wire:
+            tick = wire.state()["tick"]
+            resource.prlimit(served.process.pid, resource.RLIMIT_FSIZE, (50_000, 50_000))
+            served.wait_until_said("has stopped and is incomplete")
+            later = wire.state()["tick"]
+            assert later > tick
+            assert wire.info()["name"] == "ur5e"
+        code, _ = served.end()
+        assert code == 1
+        assert served.lines[-1].startswith("tvist: the recording")
+    assert read(path).states
+
+
+def test_clients_see_the_robot_go_at_once():
+    gone = threading.Event()
+
+    def on_alive(sample):
+        if sample.kind == zenoh.SampleKind.DELETE:
+            gone.set()
+
+    with Served() as served, Wire(served.endpoint) as wire:
+        wire.session.liveliness().declare_subscriber("tvist/ur5e/alive", on_alive, history=True)
+        assert wire.info()["name"] == "ur5e"
+        assert not gone.is_set()
+        assert served.end()[0] == 0
+        assert gone.wait(PATIENCE)
+
+
+def test_the_first_state_comes_within_two_seconds_of_the_start(measured):
+    endpoint = free_endpoint()
+    with Served(endpoint=endpoint) as served:
+        listens = time.monotonic() - served.began
+        with Wire(endpoint) as wire:
+            wire.state()
+            first = time.monotonic() - served.began
+    measured("start to listening [s]", round(listens, 3))
+    measured("start to first state at a client [s]", round(first, 3))
+    assert first < 2.0
+
+
+class TestDoesNotBegin:
+    def test_a_port_in_use_is_one_sentence_and_leaves_no_recording_behind(self, tmp_path):
+        path = tmp_path / "run.mcap"
+        with Served() as served:
+            code, said = refused_to_start("--record", path, endpoint=served.endpoint)
+        assert code == 1
+        assert "in use" in said
+        assert served.endpoint in said
+        assert not path.exists()
+
+    @pytest.mark.parametrize("where", ["nowhere/run.mcap", "."])
+    def test_a_recording_that_cannot_be_written_is_one_sentence_and_nothing_listens(self, where, tmp_path):
+        code, said = refused_to_start("--record", tmp_path / where)
+        assert code == 1
+        assert str(tmp_path / where) in said
+        assert "cannot be written" in said or "exists" in said
+
+    def test_a_recording_that_exists_is_not_replaced(self, tmp_path):
+        path = tmp_path / "run.mcap"
+        path.write_bytes(b"precious")
+        code, said = refused_to_start("--record", path)
+        assert code == 1
+        assert "exists" in said
+        assert path.read_bytes() == b"precious"
+
+    @pytest.mark.parametrize(
+        ("key", "value"),
+        {
+            "name": "Robot One",
+            "robot": "nope",
+            "payload": "-1",
+            "shaper": "zvx",
+            "calibration": "nope",
+            "clock": "sometimes",
+            "speed": "0",
+            "start": "Q9",
+            "seed": "-1",
+        }.items(),
+    )
+    def test_a_wrong_value_is_misuse_and_the_sentence_names_the_key(self, key, value):
+        code, said = refused_to_start(f"--{key}", value)
+        assert code == 2
+        assert key in said
+
+    @pytest.mark.parametrize("value", ["nan", "inf", "fast"])
+    def test_a_number_that_is_none_is_misuse(self, value):
+        code, said = refused_to_start("--speed", value)
+        assert code == 2
+        assert "speed" in said
+
+    @pytest.mark.parametrize("start", ["0,0,0", "0,0,0,0,0,nan", "0,0,0,0,0,9", "0,0,0,0,0,here"])
+    def test_a_start_that_is_no_posture_is_misuse(self, start):
+        code, said = refused_to_start("--start", start)
+        assert code == 2
+        assert "start" in said
+
+    @pytest.mark.parametrize("endpoint", ["nonsense", "tcp/127.0.0.1:99999", "tcp/192.0.2.1:7447"])
+    def test_an_endpoint_that_cannot_be_listened_on_is_named(self, endpoint):
+        code, said = refused_to_start(endpoint=endpoint)
+        assert code == 1  # which endpoints there are is Zenoh's to say
+        assert endpoint in said
+
+    def test_an_unknown_option_is_misuse(self):
+        code, said = refused_to_start("--colour", "red")
+        assert code == 2
+        assert "--colour" in said
+
+
+class TestConfigurationFile:
+    @pytest.mark.parametrize(
+        ("content", "named"),
+        [
+            ("colour = 'red'", "colour"),
+            ("speed = -1.0", "speed"),
+            ("speed = nan", "speed"),
+            ("truth = 'yes'", "truth"),
+            ("start = [0.0, 0.0]", "start"),
+            ("shaper = 'zvx'", "zvx"),
+            ("speed = ", "robot.toml"),
+        ],
+    )
+    def test_a_fault_is_one_sentence_that_names_the_key(self, content, named, tmp_path):
+        path = tmp_path / "robot.toml"
+        path.write_text(content, encoding="utf-8")
+        code, said = refused_to_start("--config", path)
+        assert code == 2
+        assert named in said
+
+    def test_one_that_is_not_there_is_misuse(self, tmp_path):
+        code, said = refused_to_start("--config", tmp_path / "nope.toml")
+        assert code == 2
+        assert "nope.toml" in said
+
+    def test_the_command_line_goes_before_it(self, tmp_path):
+        path = tmp_path / "robot.toml"
+        path.write_text('name = "from_file"\nclock = "lockstep"\nshaper = "none"\n', encoding="utf-8")
+        options = ("--config", str(path), "--shaper", "mzv")
+        with Served(*options, name="ours") as served, Wire(served.endpoint, "ours") as wire:
+            info = wire.info()
+        assert (info["name"], info["clock"], info["shaper"]) == ("ours", "lockstep", "mzv")
+
+
+class TestCalibrationFile:
+    def changed(self, tmp_path, change):
+        """The shipped calibration with a change, as a file."""
+        from importlib import resources
+
+        content = json.loads(
+            (resources.files("tvist_server.calibrations") / "ur5e_5kg.json").read_text("utf-8")
+        )
+        change(content)
+        path = tmp_path / "mine.json"
+        path.write_text(json.dumps(content), encoding="utf-8")
+        return path
+
+    def test_a_sound_one_is_used(self, tmp_path):
+        path = self.changed(tmp_path, lambda content: content.update(name="mine"))
+        with (
+            Served("--calibration", str(path), "--clock", "lockstep") as served,
+            Wire(served.endpoint) as wire,
+        ):
+            assert wire.info()["calibration"]["name"] == "mine"
+
+    @pytest.mark.parametrize(
+        ("change", "named"),
+        [
+            (lambda c: c.update(colour="red"), "colour"),
+            (lambda c: c["polynomial"].update(colour="red"), "colour"),
+            (lambda c: c.pop("payload"), "payload"),
+            (lambda c: c["polynomial"].pop("degree"), "degree"),
+            (lambda c: c["payload"].update(mass=-1.0), "mass"),
+            (lambda c: c["polynomial"].update(f_d_range=[0.0, 10.0]), "f_d_range"),
+            (lambda c: c["polynomial"].update(f_d_range=[10.0, 5.0]), "f_d_range"),
+            (lambda c: c["polynomial"].update(f_d_coefficients=[1.0]), "f_d_coefficients"),
+            (lambda c: c["polynomial"].update(joints=[9]), "joints"),
+            (lambda c: c.update(robot="UR3"), "UR3"),
+        ],
+    )
+    def test_a_fault_is_one_sentence_that_names_the_key(self, change, named, tmp_path):
+        code, said = refused_to_start("--calibration", self.changed(tmp_path, change))
+        assert code == 2
+        assert named in said
+
+    def test_one_that_is_no_json_is_one_sentence(self, tmp_path):
+        path = tmp_path / "mine.json"
+        path.write_text("{", encoding="utf-8")
+        code, said = refused_to_start("--calibration", path)
+        assert code == 2
+        assert "mine.json" in said
+
+
+def test_a_controller_that_fails_ends_the_server_with_exit_code_1_and_a_readable_recording(tmp_path):
+    """A server that answers but ticks no more would be worse than none."""
+    path = tmp_path / "run.mcap"
+    program = """
+import sys
+from tvist_cli.main import main
+from tvist_server.controller import Controller
+tick = Controller.tick
+def failing(self):
+    if self.tick_number == 100:
+        raise ArithmeticError("on purpose")
+    return tick(self)
+Controller.tick = failing
+sys.argv = ["tvist", "serve", *sys.argv[1:]]
+main()
+"""
+    ended = subprocess.run(
+        [sys.executable, "-c", program, "--listen", free_endpoint(), "--record", str(path)],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert ended.returncode == 1
+    assert "ArithmeticError: on purpose" in ended.stderr
+    assert ended.stderr.splitlines()[-1].startswith("tvist: ")
+    content = read(path)
+    assert content.complete
+    assert content.states[-1].tick == 100

@@ -1,0 +1,141 @@
+"""Control by lease, when its holder dies: the arm stops, everybody is told, and control is free again."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from tests.conformance.served import PATIENCE
+from tests.conformance.wire import Q1, STOPPED, TICK
+
+CLIENT = Path(__file__).with_name("dying_client.py")
+FAR = [2.0, *Q1[1:]]
+
+
+@pytest.fixture
+def client(realtime):
+    """Start a client process; it says when it does what it was asked to."""
+    processes = []
+
+    def start(*arguments):
+        process = subprocess.Popen(
+            [sys.executable, CLIENT, realtime.endpoint, *arguments], stdout=subprocess.PIPE
+        )
+        processes.append(process)
+        assert process.stdout.readline() == b"under way\n"
+        return process
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.wait(PATIENCE)
+        process.stdout.close()
+
+
+@pytest.fixture(autouse=True)
+def at_home(live):
+    """Every test begins and ends with the arm at Q1 and control free."""
+    live.listen("state", "event")
+    with live.control("home"):
+        pass
+    live.next("state", lambda state: state["target_q"] == Q1)
+    yield
+    with live.control("home"):
+        pass
+    live.next("state", lambda state: state["target_q"] == Q1)
+
+
+def kill(process):
+    process.kill()
+    process.wait(PATIENCE)
+    return time.monotonic()
+
+
+def test_a_client_with_a_token_of_liveliness_killed_in_mid_motion_loses_control_at_once(
+    client, live, measured
+):
+    process = client("move", "announced")
+    live.next("state", lambda state: state["target_qd"][0] > 0.5)
+    tick = live.received["state"][-1]["tick"]
+    killed = kill(process)
+    lost = live.wait("event", lambda event: event["kind"] == "lease_lost")
+    measured("from kill to lease_lost at a watcher [s]", round(time.monotonic() - killed, 4))
+    stopped = live.wait("event", lambda event: event["kind"] == "motion_stopped")
+    rest = live.next("state", lambda state: state["runtime_state"] == STOPPED)
+    assert (lost["tick"] - tick) * TICK < 0.3
+    assert stopped["tick"] == lost["tick"]
+    assert "dying" in lost["why"]
+    assert rest["target_q"][0] < FAR[0] - 0.5
+    assert live.info()["control"] is None
+    with live.control("heir") as token:
+        assert live.command("keep_alive", token=token) == {"type": "done"}
+
+
+def test_a_client_without_one_killed_in_mid_stream_is_noticed_within_260_ms(client, live, measured):
+    process = client("stream", "lease_s=1.0")
+    live.next("state", lambda state: (state["setpoint_sequence"] or 0) > 20)
+    kill(process)
+    stopped = live.wait("event", lambda event: event["kind"] == "stream_stopped")
+    live.until(stopped["tick"])
+    played = [state for state in live.received["state"] if state["setpoint_sequence"] is not None]
+    newest = max(state["setpoint_sequence"] for state in played)
+    last = min(state["tick"] for state in played if state["setpoint_sequence"] == newest)
+    silence = (stopped["tick"] - last) * TICK
+    measured("from the last set-point to stream_stopped [s of tick time]", round(silence, 4))
+    assert 0.2 < silence <= 0.26
+    assert live.info()["control"] == "dying"  # the lease itself lasts on, as its last set-point renewed it
+    lost = live.wait("event", lambda event: event["kind"] == "lease_lost")
+    assert (lost["tick"] - last) * TICK == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_killed_client_without_one_keeps_control_until_its_lease_runs_out(client, live):
+    process = client("move", "lease_s=1.0")
+    live.next("state", lambda state: state["target_qd"][0] > 0.1)
+    kill(process)
+    refused = live.command("take_control", client="heir")
+    assert (refused["type"], refused["code"]) == ("refused", "no_control")
+    lost = live.wait("event", lambda event: event["kind"] == "lease_lost")
+    stopped = live.wait("event", lambda event: event["kind"] == "motion_stopped")
+    assert stopped["tick"] == lost["tick"]
+    with live.control("heir"):
+        pass
+
+
+def test_a_lease_that_nobody_renews_runs_out_after_its_time(live):
+    began = live.info()["tick"]
+    token = live.command("take_control", client="sleepy", lease_s=0.5)["token"]
+    granted = live.info()["tick"]
+    lost = live.wait("event", lambda event: event["kind"] == "lease_lost")
+    assert began + 250 <= lost["tick"] <= granted + 255
+    refused = live.command("keep_alive", token=token)
+    assert (refused["type"], refused["code"]) == ("refused", "no_control")
+
+
+def test_any_command_with_the_token_renews_it(live):
+    token = live.command("take_control", client="busy", lease_s=0.5)["token"]
+    until = live.info()["tick"] + 500  # twice the lease
+    while (tick := live.info()["tick"]) < until:
+        live.until(tick + 50)
+        assert live.command("keep_alive", token=token) == {"type": "done"}
+    assert not [event for event in live.received["event"] if event["kind"] == "lease_lost"]
+    live.command("release_control", token=token)
+
+
+def test_control_released_in_mid_motion_stops_it(live):
+    token = live.command("take_control", client="quitter")["token"]
+    motion = live.command("move_j", token=token, q=FAR)["id"]
+    live.next("state", lambda state: state["target_qd"][0] > 0.1)
+    assert live.command("release_control", token=token) == {"type": "done"}
+    stopped = live.wait("event", lambda event: event["kind"] == "motion_stopped")
+    assert stopped["id"] == motion
+
+
+def test_a_stream_that_never_begins_stops_250_ms_after_servo_start(live):
+    token = live.command("take_control", client="silent")["token"]
+    before = live.info()["tick"]
+    assert live.command("servo_start", token=token) == {"type": "done"}
+    after = live.info()["tick"]
+    stopped = live.wait("event", lambda event: event["kind"] == "stream_stopped")
+    assert before + 125 <= stopped["tick"] <= after + 130
+    live.command("release_control", token=token)

@@ -1,0 +1,89 @@
+"""What went along the line in a tick, as the messages that clients get."""
+
+from tvist_plant.description import RobotDescription
+from tvist_plant.plant import PERIOD, Plant
+from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_protocol.stream import State, Truth
+from tvist_server.control.kinematics import ForwardKinematics, rotation_vector
+from tvist_server.cycle import Sample
+from tvist_shaping.filter import TvistFilter
+
+TRUE_MODES_EVERY = 50
+"""Ticks between two computations of the arm's true modes: an eigenvalue problem takes a good part of one."""
+
+
+class Reporter:
+    """Makes states and truths.
+
+    Args:
+        description: The robot.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self._joints = description.joints
+        self._kinematics = ForwardKinematics(description)
+        self._true_modes: dict[str, list[float]] = {}
+
+    def state(
+        self,
+        tick: int,
+        sample: Sample,
+        tvist: TvistFilter,
+        *,
+        moving: bool,
+        setpoint_sequence: int | None,
+        missed_ticks: int,
+    ) -> State:
+        """The state of a tick."""
+        target, measured = sample.target, sample.measured
+        pose, speed = self._kinematics.tool(measured.q, measured.qd)
+        return State(
+            tick=tick,
+            timestamp=tick * PERIOD,
+            robot_mode=RobotMode.RUNNING.value,
+            safety_mode=SafetyMode.NORMAL.value,
+            runtime_state=(RuntimeState.PLAYING if moving else RuntimeState.STOPPED).value,
+            setpoint_sequence=setpoint_sequence,
+            reference_q=sample.reference.tolist(),
+            target_q=target.q.tolist(),
+            target_qd=target.qd.tolist(),
+            target_qdd=target.qdd.tolist(),
+            target_moment=sample.torque.tolist(),
+            actual_q=measured.q.tolist(),
+            actual_qd=measured.qd.tolist(),
+            actual_moment=measured.moment.tolist(),
+            actual_TCP_pose=pose,
+            actual_TCP_speed=speed,
+            actual_tool_accelerometer=measured.accelerometer.tolist(),
+            speed_scaling=1.0,
+            estimated_f_d=tvist.f_d.tolist(),
+            estimated_zeta=tvist.zeta.tolist(),
+            shaper_delay=tvist.delay,
+            missed_ticks=missed_ticks,
+        )
+
+    def truth(self, tick: int, arm: Plant) -> Truth:
+        """What no robot can know of itself after a tick; its modes are computed now and then."""
+        if not self._true_modes or tick % TRUE_MODES_EVERY == 0:
+            modes = arm.modes()
+            self._true_modes = {
+                "f_d": modes.f_d[: self._joints].tolist(),
+                "zeta": modes.zeta[: self._joints].tolist(),
+                "participation": modes.participation[: self._joints].tolist(),
+            }
+        truth = arm.truth()
+        return Truth(
+            tick=tick,
+            timestamp=tick * PERIOD,
+            motor_q=truth.motor_q.tolist(),
+            motor_qd=truth.motor_qd.tolist(),
+            gear_deflection=truth.gear_deflection.tolist(),
+            link_deflection=truth.link_deflection.tolist(),
+            flange_pose=truth.flange_position.tolist() + rotation_vector(truth.flange_rotation),
+            tool_acceleration=truth.specific_force.tolist(),
+            **self._true_modes,
+        )
+
+    def forget_modes(self) -> None:
+        """The arm was put elsewhere: compute its modes anew."""
+        self._true_modes = {}
