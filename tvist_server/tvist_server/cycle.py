@@ -72,6 +72,9 @@ class ControlCycle:
         """Whether a stop bypasses the filter."""
         self._deceleration = math.inf
         self.reset(q, carried=carried, seed=seed)
+        # The first step loads compiled code, which lasts many ticks: it is made here, and taken back.
+        self.step()
+        self.reset(q, seed=seed)
 
     def step(self) -> Sample:
         """One tick."""
