@@ -20,9 +20,12 @@ def main(arguments: list[str] | None = None) -> int:
         "endpoint", nargs="?", default=ENDPOINT, help="where its server listens (%(default)s)"
     )
     checking.add_argument("--name", default=NAME, help="the robot's name (%(default)s)")
+    checking.add_argument(
+        "--security", metavar="DIR", help="folder with this client's certificate, for tls/HOST:PORT"
+    )
     checking.add_argument("--json", action="store_true", help="print one JSON object")
     chosen = parser.parse_args(arguments)
-    report = check(chosen.endpoint, chosen.name)
+    report = check(chosen.endpoint, chosen.name, security=chosen.security)
     text = msgspec.json.encode(report).decode() if chosen.json else describe(report)
     sys.stdout.write(text + "\n")
     return 0 if report.ok else 1

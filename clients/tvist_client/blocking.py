@@ -19,6 +19,7 @@ from tvist_client import stream as asynchronous_stream
 from tvist_client.portal import Portal
 from tvist_client.robot import ANSWER_S, BUFFER, ENDPOINT, NAME
 from tvist_client.transports.base import Transport
+from tvist_client.transports.certificates import Folder
 from tvist_protocol.commands import Command, StepSetpoint
 from tvist_protocol.info import Clock, Info
 from tvist_protocol.replies import Accepted, Done
@@ -206,11 +207,11 @@ class Robot:
         self._robot = robot
 
     @classmethod
-    def connect(cls, endpoint: str = ENDPOINT, name: str = NAME) -> Self:
+    def connect(cls, endpoint: str = ENDPOINT, name: str = NAME, *, security: Folder | None = None) -> Self:
         """Connect over Zenoh and shake hands."""
         portal = Portal()
         try:
-            robot = portal.call(lambda: asynchronous_robot.Robot.connect(endpoint, name))
+            robot = portal.call(lambda: asynchronous_robot.Robot.connect(endpoint, name, security=security))
         except BaseException:
             portal.close()
             raise

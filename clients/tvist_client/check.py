@@ -5,8 +5,9 @@ from collections.abc import Callable
 
 import msgspec
 
-from tvist_client.errors import ClientError, UnexpectedReplyError
+from tvist_client.errors import ClientError, NotConnectedError, UnexpectedReplyError
 from tvist_client.robot import ENDPOINT, NAME, Robot
+from tvist_client.transports.certificates import Folder
 from tvist_protocol.commands import MoveJ
 from tvist_protocol.errors import RefusedError, TvistError
 from tvist_protocol.stream import State
@@ -43,19 +44,20 @@ class Report(msgspec.Struct, frozen=True):
     """Step by step; a step that fails is the last."""
 
 
-def check(endpoint: str = ENDPOINT, name: str = NAME) -> Report:
+def check(endpoint: str = ENDPOINT, name: str = NAME, *, security: Folder | None = None) -> Report:
     """Shake hands with a robot, see a state, and have a command refused. Changes nothing.
 
     Args:
         endpoint: Where the server listens, `tcp/<host>:<port>`.
         name: The robot's name.
+        security: Folder with this client's certificate, for `tls/<host>:<port>`.
     """
-    return asyncio.run(_Check(endpoint, name).run())
+    return asyncio.run(_Check(endpoint, name, security).run())
 
 
 class _Check:
-    def __init__(self, endpoint: str, name: str) -> None:
-        self.endpoint, self.name = endpoint, name
+    def __init__(self, endpoint: str, name: str, security: Folder | None) -> None:
+        self.endpoint, self.name, self.security = endpoint, name, security
         self.protocol: int | None = None
         self.rate: float | None = None
         self.findings: list[Finding] = []
@@ -63,7 +65,7 @@ class _Check:
     async def run(self) -> Report:
         step = "connect"
         try:
-            async with await Robot.connect(self.endpoint, self.name) as robot:
+            async with await Robot.connect(self.endpoint, self.name, security=self.security) as robot:
                 self.passed(step, f"{self.name} at {self.endpoint}")
                 for step, run in (("info", self.info), ("state", self.state), ("refusal", self.refusal)):
                     self.passed(step, await run(robot))
@@ -103,6 +105,12 @@ class _Check:
             if error.reply.code in {"stale_token", "no_control"}:
                 return f"a command without control is refused: {error.reply.code}"
             raise
+        except NotConnectedError:
+            # Access control drops what is not allowed, and a query that nobody hears ends at once.
+            if self.security is None:
+                raise
+            await robot.info()  # the robot is still there, so it is this client that is not heard
+            return "its commands are not heard: this certificate is a viewer's"
         raise ClientError("a command with a stale token was obeyed: the server does not guard control")
 
 

@@ -12,6 +12,7 @@ from tvist_client.feed import Feed
 from tvist_client.motion import Motion, Motions
 from tvist_client.stream import Stream
 from tvist_client.transports.base import Transport
+from tvist_client.transports.certificates import Folder
 from tvist_client.transports.zenoh import ZenohTransport
 from tvist_protocol.codec import (
     decode_event,
@@ -64,17 +65,22 @@ class Robot:
         transport.on_lost(self._on_lost)
 
     @classmethod
-    async def connect(cls, endpoint: str = ENDPOINT, name: str = NAME) -> Self:
+    async def connect(
+        cls, endpoint: str = ENDPOINT, name: str = NAME, *, security: Folder | None = None
+    ) -> Self:
         """Connect over Zenoh and shake hands.
 
         Args:
             endpoint: Where the server listens, `tcp/<host>:<port>`.
             name: The robot's name.
+            security: Folder with this client's certificate, as `tvist keys` makes it; the endpoint is then
+                `tls/<host>:<port>`.
 
         Raises:
-            NotConnectedError: Nobody listens there, or no robot of that name is there.
+            NotConnectedError: Nobody listens there, the certificate is not taken, or no robot of that name
+                is there or shows itself.
         """
-        robot = cls(await ZenohTransport.open(endpoint, name))
+        robot = cls(await ZenohTransport.open(endpoint, name, security))
         try:
             await robot.info()
         except BaseException:

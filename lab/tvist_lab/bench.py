@@ -130,7 +130,7 @@ def _cycle(setup: Setup) -> float:
 
     def batch() -> int:
         cycle.reset(start)
-        cycle.move(target, Limits(1.5, 2.0, 100.0))
+        cycle.start(cycle.plan(target, Limits(1.5, 2.0, 100.0)))
         for _ in range(TICKS):
             cycle.step()
         return TICKS

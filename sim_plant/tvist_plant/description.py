@@ -139,6 +139,33 @@ class Sensors(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """rms per axis [m/s^2]."""
 
 
+class Body(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A capsule that holds a part of the arm."""
+
+    name: str
+    link: Annotated[int, Meta(ge=-1, lt=MAX_JOINTS)]
+    """Number of the link it belongs to, in whose Denavit-Hartenberg frame it stands; -1: the world."""
+    start: Vector3
+    """One end of its axis [m]."""
+    end: Vector3
+    """The other end [m]."""
+    radius: Positive
+    """[m]."""
+
+
+class Collision(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What may not meet: bodies of the arm, and the floor. Neighbours in the list may touch."""
+
+    floor: Number = 0.0
+    """Height [m]; the first two bodies stand on it and cannot reach it."""
+    payload_radius: Positive = 0.05
+    """Of a capsule around the line from the flange through the payload's centre to twice its distance [m]."""
+    apart: tuple[tuple[str, str], ...] = ()
+    """Further pairs that cannot meet; "payload" is one of the names."""
+    bodies: tuple[Body, ...] = ()
+    """From the base to the flange."""
+
+
 class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Everything a robot file holds."""
 
@@ -150,6 +177,7 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
     drives: Drives
     link_flexibility: LinkFlexibility = LinkFlexibility()
     sensors: Sensors = Sensors()
+    collision: Collision = Collision()
     poses: dict[str, tuple[Number, ...]] = {}
     """Named joint positions [rad]."""
 
@@ -238,10 +266,33 @@ def _check(description: RobotDescription, source: str | Path) -> None:
             f"robot file {source}: link_flexibility.links is {list(flexible.links)}; "
             f"each may stand there once and must be one of {possible}, whose length kinematics.a is not 0"
         )
+    _check_collision(description, source)
     for name, pose in description.poses.items():
         if len(pose) != joints:
             raise DescriptionError(
                 f"robot file {source}: poses.{name} has {len(pose)} entries; robot.joints has {joints}"
+            )
+
+
+def _check_collision(description: RobotDescription, source: str | Path) -> None:
+    """Check that bodies belong to links that exist, and that pairs name bodies."""
+    names = [body.name for body in description.collision.bodies]
+    known = {*names, "payload"}
+    if len(known) <= len(names):
+        raise DescriptionError(
+            f"robot file {source}: collision.bodies has the names {names}; "
+            "each may stand there once, and payload and floor are taken"
+        )
+    for body in description.collision.bodies:
+        if body.link >= description.joints:
+            raise DescriptionError(
+                f"robot file {source}: collision.bodies: {body.name} has link {body.link}; "
+                f"it must be below {description.joints}"
+            )
+    for pair in description.collision.apart:
+        if not known.issuperset(pair):
+            raise DescriptionError(
+                f"robot file {source}: collision.apart has {list(pair)}; the bodies are {sorted(known)}"
             )
 
 

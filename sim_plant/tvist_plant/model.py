@@ -48,7 +48,7 @@ def rigid_model(description: RobotDescription, payload: Payload) -> pin.Model:
     parent, placement = 0, pin.SE3.Identity()
     for number, name in enumerate(description.robot.joints):
         parent = model.addJoint(parent, pin.JointModelRZ(), placement, name)
-        placement = _link_frame(description, number)
+        placement = link_frame(description, number)
         model.appendBodyToJoint(parent, _link_inertia(description, number), placement)
     _add_flange(model, parent, placement, payload)
     return model
@@ -66,7 +66,7 @@ def flexible_model(description: RobotDescription, payload: Payload) -> FlexibleM
     for number, name in enumerate(description.robot.joints):
         parent = model.addJoint(parent, pin.JointModelRZ(), placement, name)
         joints.append(model.nv - 1)
-        frame = _link_frame(description, number)
+        frame = link_frame(description, number)
         if number not in stiffness_of:
             model.appendBodyToJoint(parent, _link_inertia(description, number), frame)
             placement = frame
@@ -95,7 +95,7 @@ def _shift(x: float, z: float) -> pin.SE3:
     return pin.SE3(np.eye(3), np.array([x, 0.0, z]))
 
 
-def _link_frame(description: RobotDescription, number: int) -> pin.SE3:
+def link_frame(description: RobotDescription, number: int) -> pin.SE3:
     """Denavit-Hartenberg frame of a link in the frame of its joint: Tz(d) Tx(a) Rx(alpha)."""
     kinematics = description.kinematics
     alpha = kinematics.alpha[number]

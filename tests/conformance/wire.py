@@ -29,12 +29,13 @@ def _any(_):
 class Wire:
     """A Zenoh session with one robot. Keeps every message of the topics it listens to."""
 
-    def __init__(self, endpoint, robot="ur5e"):
+    def __init__(self, endpoint, robot="ur5e", settings=()):
         config = zenoh.Config()
         for path, value in {
             "mode": "client",
             "connect/endpoints": [endpoint],
             "scouting/multicast/enabled": False,
+            **dict(settings),
         }.items():
             config.insert_json5(path, json.dumps(value))
         self.robot = robot

@@ -37,6 +37,7 @@ def cut(joints: int) -> RobotDescription:
     changes["link_flexibility"] = replace(
         flexible, links=tuple(kept), stiffness=flexible.stiffness[: len(kept)]
     )
+    changes["collision"] = type(UR5E.collision)()  # such an arm would carry its payload inside itself
     changes["poses"] = {name: pose[:joints] for name, pose in UR5E.poses.items()}
     return replace(UR5E, **changes)
 

@@ -10,8 +10,9 @@ from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.stream import Telemetry
 from tvist_protocol.values import Payload
 from tvist_server.about import info_of
-from tvist_server.controller import STREAM_TIMEOUT, Controller
+from tvist_server.controller import Controller
 from tvist_server.cycle import STILL
+from tvist_server.motion import STREAM_TIMEOUT
 from tvist_server.setup import body, paper_payload
 
 from .robots import PAPER, Q1, Q2, Q3, ROUNDING, UR5E, H, Robot, calibration, cut, setup
@@ -319,10 +320,6 @@ WRONG = [
     ),
 ]
 NOT_YET = [
-    (c.HandOver, {"client": "b"}),
-    (c.Pause, {}),
-    (c.Resume, {}),
-    (c.SetSpeed, {"fraction": 0.5}),
     (c.PowerOn, {}),
     (c.PowerOff, {}),
     (c.UnlockProtectiveStop, {}),
@@ -492,7 +489,7 @@ def test_counters_go_on_from_stream_to_stream_and_fit_the_wire():
         robot.tick(5)
         robot.send(c.ServoStop)
         robot.until_rest()
-    late, lost, _ = robot.controller.stream_counters()
+    late, lost, _ = robot.controller.motion.counters()
     assert late == 2
     assert 0 < lost <= 4000
     counts = dict.fromkeys(Telemetry.__struct_fields__, 0)
@@ -771,6 +768,10 @@ def anything(random: np.random.Generator, robot: Robot):
         (c.SimulationReset, {"payload": Payload(mass=float(random.uniform(0, 20)), **body_)}),
         (c.SimulationReset, {"shaper": "mzv"}),
         (c.SimulationStep, {"ticks": 5, "setpoints": (c.StepSetpoint(sequence=1, q=q),)}),
+        (c.HandOver, {"client": "b"}),
+        (c.Pause, {}),
+        *[(c.Resume, {})] * 2,
+        (c.SetSpeed, {"fraction": float(random.choice([0.0, 0.3, 1.0, 1.0, 1.0]))}),
         *NOT_YET,
     ]
     kind, fields = choices[random.integers(len(choices))]
@@ -790,8 +791,9 @@ def test_whatever_comes_nothing_breaks_and_every_motion_ends_once(seed):
     sequence = received = 0
     accepted = set()
     for _ in range(1000):
-        if robot.controller.session.lease is None and random.random() < 0.5:
-            reply = robot.send(c.TakeControl, client="a", lease_s=0.5)
+        lease = robot.controller.session.lease
+        if (lease is None or lease.token != robot.token) and random.random() < 0.5:
+            reply = robot.send(c.TakeControl, client=lease.client if lease else "a", lease_s=0.5)
         else:
             reply = anything(random, robot)
         sent += 1

@@ -16,7 +16,7 @@ GRAVITY = np.array([0.0, 0.0, -9.81])
 
 def motion(line, target, limits=PAPER):
     """Shaped reference at every tick of a motion, and for a while after; ticks until it was said to rest."""
-    line.move(np.array(target), limits)
+    line.start(line.plan(np.array(target), limits))
     shaped, rested = [], None
     for tick in range(6000):
         line.step()
@@ -37,7 +37,7 @@ def alpha(line):
 def residual(name):
     """Largest acceleration from 10 ms to 0.3 s after the shaped reference rests."""
     line = cycle(name, estimator=Fixed([6.7], [0.34]))
-    line.move(Q2, PAPER)
+    line.start(line.plan(Q2, PAPER))
     while not line.at_rest:
         line.step()
     after = []
@@ -88,7 +88,7 @@ def test_moves_one_after_the_other_begin_where_the_reference_ended():
     """Not where the shaped reference was when it was said to rest, up to 1e-7 rad before."""
     line = without_arm(cycle())
     for target in (Q1 + 0.2, Q1 + 0.5):
-        line.move(target, PAPER)
+        line.start(line.plan(target, PAPER))
         line.step()
         while not line.at_rest:
             line.step()
@@ -114,7 +114,7 @@ def test_shaping_lasts_as_long_as_its_delay_says():
 
 def test_the_target_s_derivatives_are_central_differences_of_the_shaped_reference():
     line = without_arm(cycle())
-    line.move(Q3, PAPER)
+    line.start(line.plan(Q3, PAPER))
     samples = [line.step().target for _ in range(700)]
     q = np.array([target.q for target in samples])
     qd, qdd = np.array([target.qd for target in samples]), np.array([target.qdd for target in samples])
@@ -141,7 +141,7 @@ def test_what_a_stream_leaves_behind_comes_to_rest_through_the_filter():
 
 def test_the_arm_follows():
     line = cycle()
-    line.move(Q2, PAPER)
+    line.start(line.plan(Q2, PAPER))
     while not line.at_rest:
         line.step()
     for _ in range(500):
@@ -152,13 +152,13 @@ def test_the_arm_follows():
 
 def test_a_reset_in_mid_motion_makes_it_as_new():
     used, fresh = cycle(), cycle(q=Q3, seed=3)
-    used.move(Q2, PAPER)
+    used.start(used.plan(Q2, PAPER))
     for _ in range(300):
         used.step()
     used.reset(Q3, seed=3)
     assert used.at_rest
     for line in (used, fresh):
-        line.move(Q1, Limits(1.0, 1.0, 50.0))
+        line.start(line.plan(Q1, Limits(1.0, 1.0, 50.0)))
     for _ in range(200):
         a, b = used.step(), fresh.step()
         assert (a.target.q == b.target.q).all()

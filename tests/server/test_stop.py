@@ -58,11 +58,11 @@ def test_a_stop_in_mid_motion_is_direct_and_final(name):
     dynamics = InverseDynamics(UR5E, body(paper_payload(UR5E)))
     share = TORQUE_SHARE * np.array(UR5E.limits.torque)
     line = without_arm(cycle(name))
-    line.move(Q3, PAPER)
+    line.start(line.plan(Q3, PAPER))
     undisturbed = until_rest(line)
     for moment in random.integers(2, len(undisturbed) - 2, MOMENTS):
         line.reset(Q1)
-        line.move(Q3, PAPER)
+        line.start(line.plan(Q3, PAPER))
         run(line, moment)
         # The newest reference is published one tick later.
         q, qd, qdd = undisturbed[moment]
@@ -85,20 +85,20 @@ def test_a_stop_in_mid_motion_is_direct_and_final(name):
 @pytest.mark.parametrize("name", ["zv", "ei3"])
 def test_after_a_stop_a_move_is_what_it_is_of_a_fresh_line(name):
     line = without_arm(cycle(name))
-    line.move(Q3, PAPER)
+    line.start(line.plan(Q3, PAPER))
     run(line, 431)
     line.stop(None)
     end = until_rest(line)[-1, 0]
     run(line, 3)
     fresh = without_arm(cycle(name, q=end))
     for moved in (line, fresh):
-        moved.move(Q2, PAPER)
+        moved.start(moved.plan(Q2, PAPER))
     assert (until_rest(line) == until_rest(fresh)).all()
 
 
 def test_a_stop_while_the_shaper_lets_a_finished_trajectory_out_is_a_stop_too():
     line = without_arm(cycle("ei3"))
-    motion = line.move(Q1 + 0.1, PAPER)
+    motion = line.start(line.plan(Q1 + 0.1, PAPER))
     while not motion.finished:
         run(line, 1)
     assert not line.at_rest
@@ -111,7 +111,7 @@ def test_a_stop_while_the_shaper_lets_a_finished_trajectory_out_is_a_stop_too():
 def test_a_harder_stop_takes_over_from_a_gentle_one():
     def way(*decelerations):
         line = without_arm(cycle())
-        line.move(Q2, PAPER)
+        line.start(line.plan(Q2, PAPER))
         run(line, 450)
         for deceleration in decelerations:
             line.stop(deceleration)
@@ -125,7 +125,7 @@ def test_a_harder_stop_takes_over_from_a_gentle_one():
 
 def test_a_harder_stop_keeps_the_acceleration_within_its_limit():
     line = without_arm(cycle())
-    line.move(Q2, PAPER)
+    line.start(line.plan(Q2, PAPER))
     run(line, 450)
     line.stop(2.0)
     run(line, 30)
@@ -136,7 +136,7 @@ def test_a_harder_stop_keeps_the_acceleration_within_its_limit():
 def test_a_repeated_stop_changes_nothing():
     def stopped(times):
         line = without_arm(cycle())
-        line.move(Q2, PAPER)
+        line.start(line.plan(Q2, PAPER))
         run(line, 300)
         out = []
         for _ in range(times):

@@ -19,7 +19,7 @@ def main() -> None:
         help_format="plaintext",
     )
     for name in (
-        "serve", "demo", "paper", "identify", "record", "replay", "analyze", "check", "move", "watch", "bench",
+        "serve", "demo", "paper", "identify", "record", "replay", "analyze", "check", "move", "watch", "bench", "keys",
     ):  # fmt: skip
         app.command(f"tvist_cli.commands.{name}:{name}", name=name)
     try:

@@ -29,6 +29,10 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Robot that comes with the package, or path of a robot file."""
     listen: tuple[str, ...] = (DEFAULT_ENDPOINT,)
     """Zenoh endpoints to listen on."""
+    security: str | None = None
+    """Folder with certificates and roles, as `tvist keys` makes it; endpoints are then tls/…"""
+    insecure: bool = False
+    """Let anybody who reaches an endpoint move the robot, on whatever network that is."""
     payload: Annotated[float, Meta(ge=0, le=100)] | None = None
     """Mass of the paper's disc, declared and carried [kg]; default: the robot file's payload."""
     shaper: str = "zv"

@@ -17,16 +17,15 @@ from tvist_protocol.stream import Event, EventKind, State, Truth
 from tvist_protocol.values import PROTOCOL_VERSION, Payload
 from tvist_server.calibrations import fits
 from tvist_server.choices import choose_estimator, choose_filter
+from tvist_server.collision import CollisionModel
 from tvist_server.cycle import ControlCycle
+from tvist_server.motion import MotionControl
 from tvist_server.refusal import RefusalError, check_body, check_joints, check_motion
 from tvist_server.reporting import Reporter
 from tvist_server.session import NoControlError, Session
 from tvist_server.setup import Setup, body
-from tvist_server.trajectory import Limits, SetpointStream
+from tvist_server.trajectory import Limits
 from tvist_shaping.filter import TvistFilter
-
-STREAM_TIMEOUT = 0.25
-"""A stream without set-points for this long is stopped [s]."""
 
 
 @dataclass
@@ -36,9 +35,6 @@ class Counters:
     commands: int = 0
     refused: int = 0
     setpoints_received: int = 0
-    setpoints_late: int = 0
-    setpoints_lost: int = 0
-    setpoints_limited: int = 0
     setpoints_refused: int = 0
     missed_ticks: int = 0
 
@@ -62,7 +58,6 @@ class Controller:
         self.calibration: Calibration | None = setup.calibration
         self.estimator_name = "fixed" if setup.calibration is None else "polynomial"
         self.session = Session(timeouts=setup.clock == "realtime")
-        self._timeouts = setup.clock == "realtime"
         try:
             tvist = choose_filter(setup.shaper, setup.estimator(), setup.description.joints)
         except RefusalError as error:
@@ -78,10 +73,8 @@ class Controller:
         self._reporter = Reporter(setup.description)
         self._events: list[Event] = []
         self._seed = setup.seed
-        self._motions = 0
-        self._motion: int | None = None
-        self._stream: SetpointStream | None = None
-        self._stream_heard = 0.0
+        collisions = CollisionModel(setup.description, body(setup.payload))
+        self.motion = MotionControl(self.cycle, collisions, self._emit)
         self._warn_of_payload()
 
     @property
@@ -105,23 +98,22 @@ class Controller:
 
     def receive_setpoint(self, setpoint: c.Setpoint) -> None:
         """Take a set-point; one that is not for us is counted and dropped: nobody waits for an answer."""
-        counters, stream = self.counters, self._stream
+        counters = self.counters
         counters.setpoints_received += 1
         lease = self.session.lease
         limits = self.setup.description.limits.position
         wanted = (
-            stream is not None
+            self.motion.streaming
             and lease is not None
             and setpoint.token == lease.token
             and len(setpoint.q) == len(limits)
             and all(abs(angle) <= limit for angle, limit in zip(setpoint.q, limits, strict=True))
         )
-        if not wanted or stream is None:
+        if not wanted:
             counters.setpoints_refused += 1
             return
         self.session.renew(setpoint.token, self.now)
-        self._stream_heard = self.now
-        stream.offer(setpoint.sequence, np.array(setpoint.q, dtype=float))
+        self.motion.offer(setpoint.sequence, np.array(setpoint.q, dtype=float), self.now)
 
     def client_seen(self, client: str) -> None:
         """A client's liveliness token is there."""
@@ -141,18 +133,16 @@ class Controller:
     def tick(self) -> tuple[State, list[Event]]:
         """One control period."""
         self._watch_time()
-        sample = self.cycle.step()
-        if self.cycle.at_rest and self._motion is not None:
-            self._emit("motion_done", id=self._motion)
-            self._motion = None
+        sample = self.motion.step()
         self.tick_number += 1
         events, self._events = self._events, []
         state = self._reporter.state(
             self.tick_number,
             sample,
             self.cycle.tvist,
-            moving=not self.cycle.at_rest,
-            setpoint_sequence=self._stream.sequence if self._stream else None,
+            runtime=self.motion.runtime,
+            speed=self.motion.speed,
+            setpoint_sequence=self.motion.sequence,
             missed_ticks=self.counters.missed_ticks,
         )
         return state, events
@@ -172,59 +162,17 @@ class Controller:
         """Put down an event of the tick that is being made; of the next one between two."""
         self._events.append(Event(tick=self.tick_number + 1, kind=kind, id=id, code=code, why=why))
 
-    # ------------------------------------------------------------------ motion
-
     def _watch_time(self) -> None:
         """End what nobody keeps up."""
         if self.session.expired(self.now):
             self._lose_lease("the lease ran out: no command renewed it")
-        if self._timeouts and self._stream is not None and self.now - self._stream_heard >= STREAM_TIMEOUT:
-            self._stop(None, f"no set-point for {STREAM_TIMEOUT:g} s")
+        if self.setup.clock == "realtime":
+            self.motion.watch(self.now)
 
     def _lose_lease(self, why: str) -> None:
         self.session.release()
         self._emit("lease_lost", why=why)
-        if not self.cycle.at_rest:
-            self._stop(None, why)
-
-    def _stop(self, deceleration: float | None, why: str) -> None:
-        """Stop past the filter and say how what was moving ended."""
-        self._end_stream(why)
-        if self.cycle.at_rest:
-            return
-        plan = self.cycle.stop(deceleration)
-        if plan is None:
-            return
-        if plan.limited:
-            why = f"{why}; deceleration is {plan.acceleration:.3g} rad/s², limited from {deceleration:.3g}"
-        if self._motion is not None:
-            self._emit("motion_stopped", id=self._motion, why=why)
-            self._motion = None
-        elif plan.limited:
-            self._emit("warning", code="limit_acceleration", why=why)
-
-    def _end_stream(self, why: str) -> None:
-        if self._stream is not None:
-            counters = self.counters
-            counters.setpoints_late += self._stream.late
-            counters.setpoints_lost += self._stream.lost
-            counters.setpoints_limited += self._stream.limited
-            self._stream = None
-            self._emit("stream_stopped", why=why)
-
-    def stream_counters(self) -> tuple[int, int, int]:
-        """Late, lost and limited set-points, the running stream's included."""
-        counters, stream = self.counters, self._stream
-        late, lost, limited = (stream.late, stream.lost, stream.limited) if stream else (0, 0, 0)
-        return (
-            counters.setpoints_late + late,
-            counters.setpoints_lost + lost,
-            counters.setpoints_limited + limited,
-        )
-
-    def _check_rest(self) -> None:
-        if not self.cycle.at_rest or self._stream is not None:
-            raise RefusalError("busy", "", "the arm is moving: wait for motion_done or send stop")
+        self.motion.stop(None, why)
 
     # ------------------------------------------------------------------ commands
 
@@ -243,55 +191,64 @@ class Controller:
         self._authorize(command.token)
         return Done()
 
+    def hand_over(self, command: c.HandOver) -> Reply:
+        """Give the lease to another client, who then takes control and gets a token of its own."""
+        self._authorize(command.token)
+        self.session.hand_over(command.client, self.now)
+        return Done()
+
     def release_control(self, command: c.ReleaseControl) -> Reply:
         """End the lease, and motion with it."""
         self._authorize(command.token)
         self.session.release()
-        if not self.cycle.at_rest:
-            self._stop(None, "control was released")
+        self.motion.stop(None, "control was released")
         return Done()
 
     def move_j(self, command: c.MoveJ) -> Reply:
         """Start a point-to-point motion."""
         self._authorize(command.token)
-        description = self.setup.description
-        check_joints(command.q, description)
-        check_motion(command.velocity, command.acceleration, command.jerk, description)
-        self._check_rest()
+        check_joints(command.q, self.setup.description)
+        check_motion(command.velocity, command.acceleration, command.jerk, self.setup.description)
         limits = Limits(command.velocity, command.acceleration, command.jerk)
-        try:
-            self.cycle.move(np.array(command.q, dtype=float), limits)
-        except ValueError as error:
-            raise RefusalError("out_of_range", "velocity", str(error)) from error
-        self._motions += 1
-        self._motion = self._motions
-        self._emit("motion_started", id=self._motion)
-        return Accepted(id=self._motion)
+        return Accepted(id=self.motion.move(np.array(command.q, dtype=float), limits))
 
     def servo_start(self, command: c.ServoStart) -> Reply:
         """Start to follow set-points."""
         self._authorize(command.token)
         check_motion(command.velocity, command.acceleration, command.jerk, self.setup.description)
-        self._check_rest()
         limits = Limits(command.velocity, command.acceleration, command.jerk)
-        self._stream = self.cycle.stream(command.period, limits)
-        self._stream_heard = self.now
+        self.motion.follow(command.period, limits, self.now)
         return Done()
 
     def servo_stop(self, command: c.ServoStop) -> Reply:
         """Bring the stream to rest."""
         self._authorize(command.token)
-        if self._stream is None:
-            raise RefusalError("wrong_mode", "", "no stream is running: send servo_start first")
-        self.cycle.end_stream(self._stream)
-        self._end_stream("servo_stop")
+        self.motion.end_stream()
         return Done()
 
     def stop(self, command: c.Stop) -> Reply:
         """Stop; anyone may."""
         if command.token is not None:
             self._authorize(command.token)
-        self._stop(command.deceleration, "a stop was commanded")
+        self.motion.stop(command.deceleration, "a stop was commanded")
+        return Done()
+
+    def pause(self, command: c.Pause) -> Reply:
+        """Bring the motion to a standstill on its way."""
+        self._authorize(command.token)
+        self.motion.pause()
+        return Done()
+
+    def resume(self, command: c.Resume) -> Reply:
+        """Go on with it."""
+        self._authorize(command.token)
+        self.motion.resume()
+        return Done()
+
+    def set_speed(self, command: c.SetSpeed) -> Reply:
+        """Scale the time of motions."""
+        self._authorize(command.token)
+        self.motion.set_speed(command.fraction)
         return Done()
 
     def set_shaper(self, command: c.SetShaper) -> Reply:
@@ -301,7 +258,7 @@ class Controller:
             raise RefusalError("out_of_range", "modes", f"modes is {command.modes}; the estimators give 1", 1)
         estimator, joints = self.cycle.tvist.estimator, self.setup.description.joints
         tvist = choose_filter(command.name, estimator, joints, where="name")
-        self._check_rest()
+        self.motion.check_rest()
         self._use(tvist)
         return Done()
 
@@ -312,7 +269,7 @@ class Controller:
         where = "f_d" if calibration is None else "calibration"
         shaper, joints = self.cycle.tvist.shaper.name, self.setup.description.joints
         tvist = choose_filter(shaper, estimator, joints, where=where)
-        self._check_rest()
+        self.motion.check_rest()
         self.calibration, self.estimator_name = calibration, command.name
         self._use(tvist)
         self._warn_of_payload()
@@ -323,9 +280,10 @@ class Controller:
         self._authorize(command.token)
         payload = Payload(mass=command.mass, com=command.com, inertia=command.inertia)
         check_body(payload, rated=self.setup.description.limits.payload)
-        self._check_rest()
+        self.motion.check_rest()
         self.declared = payload
         self.cycle.declare(body(payload))
+        self.motion.collisions = CollisionModel(self.setup.description, body(payload))
         self._warn_of_payload()
         return Done()
 
@@ -343,10 +301,7 @@ class Controller:
         tvist = None
         if command.shaper is not None:
             tvist = choose_filter(command.shaper, self.cycle.tvist.estimator, description.joints)
-        self._end_stream("simulation.reset")
-        if self._motion is not None:
-            self._emit("motion_stopped", id=self._motion, why="simulation.reset")
-            self._motion = None
+        self.motion.abandon("simulation.reset")
         q = self.cycle.position if command.q is None else np.array(command.q, dtype=float)
         carried = None if command.payload is None else body(command.payload)
         if tvist is not None:
@@ -363,7 +318,7 @@ class Controller:
         if self.setup.clock == "realtime":
             why = "time passes by itself here: start with --clock lockstep to step"
             raise RefusalError("wrong_mode", "type", why)
-        if command.setpoints is not None and self._stream is None:
+        if command.setpoints is not None and not self.motion.streaming:
             raise RefusalError("wrong_mode", "setpoints", "no stream is running: send servo_start first")
         setpoints = command.setpoints or ()
         if len(setpoints) > command.ticks:
@@ -410,10 +365,10 @@ _HANDLERS: dict[type, Callable[[Controller, Any], Reply]] = {
     c.SetPayload: Controller.set_payload,
     c.SimulationReset: Controller.simulation_reset,
     c.SimulationStep: Controller.simulation_step,
-    c.HandOver: Controller.not_yet,
-    c.Pause: Controller.not_yet,
-    c.Resume: Controller.not_yet,
-    c.SetSpeed: Controller.not_yet,
+    c.HandOver: Controller.hand_over,
+    c.Pause: Controller.pause,
+    c.Resume: Controller.resume,
+    c.SetSpeed: Controller.set_speed,
     c.PowerOn: Controller.not_yet,
     c.PowerOff: Controller.not_yet,
     c.UnlockProtectiveStop: Controller.not_yet,

@@ -105,19 +105,25 @@ class ControlCycle:
         """Where the shaped reference is, shape (n,) [rad]."""
         return self._differentiator.newest.q
 
-    def move(self, target: Floats, limits: Limits) -> DoubleS:
-        """Start a point-to-point motion; the arm must be at rest.
+    def plan(self, target: Floats, limits: Limits, speed: float = 1.0) -> DoubleS:
+        """A point-to-point motion from where the reference is; the arm must be at rest.
+
+        Args:
+            target: Joint positions, shape (n,) [rad].
+            limits: For every joint.
+            speed: Rate of its time against the clock's to start with [-].
 
         Raises:
             ValueError: There is no such motion.
         """
-        return self._start(DoubleS(self.reference, target, limits, PERIOD))
+        return DoubleS(self.reference, target, limits, PERIOD, speed)
 
     def stream(self, stream_period: float, limits: Limits) -> SetpointStream:
         """Start to follow set-points; the arm must be at rest."""
-        return self._start(SetpointStream(self.reference, stream_period, limits, PERIOD))
+        return self.start(SetpointStream(self.reference, stream_period, limits, PERIOD))
 
-    def _start(self, trajectory: T) -> T:
+    def start(self, trajectory: T) -> T:
+        """Follow a trajectory that begins where the reference is."""
         self.trajectory = trajectory
         self.at_rest = False
         return trajectory
@@ -125,7 +131,16 @@ class ControlCycle:
     def end_stream(self, stream: SetpointStream) -> None:
         """Bring a stream to rest inside its own limits, through the filter."""
         limits = stream.limits
-        self._start(Stop(*stream.state, acceleration=limits.acceleration, jerk=limits.jerk, period=PERIOD))
+        self.start(Stop(*stream.state, acceleration=limits.acceleration, jerk=limits.jerk, period=PERIOD))
+
+    @property
+    def newest(self) -> Target:
+        """State of motion of the newest shaped reference."""
+        return self._differentiator.newest
+
+    def plan_stop(self, deceleration: float | None) -> StopPlan:
+        """The stop that could be made now; deceleration as of `stop`."""
+        return plan_stop(self.description, self.inverse_dynamics, self.newest, deceleration, PERIOD)
 
     def stop(self, deceleration: float | None) -> StopPlan | None:
         """Stop past the filter, straight from the shaped reference; nothing in the delay line plays on.
@@ -139,9 +154,8 @@ class ControlCycle:
         wanted = math.inf if deceleration is None else deceleration
         if self.stopping and wanted <= self._deceleration:
             return None
-        newest = self._differentiator.newest
-        plan = plan_stop(self.description, self.inverse_dynamics, newest, deceleration, PERIOD)
-        self._start(plan.trajectory)
+        plan = self.plan_stop(deceleration)
+        self.start(plan.trajectory)
         self.stopping, self._deceleration = True, wanted
         return plan
 

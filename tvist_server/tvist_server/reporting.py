@@ -30,19 +30,20 @@ class Reporter:
         sample: Sample,
         tvist: TvistFilter,
         *,
-        moving: bool,
+        runtime: RuntimeState,
+        speed: float,
         setpoint_sequence: int | None,
         missed_ticks: int,
     ) -> State:
         """The state of a tick."""
         target, measured = sample.target, sample.measured
-        pose, speed = self._kinematics.tool(measured.q, measured.qd)
+        pose, tool_speed = self._kinematics.tool(measured.q, measured.qd)
         return State(
             tick=tick,
             timestamp=tick * PERIOD,
             robot_mode=RobotMode.RUNNING.value,
             safety_mode=SafetyMode.NORMAL.value,
-            runtime_state=(RuntimeState.PLAYING if moving else RuntimeState.STOPPED).value,
+            runtime_state=runtime.value,
             setpoint_sequence=setpoint_sequence,
             reference_q=sample.reference.tolist(),
             target_q=target.q.tolist(),
@@ -53,9 +54,9 @@ class Reporter:
             actual_qd=measured.qd.tolist(),
             actual_moment=measured.moment.tolist(),
             actual_TCP_pose=pose,
-            actual_TCP_speed=speed,
+            actual_TCP_speed=tool_speed,
             actual_tool_accelerometer=measured.accelerometer.tolist(),
-            speed_scaling=1.0,
+            speed_scaling=speed,
             estimated_f_d=tvist.f_d.tolist(),
             estimated_zeta=tvist.zeta.tolist(),
             shaper_delay=tvist.delay,

@@ -15,6 +15,7 @@ from tvist_server.about import info_of
 from tvist_server.clock import Clock, Lockstep, Punctuality, Realtime
 from tvist_server.config import ConfigError, ServeConfig
 from tvist_server.controller import Controller
+from tvist_server.gateways.exposure import ExposureError, guarded
 from tvist_server.gateways.zenoh import ZenohGateway
 from tvist_server.host import Host
 from tvist_server.outlet import Outlet
@@ -43,6 +44,12 @@ class Server:
     def __init__(self, config: ServeConfig) -> None:
         setup = config.setup()
         try:
+            listen, guard = guarded(
+                config.listen, [setup.name], security=config.security, insecure=config.insecure
+            )
+        except ExposureError as error:
+            raise ConfigError(str(error)) from error
+        try:
             self.controller = Controller(setup)
         except ValueError as error:
             raise ConfigError(str(error)) from error
@@ -67,7 +74,7 @@ class Server:
         """After `close`: whether the network is left. Zenoh may still wait for a client that has stopped reading."""
         try:
             self._gateway = ZenohGateway(
-                setup.name, config.listen, self, lockstep=lockstep, truth=setup.truth
+                setup.name, listen, self, lockstep=lockstep, truth=setup.truth, guard=guard
             )
         except Exception:
             if self.recorder is not None:
@@ -151,7 +158,7 @@ class Server:
 
     def _telemetry(self, punctuality: Punctuality | None) -> Telemetry:
         controller, counters = self.controller, self.controller.counters
-        late, lost, limited = controller.stream_counters()
+        late, lost, limited = controller.motion.counters()
         on_time = punctuality or Punctuality(0, 1.0, 0.0, 0.0, 0.0)
         return Telemetry(
             tick=controller.tick_number,

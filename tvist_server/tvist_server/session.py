@@ -75,6 +75,13 @@ class Session:
         self.lease = Lease(lease.client, lease.token, lease.seconds, now + lease.seconds, lease.watched)
         return self.lease
 
+    def hand_over(self, client: str, now: float) -> None:
+        """Keep the present lease for another client, from now on: it has only to take it."""
+        if self.lease is not None:
+            seconds = self.lease.seconds
+            self.lease = None
+            self.take(client, seconds, now)
+
     def release(self) -> None:
         """End the lease."""
         self.lease = None

@@ -9,6 +9,7 @@ from typing import Any
 import zenoh
 
 from tvist_client.errors import NotConnectedError
+from tvist_client.transports.certificates import Folder, settings, why_refused
 
 CONFIG: Mapping[str, Any] = {
     "mode": "client",
@@ -19,15 +20,20 @@ CONFIG: Mapping[str, Any] = {
 """Of a session: path to value."""
 
 
-def open_session(endpoint: str) -> zenoh.Session:
+def open_session(endpoint: str, security: Folder | None = None) -> zenoh.Session:
     """Open a session. Blocks while it connects.
 
+    Args:
+        endpoint: Where the server listens.
+        security: Folder with the client's certificate, where the server asks for one.
+
     Raises:
-        NotConnectedError: Nobody listens there.
+        NotConnectedError: Nobody listens there, or the certificate is not taken.
     """
     config = zenoh.Config()
+    shown = settings(endpoint, security)
     try:
-        for path, value in {**CONFIG, "connect/endpoints": [endpoint]}.items():
+        for path, value in {**CONFIG, **shown, "connect/endpoints": [endpoint]}.items():
             config.insert_json5(path, json.dumps(value))
     except zenoh.ZError as error:
         why = (
@@ -37,6 +43,9 @@ def open_session(endpoint: str) -> zenoh.Session:
     try:
         session = zenoh.open(config)
     except zenoh.ZError as error:
+        refused = why_refused(endpoint, security) if security is not None else None
+        if refused is not None:
+            raise NotConnectedError(f"no connection to {endpoint}: {refused}") from error
         why = f"nobody answers at {endpoint}: check that the server runs and listens there (`tvist serve`)"
         raise NotConnectedError(why) from error
     _OPEN.add(session)

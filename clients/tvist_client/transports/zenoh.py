@@ -13,6 +13,7 @@ from zenoh.handlers import Callback
 
 from tvist_client.errors import AnswerTimeoutError, ClientError, NotConnectedError, UnexpectedReplyError
 from tvist_client.transports.base import Topic, Transport
+from tvist_client.transports.certificates import Folder
 from tvist_client.transports.mailbox import Mailbox, wake
 from tvist_client.transports.session import close_session, open_session
 from tvist_protocol import keys
@@ -58,19 +59,20 @@ class ZenohTransport(Transport):
         )
 
     @classmethod
-    async def open(cls, endpoint: str, robot: str) -> "ZenohTransport":
+    async def open(cls, endpoint: str, robot: str, security: Folder | None = None) -> "ZenohTransport":
         """Connect to an endpoint and find the robot there.
 
         Args:
             endpoint: Where the server listens, `tcp/127.0.0.1:7447`.
             robot: The robot's name.
+            security: Folder with this client's certificate, for `tls/<host>:<port>`.
 
         Raises:
-            NotConnectedError: Nobody listens there, or no robot of that name is there.
+            NotConnectedError: Nobody listens there, or no robot of that name is there or shows itself.
             ProtocolError: `robot` cannot be a robot's name.
         """
         keys.check_robot_name(robot)
-        transport = cls(await asyncio.to_thread(open_session, endpoint), endpoint, robot)
+        transport = cls(await asyncio.to_thread(open_session, endpoint, security), endpoint, robot)
         try:
             await transport._find()
         except BaseException:
@@ -145,9 +147,10 @@ class ZenohTransport(Transport):
             raise self._gone()
         answer: asyncio.Future[bytes] = self._loop.create_future()
         self._pending.add(answer)
-        nobody = NotConnectedError(
-            f"nobody answers for robot {self._robot!r} at {self._endpoint}: check that the server still runs"
+        check = "check that the server still runs" + self._if_secured(
+            "that this certificate is an operator's"
         )
+        nobody = NotConnectedError(f"nobody answers for robot {self._robot!r} at {self._endpoint}: {check}")
 
         def on_reply(reply: zenoh.Reply) -> None:
             wake(self._loop, partial(_settle, answer, self._outcome(reply, timeout_s)))
@@ -201,6 +204,10 @@ class ZenohTransport(Transport):
             f"robot {self._robot!r} at {self._endpoint} has gone: this client finds it again when it is back"
         )
 
+    def _if_secured(self, check: str) -> str:
+        """What to check besides: access control denies without a word."""
+        return f", and {check}" if self._endpoint.startswith("tls/") else ""
+
     def _fail_pending(self, error: ClientError) -> None:
         for answer in tuple(self._pending):
             _settle(answer, error)
@@ -213,7 +220,10 @@ class ZenohTransport(Transport):
         except TimeoutError:
             robots = await self._robots()
             there = f"those there are {', '.join(robots)}" if robots else "no robot is there"
-            why = f"there is no robot {self._robot!r} at {self._endpoint}; {there}: check name and endpoint"
+            check = "check name and endpoint" + self._if_secured(
+                "that the robot knows this certificate's name"
+            )
+            why = f"there is no robot {self._robot!r} at {self._endpoint}; {there}: {check}"
             raise NotConnectedError(why) from None
 
     async def _robots(self) -> list[str]:

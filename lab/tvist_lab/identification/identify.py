@@ -13,6 +13,7 @@ from tvist_client.robot import Robot
 from tvist_lab.collect import collect
 from tvist_lab.identification.fit import Fit, check_count, fit_polynomials, spread
 from tvist_lab.identification.ring_downs import Jog, measure
+from tvist_lab.metrics import RingDown
 from tvist_lab.recordings import Floats
 from tvist_lab.workspace import IDENTIFIED
 from tvist_protocol.calibration import Calibration, Provenance, Spread
@@ -26,6 +27,9 @@ DEGREE = 2
 ANCHOR_WEIGHT = 6.0
 """Weight of a pose the user names, against one of a configuration spread over the workspace [-]."""
 
+ATTEMPTS = 3
+"""Configurations tried for each that is wanted: some the arm cannot reach, some cannot be fitted."""
+
 Progress = Callable[[], None]
 
 
@@ -38,7 +42,7 @@ class Plan:
     """What to measure."""
 
     configurations: int = CONFIGURATIONS
-    """Configurations spread over the workspace."""
+    """Usable configurations wanted, spread over the workspace."""
     anchors: tuple[tuple[float, ...], ...] = ()
     """Further ones that matter more, where the robot is going to work [rad]."""
     repeats: int = REPEATS
@@ -118,52 +122,56 @@ async def identify(
     joints = tuple(j for j in (1, 2, 3) if j < len(info.joints)) or (0,)
     check_count(plan.configurations + len(plan.anchors), joints, plan.degree)
     await arm.set_shaper("none")
-    q, weights = _configurations(plan, len(info.joints))
-    kept, values, truths = [], [], []
+    anchors = [np.array(anchor, dtype=float) for anchor in plan.anchors]
+    spread_out = list(IDENTIFIED.spread(ATTEMPTS * plan.configurations, len(info.joints), plan.seed))
+    kept: list[Floats] = []
+    values: list[tuple[float, float]] = []
+    truths: list[tuple[float, float] | None] = []
+    weights: list[float] = []
     rejected = 0
-    for number, configuration in enumerate(q):
-        try:
-            ring = await measure(robot, arm, configuration, plan.jog, plan.repeats)
-        except RefusedError as error:
-            if error.reply.code != "collision":
-                raise
-            ring = None
-        if ring is not None and ring.ok:
-            kept.append(number)
-            values.append((ring.f_d, ring.zeta))
-            truths.append(await _true_mode(robot))
-        else:
+    for number, q in enumerate(anchors + spread_out):
+        if len(kept) == len(anchors) + plan.configurations:
+            break
+        ring = await _ring_down(robot, arm, q, plan)
+        if ring is None:
             rejected += 1
+            continue
+        kept.append(q)
+        values.append((ring.f_d, ring.zeta))
+        truths.append(await _true_mode(robot))
+        weights.append(ANCHOR_WEIGHT if number < len(anchors) else 1.0)
         progress()
     if not kept:
         raise IdentificationError(
             "no ring-down could be fitted: does the arm move, and is its accelerometer read?"
         )
-    named = sum(number < len(plan.anchors) for number in kept)
+    named = sum(weight > 1.0 for weight in weights)
     f_d, zeta = np.array(values).T
-    q, weights = q[kept], weights[kept]
-    fit = fit_polynomials(q, f_d, zeta, weights, joints=joints, degree=plan.degree)
+    configurations = np.array(kept)
+    fit = fit_polynomials(configurations, f_d, zeta, np.array(weights), joints=joints, degree=plan.degree)
     calibration = _calibration(info, plan, fit, f_d, zeta, rejected, name=name, command=command)
     if any(truth is None for truth in truths):
         return Identification(
-            calibration, q, f_d, zeta, None, None,
+            calibration, configurations, f_d, zeta, None, None,
             "measurements that a fit did not see", fit.cross_validated_f_d, fit.cross_validated_zeta, named,
         )  # fmt: skip
     true_f_d, true_zeta = np.array(truths, dtype=float).T
     return Identification(
-        calibration, q, f_d, zeta, true_f_d, true_zeta,
+        calibration, configurations, f_d, zeta, true_f_d, true_zeta,
         "the arm's true lowest mode, by fits that did not see the configuration",
         spread(fit.unseen_f_d, true_f_d), spread(fit.unseen_zeta, true_zeta), named,
     )  # fmt: skip
 
 
-def _configurations(plan: Plan, joints: int) -> tuple[Floats, Floats]:
-    spread_out = IDENTIFIED.spread(plan.configurations, joints, plan.seed)
-    if not plan.anchors:
-        return spread_out, np.ones(len(spread_out))
-    anchors = np.array(plan.anchors, dtype=float)
-    weights = np.concatenate([np.full(len(anchors), ANCHOR_WEIGHT), np.ones(len(spread_out))])
-    return np.concatenate([anchors, spread_out]), weights
+async def _ring_down(robot: Robot, arm: Arm, q: Floats, plan: Plan) -> RingDown | None:
+    """What rings at a configuration; None where it cannot be reached or fitted."""
+    try:
+        ring = await measure(robot, arm, q, plan.jog, plan.repeats)
+    except RefusedError as error:
+        if error.reply.code != "collision":
+            raise
+        return None
+    return ring if ring.ok else None
 
 
 async def _true_mode(robot: Robot) -> tuple[float, float] | None:

@@ -9,6 +9,7 @@ from tvist_client.robot import Robot
 from tvist_lab.collect import collect
 from tvist_lab.metrics import RingDown, fit_ring_down, motions, tool_acceleration
 from tvist_lab.recordings import Floats
+from tvist_protocol.errors import RefusedError
 
 LISTEN = 0.6
 """Time the arm is listened to after a jog [s]."""
@@ -37,6 +38,23 @@ class Jog:
         return jog
 
 
+async def reach(arm: Arm, q: Floats) -> None:
+    """Move to a configuration; where something would meet on the straight way, by the upright arm.
+
+    Raises:
+        RefusedError: It cannot be reached that way either; code `collision`.
+    """
+    try:
+        await arm.move_j(q)
+    except RefusedError as error:
+        if error.reply.code != "collision":
+            raise
+        upright = np.zeros_like(q)
+        upright[[joint for joint in (1, 3) if joint < len(q)]] = -np.pi / 2
+        await arm.move_j(upright)
+        await arm.move_j(q)
+
+
 async def measure(robot: Robot, arm: Arm, q: Floats, jog: Jog, repeats: int) -> RingDown:
     """(f_d, ζ) of the mode that rings most after a jog to a configuration.
 
@@ -48,8 +66,12 @@ async def measure(robot: Robot, arm: Arm, q: Floats, jog: Jog, repeats: int) -> 
         q: Configuration, shape (n,) [rad].
         jog: The move that makes it ring.
         repeats: Jogs to average.
+
+    Raises:
+        RefusedError: The configuration cannot be reached; code `collision`.
     """
     start = q - jog.of(len(q))
+    await reach(arm, start)
     period = 1.0 / (await robot.info()).rate_hz
     rings = []
     for _ in range(repeats):

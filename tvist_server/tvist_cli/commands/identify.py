@@ -1,7 +1,6 @@
 """`tvist identify`: calibrate a robot from its own accelerometer."""
 
 import asyncio
-import sys
 from contextlib import AsyncExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +18,7 @@ def identify(
     output: Path = Path("calibration.json"),
     name: str | None = None,
     robot: str = "ur5e",
+    security: Path | None = None,
     payload: float | None = None,
     configurations: int = 160,
     repeats: int = 3,
@@ -37,6 +37,7 @@ def identify(
         output: File to write.
         name: Of the calibration; default: the file's.
         robot: Name of the served robot; in process, the robot file.
+        security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         payload: Mass of the paper's disc in kg, in process.
         configurations: How many, spread over the workspace.
         repeats: Jogs averaged at each.
@@ -73,12 +74,16 @@ def identify(
             }
             setup = free_setup(from_mapping(content, "options"))
     plan = Plan(configurations=configurations, anchors=tuple(anchors), repeats=repeats, seed=seed)
-    command = " ".join(["tvist", *sys.argv[1:]])[:500]
+    command = f"tvist identify --configurations {configurations} --repeats {repeats} --seed {seed}"
+    if payload is not None:
+        command += f" --payload {payload:g}"
 
     async def measure() -> "Identification":
         async with AsyncExitStack() as stack:
             if endpoint is not None:
-                client = await stack.enter_async_context(await Robot.connect(endpoint, name=robot))
+                client = await stack.enter_async_context(
+                    await Robot.connect(endpoint, robot, security=security)
+                )
             elif setup is not None:
                 client = await stack.enter_async_context(robot_in_process(setup))
             arm = await stack.enter_async_context(client.control("identify"))

@@ -1,6 +1,7 @@
 """`tvist move`: one motion by hand."""
 
 import asyncio
+from pathlib import Path
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import out, print_json
@@ -11,6 +12,7 @@ def move(
     *,
     endpoint: str = "tcp/127.0.0.1:7447",
     name: str = "ur5e",
+    security: Path | None = None,
     velocity: float = 1.5,
     acceleration: float = 2.0,
     jerk: float = 100.0,
@@ -23,6 +25,7 @@ def move(
         target: Q1, Q2, Q3, or joint angles in rad with commas.
         endpoint: Zenoh endpoint of the robot.
         name: Its name.
+        security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         velocity: Limit for every joint in rad/s.
         acceleration: Limit for every joint in rad/s².
         jerk: Limit for every joint in rad/s³.
@@ -42,7 +45,10 @@ def move(
         ) from None
 
     async def run() -> tuple[int, int]:
-        async with await Robot.connect(endpoint, name) as robot, robot.control("tvist move") as arm:
+        async with (
+            await Robot.connect(endpoint, name, security=security) as robot,
+            robot.control("tvist move") as arm,
+        ):
             if shaper is not None:
                 await arm.set_shaper(shaper)
             motion = await arm.move_j(q, velocity=velocity, acceleration=acceleration, jerk=jerk)

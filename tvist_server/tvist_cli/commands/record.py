@@ -14,6 +14,7 @@ def record(
     *,
     endpoint: str = "tcp/127.0.0.1:7447",
     name: str = "ur5e",
+    security: Path | None = None,
     seconds: float | None = None,
     json: bool = False,
 ) -> None:
@@ -25,6 +26,7 @@ def record(
         file: MCAP file to write.
         endpoint: Zenoh endpoint of the robot.
         name: Its name.
+        security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         seconds: End by itself after this time.
         json: Print one JSON object at the end.
     """
@@ -36,7 +38,7 @@ def record(
         ended = asyncio.Event()
         for number in (signal.SIGINT, signal.SIGTERM):
             asyncio.get_running_loop().add_signal_handler(number, ended.set)
-        async with await Robot.connect(endpoint, name) as robot:
+        async with await Robot.connect(endpoint, name, security=security) as robot:
             with Recorder(file, await robot.info(), {}) as recorder:
                 robot.on_state(recorder.state)
                 robot.on_state(lambda state: ticks.append(state.tick))

@@ -14,6 +14,8 @@ def serve(
     name: str | None = None,
     robot: str | None = None,
     listen: list[str] | None = None,
+    security: str | None = None,
+    insecure: bool = False,
     payload: float | None = None,
     shaper: str | None = None,
     calibration: str | None = None,
@@ -31,6 +33,8 @@ def serve(
         name: Name on the network [ur5e].
         robot: Robot that comes with the package, or path of a robot file [ur5e].
         listen: Zenoh endpoint, repeatable [tcp/127.0.0.1:7447].
+        security: Folder made by tvist keys; the endpoint is then tls/ADDRESS:PORT, and who has no role sees nothing.
+        insecure: Listen beyond this machine without: anybody there may move the robot.
         payload: Mass of the paper's disc on the flange in kg [5].
         shaper: none, zv, mzv, zvd, ei, ei2 or ei3 [zv].
         calibration: Calibration that comes with the package, or path of one; none for a robot to be identified.
@@ -43,7 +47,8 @@ def serve(
         config: TOML file with any of these; the command line goes before it.
     """
     given: dict[str, Any] = {
-        "name": name, "robot": robot, "listen": listen, "payload": payload, "shaper": shaper,
+        "name": name, "robot": robot, "listen": listen, "security": security,
+        "insecure": insecure or None, "payload": payload, "shaper": shaper,
         "calibration": calibration, "clock": clock, "speed": speed, "start": start, "seed": seed,
         "record": record, "truth": truth or None,
     }  # fmt: skip

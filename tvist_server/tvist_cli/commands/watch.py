@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Group
@@ -20,6 +21,7 @@ def watch(
     endpoint: str = "tcp/127.0.0.1:7447",
     *,
     name: str = "ur5e",
+    security: Path | None = None,
     seconds: float | None = None,
     json: bool = False,
 ) -> None:
@@ -28,13 +30,14 @@ def watch(
     Args:
         endpoint: Zenoh endpoint of the robot.
         name: Its name.
+        security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         seconds: End by itself after this time.
         json: Print each event, and the state ten times a second, as a JSON object a line.
     """
     from tvist_client.robot import Robot
 
     async def run() -> None:
-        async with await Robot.connect(endpoint, name) as robot:
+        async with await Robot.connect(endpoint, name, security=security) as robot:
             events: list[Event] = []
             robot.on_event(events.append)
             if json:

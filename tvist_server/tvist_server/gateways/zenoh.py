@@ -10,6 +10,7 @@ import json
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import zenoh
@@ -47,13 +48,21 @@ class ZenohGateway(Gateway):
         desk: Takes what arrives.
         lockstep: Whether a client lets time pass: then no state may be lost, and the publisher waits.
         truth: Whether to put the stream of what no robot can know.
+        guard: Settings of the session that keep others out, path to value.
 
     Raises:
         GatewayError: An endpoint cannot be listened on.
     """
 
     def __init__(
-        self, robot: str, endpoints: Sequence[str], desk: Desk, *, lockstep: bool, truth: bool
+        self,
+        robot: str,
+        endpoints: Sequence[str],
+        desk: Desk,
+        *,
+        lockstep: bool,
+        truth: bool,
+        guard: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         self.setpoints_refused = 0
         """Set-points that never reached the desk: put on a key with a wildcard, or too large."""
@@ -62,7 +71,7 @@ class ZenohGateway(Gateway):
         self._closed = False
         self._answers = Answers()
         try:
-            self._session = _open(endpoints)
+            self._session = _open(endpoints, guard)
         except GatewayError:
             self._answers.close()
             raise
@@ -188,14 +197,16 @@ def _publishers(
     return publishers
 
 
-def _open(endpoints: Sequence[str]) -> zenoh.Session:
+def _open(endpoints: Sequence[str], guard: Mapping[str, Any]) -> zenoh.Session:
     config = zenoh.Config()
     try:
-        for path, value in {**CONFIG, "listen/endpoints": list(endpoints)}.items():
+        for path, value in {**CONFIG, **guard, "listen/endpoints": list(endpoints)}.items():
             config.insert_json5(path, json.dumps(value))
         return zenoh.open(config)
     except zenoh.ZError as error:
-        raise GatewayError(_explain(error, ", ".join(endpoints))) from error
+        raise GatewayError(
+            _explain(error, ", ".join(endpoint.partition("#")[0] for endpoint in endpoints))
+        ) from error
 
 
 def _explain(error: zenoh.ZError, endpoints: str) -> str:

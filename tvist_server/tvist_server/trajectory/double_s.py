@@ -4,6 +4,10 @@ import numpy as np
 import ruckig
 
 from tvist_server.trajectory.base import Floats, Limits, Trajectory
+from tvist_server.trajectory.pace import Pace
+
+LOOK_AHEAD = 2.0
+"""Ticks by which the path is looked ahead of when its pace changes."""
 
 
 class DoubleS(Trajectory):
@@ -18,12 +22,15 @@ class DoubleS(Trajectory):
         target: Joint positions at rest, shape (n,) [rad].
         limits: For every joint.
         period: Tick [s].
+        speed: Rate of its time against the clock's to start with [-].
 
     Raises:
         ValueError: There is no such motion within these limits, or it would last for hours.
     """
 
-    def __init__(self, start: Floats, target: Floats, limits: Limits, period: float) -> None:
+    def __init__(
+        self, start: Floats, target: Floats, limits: Limits, period: float, speed: float = 1.0
+    ) -> None:
         n = len(start)
         request = ruckig.InputParameter(n)
         request.current_position, request.target_position = start.tolist(), target.tolist()
@@ -41,22 +48,52 @@ class DoubleS(Trajectory):
             ) from error
         self._target = np.array(target, dtype=float)
         self._period = period
-        self._ticks = 0
+        self.speed = speed
+        """Rate that its time is to go at, 0 to 1 [-]."""
+        self._pace = Pace(limits, period, speed)
+        # Time on the path: whole ticks at an even rate since the rate last changed, so that nothing adds up.
+        self._since, self._ticks = 0.0, 0
 
     @property
     def duration(self) -> float:
         """From rest to rest [s]."""
         return float(self._trajectory.duration)
 
+    def time_at(self, share: float) -> float:
+        """When a share of the way, 0 to 1, is behind it [s]; the way is straight, so every joint agrees."""
+        start, end = (np.array(self._trajectory.at_time(time)[0]) for time in (0.0, self.duration))
+        joint = int(np.argmax(np.abs(end - start)))
+        early, late = 0.0, self.duration
+        for _ in range(40):
+            middle = 0.5 * (early + late)
+            done = (self._trajectory.at_time(middle)[0][joint] - start[joint]) / (end[joint] - start[joint])
+            early, late = (middle, late) if done < share else (early, middle)
+        return late
+
     def next(self) -> Floats:
         """Position one tick further; the target exactly from the first tick at or after the end."""
-        self._ticks += 1
+        if self._pace.steady(self.speed):
+            self._ticks += 1
+        else:
+            time = self._time
+            ends = (time, time + LOOK_AHEAD * self._period)
+            curve = [np.array(self._trajectory.at_time(end)[1:3]) for end in ends]
+            step = self._pace.advance(self.speed, curve)
+            self._since, self._ticks = time + step, 0
         if self.finished:
             return self._target
-        position, _, _ = self._trajectory.at_time(self._ticks * self._period)
-        return np.array(position)
+        return np.array(self._trajectory.at_time(self._time)[0])
+
+    @property
+    def rate(self) -> float:
+        """Rate at which its time goes [-]."""
+        return self._pace.rate
+
+    @property
+    def _time(self) -> float:
+        return self._since + self._ticks * self._pace.rate * self._period
 
     @property
     def finished(self) -> bool:
         """Whether the target was reached."""
-        return self._ticks * self._period >= self.duration
+        return self._time >= self.duration

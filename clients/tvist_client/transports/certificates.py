@@ -1,0 +1,94 @@
+"""How a client shows who it is: a folder with its certificate, as `tvist keys` makes one for each client.
+
+authority.pem    certificate of the authority that signed the robot's
+client.pem       the client's certificate, and
+client.key       its private key
+"""
+
+import contextlib
+import os
+import socket
+import ssl
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from tvist_client.errors import NotConnectedError
+
+AUTHORITY, CERTIFICATE, KEY = "authority.pem", "client.pem", "client.key"
+OPEN_MS = 15_000
+"""How long opening a session may take [ms]. A server accepts nobody for 100 ms after each handshake that fails, so
+a hundred connections given up at once make the next client wait for 10 s."""
+PROBE_S = 2.0
+"""How long finding out why there is no connection may take [s]."""
+
+Folder = str | os.PathLike[str]
+
+
+def settings(endpoint: str, security: Folder | None) -> dict[str, Any]:
+    """Settings of a Zenoh session that shows this certificate: path to value.
+
+    Args:
+        endpoint: Where the server listens.
+        security: The client's folder; none for a server without security.
+
+    Raises:
+        NotConnectedError: A file is not there, or folder and endpoint do not go together.
+    """
+    encrypted = endpoint.startswith("tls/")
+    if security is None:
+        if encrypted:
+            raise NotConnectedError(
+                f"{endpoint} asks for a certificate: name the folder that holds it as security"
+            )
+        return {}
+    if not encrypted:
+        raise NotConnectedError(
+            f"{endpoint} takes no certificate: with security the endpoint is tls/<host>:<port>"
+        )
+    folder = Path(security).absolute()
+    for name in (AUTHORITY, CERTIFICATE, KEY):
+        try:
+            (folder / name).read_bytes()
+        except OSError as error:
+            why = f"{folder / name}: {error.strerror}; `tvist keys` makes a folder for each client"
+            raise NotConnectedError(why) from error
+    return {
+        "transport/unicast/open_timeout": OPEN_MS,
+        "transport/link/tls/enable_mtls": True,
+        "transport/link/tls/root_ca_certificate": str(folder / AUTHORITY),
+        "transport/link/tls/connect_certificate": str(folder / CERTIFICATE),
+        "transport/link/tls/connect_private_key": str(folder / KEY),
+    }
+
+
+def why_refused(endpoint: str, security: Folder) -> str | None:
+    """Why no session could be opened, as far as a handshake of our own tells: Zenoh says nothing of it.
+
+    Blocks for at most twice `PROBE_S`.
+
+    Returns:
+        A reason, None where the handshake goes well or nobody listens.
+    """
+    folder = Path(security)
+    where = urlsplit("//" + endpoint.partition("/")[2].partition("#")[0].partition("?")[0])
+    try:
+        context = ssl.create_default_context(cafile=folder / AUTHORITY)
+        context.load_cert_chain(folder / CERTIFICATE, folder / KEY)
+    except ssl.SSLError as error:
+        return f"{folder} holds no certificate and key that belong together ({error.reason or error})"
+    try:
+        with (
+            socket.create_connection((where.hostname or "", where.port or 0), PROBE_S) as plain,
+            context.wrap_socket(plain, server_hostname=where.hostname) as encrypted,
+            contextlib.suppress(TimeoutError),
+        ):
+            # In TLS 1.3 a server judges the client's certificate after the handshake: its verdict is read.
+            encrypted.recv(1)
+    except ssl.SSLCertVerificationError as error:
+        return f"the robot's certificate is not trusted: {error.verify_message.rstrip('.')}"
+    except ssl.SSLError as error:
+        return f"the robot does not take this certificate: {(error.reason or str(error)).replace('_', ' ').lower()}"
+    except (OSError, ValueError):
+        return None
+    return None

@@ -1,0 +1,223 @@
+"""The documentation is true: its snippets run, its commands and options exist, its links lead somewhere."""
+
+import doctest
+import functools
+import json
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+from tests.conformance.served import Served
+
+from tvist_client.blocking import Robot
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+TUTORIAL = DOCS / "tutorials" / "first-motion.md"
+PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
+LINKED = sorted({*PAGES, *ROOT.glob("*.md"), *ROOT.glob("*/README.md"), *ROOT.glob("*/examples/README.md")})
+ENDPOINT = "tcp/127.0.0.1:7447"
+PATIENCE = 90.0
+"""How long a snippet may take [s]: the very first one compiles the arm's equations."""
+
+FENCE = re.compile(
+    r"^(?P<indent> *)```(?P<kind>\w*)\n(?P<text>.*?)^(?P=indent)```$", re.MULTILINE | re.DOTALL
+)
+LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
+SPAN = re.compile(r"`(?P<code>tvist [a-z][^`]*)`")
+
+
+def named(path):
+    return str(path.relative_to(ROOT))
+
+
+def blocks(*kinds):
+    """(page, number of the line, text) of every fenced block of a kind."""
+    found = []
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        for match in FENCE.finditer(text):
+            if match["kind"] in kinds:
+                line = text.count("\n", 0, match.start()) + 1
+                found.append(pytest.param(textwrap.dedent(match["text"]), id=f"{named(page)}:{line}"))
+    return found
+
+
+def without_code(text):
+    return re.sub(r"`[^`\n]*`", "", FENCE.sub("", text))
+
+
+def run(*arguments, cwd=ROOT):
+    return subprocess.run(
+        [sys.executable, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+        cwd=cwd,
+        env={**os.environ, "COLUMNS": "100"},
+    )
+
+
+def assert_well(ended):
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    return ended.stdout
+
+
+class TestLinks:
+    @pytest.mark.parametrize("page", LINKED, ids=named)
+    def test_every_link_leads_to_a_file_and_a_heading(self, page):
+        for match in LINK.finditer(without_code(page.read_text(encoding="utf-8"))):
+            target, _, anchor = match["target"].partition("#")
+            if target.startswith(("http://", "https://")):
+                continue
+            linked = (page.parent / target).resolve() if target else page
+            assert linked.exists(), f"{named(page)} links to {match['target']}"
+            assert linked.is_relative_to(ROOT), f"{named(page)} links out of the project"
+            assert not anchor or anchor in anchors(linked), f"{named(page)} links to {match['target']}"
+
+    def test_the_index_names_every_page(self):
+        index = DOCS / "README.md"
+        text = index.read_text(encoding="utf-8")
+        linked = {(DOCS / match["target"]).resolve() for match in LINK.finditer(text)}
+        assert set(DOCS.rglob("*.md")) - linked == {index}
+
+
+def anchors(page):
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+class TestCommands:
+    @pytest.mark.parametrize("text", blocks("sh"))
+    def test_commands_in_blocks_exist_with_their_options(self, text):
+        for line in text.splitlines():
+            if words := shlex.split(line, comments=True):
+                check_command(words)
+
+    @pytest.mark.parametrize("page", PAGES, ids=named)
+    def test_commands_in_sentences_exist_with_their_options(self, page):
+        for match in SPAN.finditer(FENCE.sub("", page.read_text(encoding="utf-8"))):
+            check_command(shlex.split(match["code"]))
+
+
+def check_command(words):
+    program, *arguments = words
+    match program.removeprefix(".venv/bin/"):
+        case "tvist":
+            command = [] if arguments[0].startswith("-") else arguments[:1]
+            known = options(*(word.rstrip(",") for word in command))
+            unknown = {word for word in arguments if word.startswith("--")} - known
+            assert not unknown, f"tvist {' '.join(command)} does not know {unknown}"
+        case "make":
+            targets = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+            assert set(arguments) <= set(targets)
+        case "python" | "cp":
+            assert (ROOT / arguments[0]).exists(), arguments[0]
+        case ".":
+            assert arguments == [".venv/bin/activate"]
+        case _:
+            raise AssertionError(f"nobody checks {shlex.join(words)}")
+
+
+@functools.cache
+def options(*command):
+    told = assert_well(run("-m", "tvist_cli", *command, "--help"))
+    assert not command or f"tvist {command[0]}" in told
+    return set(re.findall(r"--[\w-]+", told))
+
+
+@pytest.fixture(scope="module")
+def realtime():
+    """A robot in real time."""
+    with Served() as served:
+        yield served
+
+
+@pytest.fixture(scope="module")
+def story(tmp_path_factory):
+    """What the tutorial's commands leave and say: its folder, and the words of each command."""
+    folder = tmp_path_factory.mktemp("tutorial")
+    text = TUTORIAL.read_text(encoding="utf-8")
+    lines = [
+        line for match in FENCE.finditer(text) if match["kind"] == "sh" for line in match["text"].splitlines()
+    ]
+    commands = [
+        words[1:] for line in lines if (words := shlex.split(line, comments=True)) and words[0] == "tvist"
+    ]
+    (_, *how), *rest = commands
+    assert commands[0][0] == "serve"
+    recording = how.index("--record") + 1
+    how[recording] = str(folder / how[recording])
+    said = []
+    with Served(*how) as served:
+        for words in rest:
+            if words[0] in {"analyze", "replay"} and served.process.poll() is None:
+                assert served.end(signal.SIGINT)[0] == 0
+            said.append((words, tell(folder, words, served.endpoint)))
+    return folder, said
+
+
+def tell(folder, words, endpoint):
+    """Do one of the tutorial's commands as a person would, who leaves a second between motions."""
+    at = {"move": ["--endpoint", endpoint], "check": [endpoint], "watch": [endpoint, "--seconds", "1"]}
+    told = assert_well(run("-m", "tvist_cli", *words, *at.get(words[0], ()), cwd=folder))
+    if words[0] == "move":
+        with Robot.connect(endpoint) as robot:
+            robot.advance(500)
+    return told
+
+
+class TestTutorial:
+    pytestmark = pytest.mark.slow
+
+    def test_every_command_works_in_its_order(self, story):
+        _, said = story
+        assert [words[0] for words, _ in said] == ["check", "watch", *["move"] * 4, "analyze", "replay"]
+        assert "every state equal to the last bit" in said[-1][1]
+
+    def test_figures_are_where_it_says(self, story):
+        folder, _ = story
+        for name in re.findall(r"first-figures/\w+\.png", TUTORIAL.read_text(encoding="utf-8")):
+            assert (folder / name).exists()
+
+    def test_the_shaped_motions_end_later_and_are_still_earlier(self, story):
+        folder, _ = story
+        found = json.loads(assert_well(run("-m", "tvist_cli", "analyze", "first.mcap", "--json", cwd=folder)))
+        unshaped, shaped = found["motions"][:2], found["motions"][2:]
+        assert len(shaped) == 2
+        for before, after in zip(unshaped, shaped, strict=True):
+            assert after["delay_ms"] == pytest.approx(72, abs=4)
+            assert after["residual_vibration_m_s2"] < 0.25 * before["residual_vibration_m_s2"]
+            assert after["still_after_ms"] < before["still_after_ms"] - 40
+
+
+class TestSnippets:
+    @pytest.mark.parametrize("text", blocks("pycon"))
+    def test_sessions_print_what_they_say(self, text):
+        examples = doctest.DocTestParser().get_doctest(text, {}, "snippet", None, 0)
+        results = doctest.DocTestRunner().run(examples)
+        assert results.attempted > 0
+        assert results.failed == 0
+
+    @pytest.mark.parametrize("text", blocks("python"))
+    def test_scripts_run(self, text, request, tmp_path):
+        folder = ROOT
+        if "Robot.connect()" in text or ENDPOINT in text:
+            endpoint = request.getfixturevalue("realtime").endpoint
+            text = text.replace("Robot.connect()", f'Robot.connect("{endpoint}")').replace(ENDPOINT, endpoint)
+        if "first.mcap" in text:
+            folder = request.getfixturevalue("story")[0]
+        script = tmp_path / "test_snippet.py"
+        script.write_text(text, encoding="utf-8")
+        if "def test_" in text:
+            (tmp_path / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
+            assert_well(run("-m", "pytest", "-q", "-p", "no:cacheprovider", script, cwd=tmp_path))
+        else:
+            assert_well(run("-W", "error", script, cwd=folder))

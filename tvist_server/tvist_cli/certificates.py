@@ -1,0 +1,224 @@
+"""An authority and the certificates it signs, for mutual TLS between a robot and its clients.
+
+ECDSA on P-256: Zenoh takes Ed25519 as well, but the TLS of small devices often does not.
+"""
+
+import ipaddress
+import os
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Literal, Self
+
+from cryptography import x509
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+AUTHORITY_DAYS = 7300
+"""How long an authority lasts [days]; what it signs ends before it does."""
+SLACK = timedelta(hours=1)
+"""How much a client's or robot's clock may be behind."""
+USAGES = {"robot": ExtendedKeyUsageOID.SERVER_AUTH, "client": ExtendedKeyUsageOID.CLIENT_AUTH}
+"""So that no client's certificate can stand for the robot's, nor the other way round."""
+
+Host = x509.DNSName | x509.IPAddress
+
+
+class CertificateError(ValueError):
+    """A file holds no certificate or key that will do; the sentence names it."""
+
+
+def host(text: str) -> Host:
+    """A name or address under which clients reach a robot.
+
+    Raises:
+        ValueError: It is neither.
+    """
+    try:
+        return x509.IPAddress(ipaddress.ip_address(text))
+    except ValueError:
+        labels = text.split(".")
+        if len(text) > 253 or not all(_is_label(label) for label in labels) or labels[-1].isdigit():
+            raise ValueError(f"host is {text!r:.80}: must be a name as robot.lab, or an IP address") from None
+        return x509.DNSName(text)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A certificate and its private key."""
+
+    certificate: x509.Certificate
+    key: ec.EllipticCurvePrivateKey
+
+    @property
+    def until(self) -> datetime:
+        """When the certificate ends."""
+        return self.certificate.not_valid_after_utc
+
+    def write(self, certificate: Path, key: Path) -> None:
+        """Write both as PEM, the key for its owner alone.
+
+        Raises:
+            FileExistsError: One is there already.
+        """
+        form = serialization.PrivateFormat.PKCS8
+        secret = self.key.private_bytes(serialization.Encoding.PEM, form, serialization.NoEncryption())
+        write_new(key, secret, 0o600)
+        write_new(certificate, self.certificate.public_bytes(serialization.Encoding.PEM), 0o644)
+
+
+class Authority(Pair):
+    """Signs certificates."""
+
+    @classmethod
+    def make(cls) -> Self:
+        """A new one."""
+        key = ec.generate_private_key(ec.SECP256R1())
+        # A name of its own: a client that holds certificates of two authorities can tell them apart.
+        name = f"tvist authority {x509.random_serial_number():x}"[:40]
+        builder = (
+            _builder(name, key, days=AUTHORITY_DAYS)
+            .issuer_name(_name(name))
+            .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+            .add_extension(_key_usage(signs_certificates=True), critical=True)
+        )
+        return cls(builder.sign(key, hashes.SHA256()), key)
+
+    @classmethod
+    def read(cls, certificate: Path, key: Path) -> Self:
+        """One made before.
+
+        Raises:
+            CertificateError: The files hold no certificate and key that belong together.
+        """
+        pair = cls(read_certificate(certificate), _read_key(key))
+        if pair.certificate.public_key() != pair.key.public_key():
+            raise CertificateError(f"{key} is not the key of {certificate}")
+        return pair
+
+    def issue(
+        self, name: str, usage: Literal["robot", "client"], *, days: int, hosts: tuple[Host, ...] = ()
+    ) -> Pair:
+        """Sign a certificate.
+
+        Args:
+            name: Common name.
+            usage: Who it is for.
+            days: How long it lasts.
+            hosts: Names and addresses of a robot.
+
+        Raises:
+            CertificateError: It would outlast the authority.
+        """
+        key = ec.generate_private_key(ec.SECP256R1())
+        mine = x509.SubjectKeyIdentifier.from_public_key(self.key.public_key())
+        builder = (
+            _builder(name, key, days=days)
+            .issuer_name(self.certificate.subject)
+            .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+            .add_extension(_key_usage(signs_certificates=False), critical=True)
+            .add_extension(x509.ExtendedKeyUsage([USAGES[usage]]), critical=False)
+            .add_extension(
+                x509.AuthorityKeyIdentifier.from_issuer_subject_key_identifier(mine), critical=False
+            )
+        )
+        if hosts:
+            builder = builder.add_extension(x509.SubjectAlternativeName(hosts), critical=False)
+        pair = Pair(builder.sign(self.key, hashes.SHA256()), key)
+        if pair.until > self.until:
+            raise CertificateError(f"days is {days}: the authority itself ends on {self.until:%Y-%m-%d}")
+        return pair
+
+    def signed(self, certificate: x509.Certificate) -> bool:
+        """Whether a certificate is one of this authority's."""
+        try:
+            certificate.verify_directly_issued_by(self.certificate)
+        except (ValueError, TypeError, InvalidSignature):
+            return False
+        return True
+
+
+def common_name(certificate: x509.Certificate) -> str:
+    """Whose certificate it is."""
+    return str(certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)[0].value)
+
+
+def hosts_of(certificate: x509.Certificate) -> set[Host]:
+    """Under which names and addresses it is good."""
+    found = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName)
+    return {name for name in found.value if isinstance(name, Host)}
+
+
+def read_certificate(path: Path) -> x509.Certificate:
+    """A certificate.
+
+    Raises:
+        CertificateError: The file cannot be read, or holds none.
+    """
+    try:
+        return x509.load_pem_x509_certificate(path.read_bytes())
+    except OSError as error:
+        raise CertificateError(f"{path}: {error.strerror}") from error
+    except ValueError as error:
+        raise CertificateError(f"{path} is no certificate in PEM") from error
+
+
+def write_new(path: Path, content: bytes, mode: int) -> None:
+    """Write a file that is not there yet, with its permissions from the first byte on.
+
+    Raises:
+        FileExistsError: It is there.
+    """
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
+    with open(descriptor, "wb") as file:  # noqa: PTH123  a descriptor, not a path
+        file.write(content)
+
+
+def _read_key(path: Path) -> ec.EllipticCurvePrivateKey:
+    try:
+        key = serialization.load_pem_private_key(path.read_bytes(), password=None)
+    except OSError as error:
+        raise CertificateError(f"{path}: {error.strerror}") from error
+    except (ValueError, TypeError) as error:
+        raise CertificateError(f"{path} is no private key in PEM without a password") from error
+    if not isinstance(key, ec.EllipticCurvePrivateKey):
+        raise CertificateError(f"{path} is no key for ECDSA")
+    return key
+
+
+def _builder(name: str, key: ec.EllipticCurvePrivateKey, *, days: int) -> x509.CertificateBuilder:
+    now = datetime.now(UTC).replace(microsecond=0)
+    return (
+        x509.CertificateBuilder()
+        .subject_name(_name(name))
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - SLACK)
+        .not_valid_after(now + timedelta(days=days))
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
+    )
+
+
+def _name(common: str) -> x509.Name:
+    return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common)])
+
+
+def _key_usage(*, signs_certificates: bool) -> x509.KeyUsage:
+    return x509.KeyUsage(
+        digital_signature=not signs_certificates,
+        key_cert_sign=signs_certificates,
+        crl_sign=signs_certificates,
+        content_commitment=False,
+        key_encipherment=False,
+        data_encipherment=False,
+        key_agreement=False,
+        encipher_only=False,
+        decipher_only=False,
+    )
+
+
+def _is_label(label: str) -> bool:
+    inner = label.replace("-", "").replace("_", "")
+    return label.isascii() and inner.isalnum() and len(label) <= 63 and not label.startswith("-")

@@ -1,0 +1,198 @@
+"""`tvist keys`: certificates for a robot and its clients."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tvist_cli.failure import Failure, told
+from tvist_cli.output import out, print_json
+
+if TYPE_CHECKING:
+    from tvist_cli.certificates import Authority, Host
+    from tvist_server.gateways.access import Role
+
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+"""Of a client: a folder of that name is none of the files beside it, which all have a dot."""
+AUTHORITY_KEY = "authority.key"
+HEAD = """\
+# Who may do what, by the common name of a certificate: "operator" moves the robot, "viewer" sees what it does.
+# Who is left out is nobody: delete a line and start the robot again to take a name's rights away.
+"""
+
+
+def keys(
+    folder: Path,
+    *,
+    robot: str | None = None,
+    host: list[str] | None = None,
+    operator: list[str] | None = None,
+    viewer: list[str] | None = None,
+    days: int = 365,
+    json: bool = False,
+) -> None:
+    """Make an authority, a certificate for a robot, and one for each client; what is there is kept.
+
+    FOLDER is then what tvist serve --security wants, and FOLDER/NAME what the client of that name does.
+
+    Args:
+        folder: Where to make them.
+        robot: The robot's name; needed the first time.
+        host: Name or IP address under which clients reach the robot, repeatable; needed the first time.
+        operator: Name of a client that may move the robot, repeatable.
+        viewer: Name of a client that may see what it does, repeatable.
+        days: How long the new certificates last.
+        json: Print one JSON object.
+    """
+    try:
+        import cryptography  # noqa: F401  only here for a clear sentence
+    except ImportError as error:
+        raise Failure("keys needs the package cryptography: pip install 'tvist[server]'") from error
+    from tvist_cli.certificates import CertificateError
+    from tvist_protocol.keys import check_robot_name
+    from tvist_server.gateways.exposure import ExposureError
+
+    if not 1 <= days <= 3650:
+        raise Failure(f"days is {days}: must be 1 to 3650", code=2)
+    with told(ValueError, code=2):
+        if robot is not None:
+            check_robot_name(robot)
+        asked = _roles(operator or [], viewer or [])
+        hosts = _hosts(host or [])
+    with told(CertificateError, ExposureError, OSError):
+        ring = _KeyRing(folder, days)
+        ring.look(robot, hosts, asked)
+        ring.make(robot, hosts, asked)
+    if json:
+        print_json({"folder": str(folder), "made": ring.made, "kept": ring.kept, "roles": ring.roles})
+        return
+    for line in (
+        *(f"made  {what}" for what in ring.made),
+        *(f"kept  {what}" for what in ring.kept),
+        *_next(folder, asked),
+    ):
+        out.print(line, soft_wrap=True, markup=False)
+
+
+def _next(folder: Path, asked: "dict[str, Role]") -> list[str]:
+    """What to do with what was made."""
+    return [
+        f"robot:  tvist serve --security {folder} --listen tls/ADDRESS:7447",
+        *(f"{name}:  tvist check tls/HOST:7447 --security {folder / name}" for name in asked),
+        f"{folder / AUTHORITY_KEY} makes an operator of anybody: the robot does not need it, keep it elsewhere",
+    ]
+
+
+@dataclass
+class _KeyRing:
+    """A folder of keys. `look` changes nothing and raises where `make` would stop half way."""
+
+    folder: Path
+    days: int
+    made: list[str] = field(default_factory=list)
+    kept: list[str] = field(default_factory=list)
+    roles: "dict[str, Role]" = field(default_factory=dict)
+
+    def look(self, robot: str | None, hosts: "tuple[Host, ...]", asked: "dict[str, Role]") -> None:
+        """Raise where something is missing, or is there and is not what was asked for."""
+        from tvist_cli.certificates import common_name, hosts_of, read_certificate
+        from tvist_server.gateways.exposure import AUTHORITY, CERTIFICATE, CLIENTS, roles_in
+
+        there = [(self.folder / name).exists() for name in (AUTHORITY, AUTHORITY_KEY)]
+        if there == [True, False]:
+            why = f"{self.folder / AUTHORITY_KEY} is not there: bring it back to make more certificates"
+            raise Failure(why)
+        if (self.folder / CERTIFICATE).exists():
+            certificate = read_certificate(self.folder / CERTIFICATE)
+            name = common_name(certificate)
+            if robot not in {None, name} or (hosts and set(hosts) != hosts_of(certificate)):
+                good = ", ".join(sorted(str(host.value) for host in hosts_of(certificate)))
+                raise Failure(
+                    f"{self.folder / CERTIFICATE} is that of {name} at {good}, and is not overwritten: "
+                    "take another folder, or move it and robot.key away"
+                )
+        elif robot is None or not hosts:
+            raise Failure(
+                f"{self.folder} has no {CERTIFICATE} yet: --robot NAME and --host ADDRESS make it", code=2
+            )
+        if (self.folder / CLIENTS).exists():
+            self.roles = roles_in(self.folder)
+        for name, role in asked.items():
+            given = self.roles.get(name)
+            if given not in {None, role}:
+                raise Failure(
+                    f"{name} is {given} already: take another name, or change {self.folder / CLIENTS}"
+                )
+            if given is None and (self.folder / name).exists():
+                # Whoever was left out still has the old certificate: a line for the name would let it in again.
+                raise Failure(
+                    f"{self.folder / name} is there and {CLIENTS} leaves {name} out: take another name"
+                )
+
+    def make(self, robot: str | None, hosts: "tuple[Host, ...]", asked: "dict[str, Role]") -> None:
+        """Make what is not there."""
+        from tvist_server.gateways.exposure import CERTIFICATE, KEY
+
+        self.folder.mkdir(parents=True, exist_ok=True)
+        authority = self._authority()
+        if robot is not None and not (self.folder / CERTIFICATE).exists():
+            pair = authority.issue(robot, "robot", days=self.days, hosts=hosts)
+            pair.write(self.folder / CERTIFICATE, self.folder / KEY)
+            self.made.append(f"{self.folder / CERTIFICATE}: robot {robot}, until {pair.until:%Y-%m-%d}")
+        for name, role in asked.items():
+            self._client(authority, name, role)
+
+    def _authority(self) -> "Authority":
+        from tvist_cli.certificates import Authority
+        from tvist_server.gateways.exposure import AUTHORITY
+
+        certificate, key = self.folder / AUTHORITY, self.folder / AUTHORITY_KEY
+        if certificate.exists():
+            return Authority.read(certificate, key)
+        authority = Authority.make()
+        authority.write(certificate, key)
+        self.made.append(f"{certificate}: authority, until {authority.until:%Y-%m-%d}")
+        return authority
+
+    def _client(self, authority: "Authority", name: str, role: "Role") -> None:
+        from tvist_cli.certificates import write_new
+        from tvist_client.transports.certificates import AUTHORITY, CERTIFICATE, KEY
+        from tvist_server.gateways import exposure
+
+        own = self.folder / name
+        if own.exists():
+            self.kept.append(f"{own}: {role}")
+            return
+        pair = authority.issue(name, "client", days=self.days)
+        if name not in self.roles:
+            self._note(name, role)
+        own.mkdir(mode=0o700)
+        pair.write(own / CERTIFICATE, own / KEY)
+        write_new(own / AUTHORITY, (self.folder / exposure.AUTHORITY).read_bytes(), 0o644)
+        self.made.append(f"{own}: {role}, until {pair.until:%Y-%m-%d}")
+
+    def _note(self, name: str, role: "Role") -> None:
+        """Add a line to the roles, which a person may have edited."""
+        from tvist_server.gateways.exposure import CLIENTS
+
+        path = self.folder / CLIENTS
+        before = path.read_text(encoding="utf-8") if path.exists() else HEAD
+        gap = "" if before.endswith("\n") or not before else "\n"
+        path.write_text(f'{before}{gap}"{name}" = "{role}"\n', encoding="utf-8")
+        self.roles[name] = role
+
+
+def _roles(operators: Sequence[str], viewers: Sequence[str]) -> "dict[str, Role]":
+    for name in (*operators, *viewers):
+        if not NAME.fullmatch(name):
+            raise ValueError(f"client is {name!r:.80}: must be 1 to 64 of A-Z a-z 0-9 _ -, the first no sign")
+        if name in operators and name in viewers:
+            raise ValueError(f"{name} cannot be operator and viewer: an operator sees everything anyway")
+    return {**dict.fromkeys(operators, "operator"), **dict.fromkeys(viewers, "viewer")}
+
+
+def _hosts(names: Sequence[str]) -> "tuple[Host, ...]":
+    from tvist_cli.certificates import host
+
+    return tuple(dict.fromkeys(host(name) for name in names))

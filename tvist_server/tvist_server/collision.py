@@ -1,0 +1,154 @@
+"""Where the arm would meet itself or the floor: capsules of the robot file, distances by coal."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from tvist_plant.description import Body, Payload, RobotDescription
+from tvist_plant.model import FLANGE, link_frame, rigid_model
+from tvist_server.control.differentiator import Floats
+
+CLEARANCE = 0.005
+"""Least distance between two bodies [m]."""
+FAR = 0.05
+"""Distance that allows a long step [m]."""
+SHORT = 0.02
+"""Step where something is nearer than that [rad]."""
+PAYLOAD = "payload"
+FLOOR = "floor"
+REACH = 1.0
+"""How far a point of the arm can be from a joint's axis: what moves by that times the angle [m]."""
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """Two bodies too near to each other."""
+
+    first: str
+    second: str
+    distance: float
+    """Between their surfaces; negative where they overlap [m]."""
+
+
+class CollisionModel:
+    """The arm's bodies, its declared payload and the floor.
+
+    Args:
+        description: The robot; without bodies nothing ever meets.
+        payload: What the controller believes that the arm carries.
+    """
+
+    def __init__(self, description: RobotDescription, payload: Payload) -> None:
+        self._model = rigid_model(description, payload)
+        self._data = self._model.createData()
+        self._geometry = pin.GeometryModel()
+        self._names: list[str] = []
+        collision = description.collision
+        for body in collision.bodies:
+            self._add(body, description)
+        if collision.bodies and payload.mass > 0.0:
+            self._add_payload(payload, collision.payload_radius)
+        self._add_pairs(description)
+        self._fine, self._coarse = (self._request(margin) for margin in (CLEARANCE, FAR))
+        self._distances = self._geometry.createData()
+
+    def meeting(self, q: Floats) -> Meeting | None:
+        """The nearest pair at a posture, where it is nearer than the clearance.
+
+        Args:
+            q: Joint positions, shape (n,) [rad].
+        """
+        return self._nearest(q) if self._within(self._fine, q) else None
+
+    def on_way(self, way: Callable[[float], Floats], length: float) -> tuple[float, Meeting] | None:
+        """The first meeting on a way, found by long steps where everything is far apart and short ones elsewhere.
+
+        Args:
+            way: Share of the way, 0 to 1, to joint positions of shape (n,) [rad].
+            length: Sum over the joints of what they turn on it [rad].
+
+        Returns:
+            Share of the way and the pair; None where it is free.
+        """
+        share, escaping = 0.0, self.meeting(way(0.0))
+        while True:
+            q = way(share)
+            # Nothing comes nearer than REACH times the angle turned.
+            angle = (FAR - CLEARANCE) / REACH
+            if self._within(self._coarse, q):
+                angle = SHORT
+                if self._within(self._fine, q):
+                    nearest = self._nearest(q)
+                    # What is in a meeting already may move out of it.
+                    if escaping is None or nearest.distance < escaping.distance:
+                        return share, nearest
+                    escaping = nearest
+                else:
+                    escaping = None
+            if share >= 1.0:
+                return None
+            share = 1.0 if length <= 0.0 else min(share + angle / length, 1.0)
+
+    def _request(self, margin: float) -> pin.GeometryData:
+        data = self._geometry.createData()
+        for request in data.collisionRequests:
+            request.security_margin = margin
+        return data
+
+    def _within(self, margin: pin.GeometryData, q: Floats) -> bool:
+        """Whether any pair is nearer than the margin."""
+        return bool(pin.computeCollisions(self._model, self._data, self._geometry, margin, q, True))
+
+    def _nearest(self, q: Floats) -> Meeting:
+        pin.computeDistances(self._model, self._data, self._geometry, self._distances, q)
+        distances = [result.min_distance for result in self._distances.distanceResults]
+        number = int(np.argmin(distances))
+        pair = self._geometry.collisionPairs[number]
+        return Meeting(self._names[pair.first], self._names[pair.second], float(distances[number]))
+
+    def _add(self, body: Body, description: RobotDescription) -> None:
+        start, end = np.array(body.start), np.array(body.end)
+        if body.link < 0:
+            self._add_capsule(body.name, 0, pin.SE3.Identity(), start, end, body.radius)
+        else:
+            frame = link_frame(description, body.link)
+            self._add_capsule(body.name, body.link + 1, frame, start, end, body.radius)
+
+    def _add_payload(self, payload: Payload, radius: float) -> None:
+        flange = self._model.frames[self._model.getFrameId(FLANGE)]
+        centre = np.array(payload.com)
+        distance = float(np.linalg.norm(centre))
+        inset = centre * min(radius / distance, 1.0) if distance > 0.0 else centre
+        self._add_capsule(PAYLOAD, flange.parentJoint, flange.placement, inset, 2.0 * centre - inset, radius)
+
+    def _add_capsule(
+        self, name: str, joint: int, frame: pin.SE3, start: Floats, end: Floats, radius: float
+    ) -> None:
+        axis = end - start
+        length = float(np.linalg.norm(axis))
+        up = np.array([0.0, 0.0, 1.0])
+        rotation = pin.Quaternion.FromTwoVectors(up, axis / length).matrix() if length > 0.0 else np.eye(3)
+        placement = frame * pin.SE3(rotation, (start + end) / 2.0)
+        shape = coal.Capsule(radius, max(length, 1e-6))
+        self._geometry.addGeometryObject(pin.GeometryObject(name, joint, placement, shape))
+        self._names.append(name)
+
+    def _add_pairs(self, description: RobotDescription) -> None:
+        collision = description.collision
+        apart = {frozenset(pair) for pair in collision.apart}
+        bodies = range(len(self._names))
+        for first, second in combinations(bodies, 2):
+            names = frozenset((self._names[first], self._names[second]))
+            if second - first > 1 and names not in apart:
+                self._geometry.addCollisionPair(pin.CollisionPair(first, second))
+        if not self._names:
+            return
+        floor = coal.Halfspace(np.array([0.0, 0.0, 1.0]), collision.floor)
+        self._geometry.addGeometryObject(pin.GeometryObject(FLOOR, 0, pin.SE3.Identity(), floor))
+        self._names.append(FLOOR)
+        for number in bodies[2:]:  # the base stands on the floor, and the shoulder cannot reach it
+            self._geometry.addCollisionPair(pin.CollisionPair(number, len(self._names) - 1))
