@@ -1,10 +1,13 @@
 """What a robot was found to be: the content of a calibration file, and of `set_estimator`'s `calibration`."""
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta, Struct
 
+from tvist_protocol.errors import ProtocolError
+from tvist_protocol.explain import explain_refusal
 from tvist_protocol.values import Angle, DampingRatio, Frequency, Name, Payload, Seed
 
 Coefficient = Annotated[float, Meta(ge=-1e6, le=1e6)]
@@ -96,16 +99,20 @@ class CalibrationError(ValueError):
     """A calibration is wrong: the message names the key, the value and what is allowed."""
 
 
-def calibration_of(content: object) -> Calibration:
-    """Check a map.
+def calibration_of(content: Mapping[str, Any]) -> Calibration:
+    """Check a map, as `set_estimator` brings it.
 
     Raises:
-        CalibrationError: A key is unknown, missing or out of range.
+        ProtocolError: A key is unknown, missing or out of range; `where` names it within `calibration`.
     """
     try:
         return msgspec.convert(content, Calibration)
     except msgspec.ValidationError as error:
-        raise CalibrationError(str(error)) from error
+        fault = explain_refusal(error, msgspec.msgpack.encode(content), {})
+        where = f"calibration.{fault.where}".removesuffix(".")
+        whole, why = "the message", fault.why
+        why = f"calibration{why.removeprefix(whole)}" if why.startswith(whole) else f"calibration.{why}"
+        raise ProtocolError(fault.code, where, why, fault.limit) from error
 
 
 def calibration_from_json(text: bytes) -> Calibration:

@@ -135,8 +135,8 @@ def estimator(own=None, **fields):
         ({"name": "polynomial", "zeta": (0.1,)}, "out_of_range", "zeta"),
         ({"name": "polynomial", "calibration": "nowhere"}, "unknown_calibration", "calibration"),
         ({"name": "polynomial", "calibration": "../../etc/passwd"}, "unknown_calibration", "calibration"),
-        ({"name": "polynomial", "calibration": {}}, "out_of_range", "calibration"),
-        ({"name": "polynomial", "calibration": {"nmae": "x"}}, "out_of_range", "calibration"),
+        ({"name": "polynomial", "calibration": {}}, "missing_field", "calibration.name"),
+        ({"name": "polynomial", "calibration": {"nmae": "x"}}, "unknown_field", "calibration.nmae"),
     ],
 )
 def test_estimators_that_cannot_be(fields, code, where):
@@ -172,3 +172,19 @@ def test_the_server_s_own_calibration_goes_by_its_name_or_without():
     own = calibration(name="own")
     for named in (None, "own"):
         assert estimator(own, name="polynomial", calibration=named)[1] is own
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "where"),
+    [
+        ({"degree": 99}, "out_of_range", "calibration.polynomial.degree"),
+        ({"degree": "two"}, "malformed", "calibration.polynomial.degree"),
+        ({"f_d_range": (1.0, 1e9)}, "out_of_range", "calibration.polynomial.f_d_range[1]"),
+        ({"colour": 1}, "unknown_field", "calibration.polynomial.colour"),
+    ],
+)
+def test_a_fault_deep_in_a_calibration_is_named_where_it_is(change, code, where):
+    wrong = content()
+    wrong["polynomial"] |= change
+    reply = refused(estimator, name="polynomial", calibration=wrong)
+    assert (reply.code, reply.where) == (code, where)

@@ -1,7 +1,8 @@
 """Shapers and estimators as clients name them."""
 
-from tvist_protocol.calibration import Calibration, CalibrationError, calibration_of
+from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_protocol.commands import SetEstimator
+from tvist_protocol.errors import ProtocolError
 from tvist_server.calibrations import available, estimator_of, load
 from tvist_server.refusal import RefusalError
 from tvist_server.setup import Setup
@@ -79,8 +80,8 @@ def _calibration(command: SetEstimator, setup: Setup) -> Calibration:
     if isinstance(command.calibration, dict):
         try:
             return calibration_of(command.calibration)
-        except CalibrationError as error:
-            raise RefusalError("out_of_range", "calibration", f"calibration: {error}") from error
+        except ProtocolError as error:
+            raise RefusalError(error.code, error.where, error.why, error.limit) from error
     own = setup.calibration
     if command.calibration is None or (own is not None and own.name == command.calibration):
         if own is None:

@@ -8,6 +8,7 @@ import msgspec
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration, calibration_of
+from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Clock
 from tvist_protocol.values import Payload
 from tvist_server.calibrations import estimator_of
@@ -90,7 +91,7 @@ class Setup:
                 ),
                 **{key: content[key] for key in ("name", "shaper", "seed", "clock", "truth")},
             )
-        except (KeyError, TypeError, msgspec.ValidationError) as error:
+        except (KeyError, TypeError, msgspec.ValidationError, ProtocolError) as error:
             raise ValueError(f"start of the recording: {error}") from error
 
 
