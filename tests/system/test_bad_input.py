@@ -114,7 +114,7 @@ CASES = {
     "no type": (msgpack.packb({"token": "x"}), "missing_field", "type"),
     "unknown type": (pack("dance"), "unknown_type", "type"),
     "type is a number": (msgpack.packb({"type": 3}), "malformed", "type"),
-    "a later version's command": (of("hand_over", client="other"), "unknown_type", "type"),
+    "a later version's command": (of("power_off"), "unknown_type", "type"),
     # fields
     "unknown field": (of("move_j", q=Q1, vel=1.0), "unknown_field", "vel"),
     "missing field": (of("move_j"), "missing_field", "q"),
@@ -168,8 +168,8 @@ CASES = {
     ),
     "fixed without its damping": (of("set_estimator", name="fixed", f_d=[10.0]), "missing_field", "zeta"),
     # a calibration as a map
-    "calibration with an unknown key": (estimator(colour="red"), "out_of_range", "calibration"),
-    "calibration with a missing key": (estimator(payload=...), "out_of_range", "calibration"),
+    "calibration with an unknown key": (estimator(colour="red"), "unknown_field", "calibration.colour"),
+    "calibration with a missing key": (estimator(payload=...), "missing_field", "calibration.payload"),
     "calibration of another arm": (estimator(robot="UR3"), "out_of_range", "calibration.robot"),
     "calibration with NaN": (estimator(name=NAN), "out_of_range", "calibration.name"),
     "calibration with too few coefficients": (
@@ -190,9 +190,9 @@ def test_a_bad_command_is_refused_by_code_and_field_and_changes_nothing(guard, c
 
 
 def test_the_sentence_about_a_calibration_names_the_key(guard):
-    said = guard.refuses(estimator(colour="red")(guard.token), "out_of_range", "calibration")["why"]
+    said = guard.refuses(estimator(colour="red")(guard.token), "unknown_field", "calibration.colour")["why"]
     assert "colour" in said
-    said = guard.refuses(estimator(payload=...)(guard.token), "out_of_range", "calibration")["why"]
+    said = guard.refuses(estimator(payload=...)(guard.token), "missing_field", "calibration.payload")["why"]
     assert "payload" in said
 
 

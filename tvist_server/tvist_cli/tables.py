@@ -27,7 +27,7 @@ def print_paper(result: dict[str, Any]) -> None:
             percents = (f"{impact[key]:+.1f} %" if impact[key] is not None else "–" for key in impact)
             rows.append((f"{motion} impact, {who}", "", *percents))
     table(
-        f"Table 2, mean of {result['runs']} runs beside the paper's 10",
+        f"Table 2, {_runs(result['runs'])} beside the paper's 10",
         ("motion", "delay ms", "stabil. ms", "cycle ms", "overshoot m", "RV m/s²"),
         rows,
     )
@@ -37,11 +37,11 @@ def print_paper(result: dict[str, Any]) -> None:
             default=None,
         )
         table(
-            f"{motion}: every method from the start of the unshaped reference",
-            ("method", "delay ms", "RV m/s²", "peak m/s²", "less peak %", "still after ms", "peak q̈ / limit"),
+            f"{motion}: every method from the start of the unshaped reference (← still first)",
+            ("method", "delay ms", "RV m/s²", "peak m/s²", "less %", "still ms", "q̈/limit"),
             [
                 (
-                    _label(result, name) + (" ← first still" if row["still_after_ms"] == first else ""),
+                    _label(result, name) + (" ←" if row["still_after_ms"] == first else ""),
                     number(row["delay_ms"], 0), number(row["residual_vibration_m_s2"]), number(row["peak_m_s2"]),
                     number(row["peak_reduction_percent"], 1), number(row["still_after_ms"], 0),
                     number(row["peak_acceleration_ratio"]),
@@ -78,3 +78,7 @@ def _figures(row: dict[str, float | None]) -> tuple[str, ...]:
 
 def _label(result: dict[str, Any], name: str) -> str:
     return "waiting, unshaped" if name == "unshaped" else str(result["methods"][name])
+
+
+def _runs(runs: int) -> str:
+    return "one run" if runs == 1 else f"mean of {runs} runs"

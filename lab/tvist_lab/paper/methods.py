@@ -47,7 +47,7 @@ class TimeVarying(Method):
 
     shaper: str = "zv"
     name: str = "shaped"
-    label: str = "TVIST-ZV, the paper's"
+    label: str = "TVIST-ZV"
 
     async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> float:  # noqa: ARG002
         """The polynomial estimator of the robot's own calibration."""
@@ -59,7 +59,7 @@ class TimeVarying(Method):
 class FrozenAtEnd(Method):
     """ZV for the end pose all along: needs the target in advance."""
 
-    name, label = "zv_frozen_at_end", "ZV frozen at the end pose"
+    name, label = "zv_frozen_at_end", "ZV for the end pose"
 
     async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> float:
         """Ask the robot for its estimate at the end, then hold it."""
@@ -100,7 +100,7 @@ class EqualDuration(Method):
     delay: float
     """Of the shaped motion [s]."""
     name: str = "equal_duration_double_s"
-    label: str = "double S of equal duration"
+    label: str = "longer double S"
 
     async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> float:  # noqa: ARG002
         """A double S that reaches its limits lasts way/v + v/a + a/j: what a/j gains the motion lasts longer."""

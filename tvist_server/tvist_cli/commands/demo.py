@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import err, out, print_json, progress
+from tvist_cli.output import out, print_json, progress
 from tvist_cli.tables import print_paper
 
 
@@ -35,5 +35,4 @@ def demo(*, output: Path = Path("tvist-demo"), seed: int = 0, json: bool = False
             "next: tvist serve, then tvist move Q2 in another terminal; or clients/examples/01_bare_client.py"
         )
     if not result.equal:
-        err.print(result.verdict)
-        raise Failure("the recording and its replay do not agree")
+        raise Failure("the recording does not agree with its replay, or with what was received")

@@ -11,6 +11,9 @@ from tvist_cli.output import err, out, print_json, progress, table
 if TYPE_CHECKING:
     from tvist_lab.identification.identify import Identification
 
+PAPER_MASS = 5.0
+"""What a served robot carries unless told otherwise [kg]."""
+
 
 def identify(
     endpoint: str | None = None,
@@ -161,7 +164,10 @@ def _report(done: "Identification", output: Path, *, json: bool) -> None:
             *([_row(done.against, done.error_f_d, done.error_zeta)] if done.true_f_d is not None else []),
         ],
     )
-    out.print(f"written to {output}; use it with: tvist serve --calibration {output}")
+    mass = (
+        f" --payload {done.calibration.payload.mass:g}" if done.calibration.payload.mass != PAPER_MASS else ""
+    )
+    out.print(f"written to {output}; use it with: tvist serve --calibration {output}{mass}")
 
 
 def _row(against: str, f_d: object, zeta: object) -> tuple[str, ...]:

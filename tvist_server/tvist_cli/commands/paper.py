@@ -2,7 +2,9 @@
 
 import asyncio
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import err, print_json, progress
@@ -18,7 +20,7 @@ def paper(
     seed: int = 0,
     figures: Path | None = None,
     calibration: str = "ur5e_5kg",
-    baselines: bool = True,
+    baselines: Annotated[bool, Parameter(negative="--no-baselines")] = True,
     markdown: Path | None = None,
     json: bool = False,
 ) -> None:

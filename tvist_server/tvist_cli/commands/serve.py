@@ -77,6 +77,8 @@ def serve(
             f"listens on {', '.join(checked.listen)}, clock {setup.clock}; ready after {took:.1f} s. Control+C ends it."
         )
 
+    for endpoint in checked.listen if checked.insecure else ():
+        say(f"anybody who reaches {endpoint} can move this robot")
     asyncio.run(server.run(ready))
     if server.failure is not None:
         raise Failure(server.failure)

@@ -1,0 +1,129 @@
+"""What others can reach is guarded, or asked for in so many words; the rules of access are data."""
+
+import socket
+
+import pytest
+
+from tvist_protocol.codec import MAX_BYTES
+from tvist_server.gateways.access import access_control
+from tvist_server.gateways.endpoints import is_local
+from tvist_server.gateways.exposure import ExposureError, guarded
+
+LOCAL = [
+    "tcp/127.0.0.1:7447", "tcp/127.1.2.3:7447", "tcp/[::1]:7447", "udp/127.0.0.1:7447", "ws/127.0.0.1:7447",
+    "tls/127.0.0.1:7447", "quic/[::1]:7447", "tcp/localhost:7447", "unixsock-stream//tmp/robot.sock",
+    "tcp/127.0.0.1:7447?rel=1", "tcp/127.0.0.1:7447#so_sndbuf=65000",
+]  # fmt: skip
+EXPOSED = [
+    "tcp/0.0.0.0:7447", "tcp/[::]:7447", "udp/0.0.0.0:7447", "ws/0.0.0.0:7447", "tcp/192.168.1.5:7447",
+    "tcp/[fe80::1%eth0]:7447", "tcp/[2001:db8::1]:7447", "udp/224.0.0.224:7446", "tcp/[::ffff:192.0.2.1]:7447",
+    "tcp/0:7447", "tcp/:7447", "tcp/nowhere.invalid:7447", "serial//dev/ttyUSB0", "vsock/-1:7447", "TCP/127.0.0.1:7447",
+    "tcp/0.0.0.0:7447#iface=lo", "tcp/0.0.0.0:7447?from=127.0.0.1:1", "unixpipe//tmp/robot", "nonsense", "",
+    "tcp/127.0.0.1.evil.invalid:7447",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("endpoint", LOCAL)
+def test_what_only_this_machine_reaches_needs_nothing(endpoint):
+    assert is_local(endpoint)
+
+
+@pytest.mark.parametrize("endpoint", EXPOSED)
+def test_whatever_else_is_refused_with_both_ways_out(endpoint):
+    assert not is_local(endpoint)
+    with pytest.raises(ExposureError) as refused:
+        guarded(["tcp/127.0.0.1:7447", endpoint], ["ur5e"], security=None, insecure=False)
+    for words in (f"listen is {endpoint}", "--security DIR", "--insecure"):
+        assert words in str(refused.value)
+
+
+def test_a_name_with_one_address_that_leaves_the_machine_is_not_local(monkeypatch):
+    def addresses(*of):
+        return lambda *_, **__: [(socket.AF_INET, socket.SOCK_STREAM, 6, "", (address, 0)) for address in of]
+
+    monkeypatch.setattr(socket, "getaddrinfo", addresses("127.0.0.1", "127.0.0.2"))
+    assert is_local("tcp/robot:7447")
+    monkeypatch.setattr(socket, "getaddrinfo", addresses("127.0.0.1", "192.0.2.1"))
+    assert not is_local("tcp/robot:7447")
+    monkeypatch.setattr(socket, "getaddrinfo", addresses())
+    assert not is_local("tcp/robot:7447")
+
+
+def test_local_endpoints_are_left_as_they_are():
+    assert guarded(LOCAL[:3], ["ur5e"], security=None, insecure=False) == (LOCAL[:3], {})
+
+
+def test_insecure_lets_everybody_in_and_still_limits_the_size_of_a_message():
+    endpoints, settings = guarded(["tcp/0.0.0.0:7447"], ["ur5e"], security=None, insecure=True)
+    assert endpoints == ["tcp/0.0.0.0:7447"]
+    assert settings == {"transport/link/rx/max_message_size": 2 * MAX_BYTES}
+
+
+@pytest.mark.parametrize("insecure", [False, True])
+@pytest.mark.parametrize("endpoint", ["tls/127.0.0.1:7447", "tls/0.0.0.0:7447", "quic/127.0.0.1:7447"])
+def test_an_encrypted_endpoint_needs_certificates(endpoint, insecure):
+    with pytest.raises(ExposureError, match="--security DIR"):
+        guarded([endpoint], ["ur5e"], security=None, insecure=insecure)
+
+
+class TestAccess:
+    ROLES = {"anna": "operator", "wall": "viewer", "otto": "operator"}  # noqa: RUF012  never changed
+
+    def granted(self, role, flow, message, robots=("ur5e",)):
+        """Keys that a role has for a kind of message."""
+        made = access_control(robots, self.ROLES)
+        (policy,) = (policy for policy in made["policies"] if policy["subjects"] == [role])
+        rules = [rule for rule in made["rules"] if rule["id"] in policy["rules"]]
+        assert {rule["permission"] for rule in rules} == {"allow"}
+        return {
+            key
+            for rule in rules
+            if rule["flows"] == [flow] and message in rule["messages"]
+            for key in rule["key_exprs"]
+        }
+
+    def test_what_is_not_allowed_is_denied(self):
+        made = access_control(["ur5e"], self.ROLES)
+        assert made["enabled"] is True
+        assert made["default_permission"] == "deny"
+
+    def test_a_viewer_may_send_nothing_but_questions(self):
+        sends = {message: self.granted("viewer", "ingress", message) for message in (*SENT, *ASKED)}
+        assert {message for message, keys in sends.items() if keys} == {
+            "query", "declare_subscriber", "declare_liveliness_subscriber", "liveliness_query",
+        }  # fmt: skip
+        assert sends["query"] == {"tvist/ur5e/info"}
+
+    def test_an_operator_may_besides_command_stream_and_be_there_and_no_more(self):
+        assert self.granted("operator", "ingress", "query") == {"tvist/ur5e/info", "tvist/ur5e/command"}
+        assert self.granted("operator", "ingress", "put") == {"tvist/ur5e/setpoint"}
+        assert self.granted("operator", "ingress", "liveliness_token") == {"tvist/ur5e/client/*"}
+        for message in ("delete", "reply", "declare_queryable"):
+            assert not self.granted("operator", "ingress", message)
+
+    @pytest.mark.parametrize("role", ["viewer", "operator"])
+    def test_both_hear_what_the_robot_tells_and_nothing_that_clients_send(self, role):
+        streams = {f"tvist/ur5e/{topic}" for topic in ("state", "event", "telemetry", "truth")}
+        assert self.granted(role, "egress", "put") == streams
+        assert self.granted(role, "egress", "query") == set()
+        assert self.granted(role, "ingress", "declare_subscriber") == streams
+
+    def test_every_robot_served_has_its_keys_and_no_other_has(self):
+        robots = ("left", "right")
+        assert self.granted("operator", "ingress", "put", robots) == {
+            "tvist/left/setpoint",
+            "tvist/right/setpoint",
+        }
+        keys = {key for rule in access_control(robots, self.ROLES)["rules"] for key in rule["key_exprs"]}
+        assert {key.split("/")[1] for key in keys} == {"left", "right", "*"}
+        assert {key for key in keys if key.split("/")[1] == "*"} == {"tvist/*/alive"}
+
+    @pytest.mark.parametrize(("name", "role"), ROLES.items())
+    def test_a_role_without_names_is_left_out_since_zenoh_would_take_it_for_everybody(self, name, role):
+        made = access_control(["ur5e"], {name: role})
+        assert made["subjects"] == [{"id": role, "cert_common_names": [name]}]
+        assert [policy["subjects"] for policy in made["policies"]] == [[role]]
+
+
+SENT = ("put", "delete", "reply", "declare_queryable", "liveliness_token")
+ASKED = ("query", "declare_subscriber", "declare_liveliness_subscriber", "liveliness_query")
