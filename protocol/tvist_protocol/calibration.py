@@ -65,7 +65,7 @@ class Provenance(_Part, frozen=True, kw_only=True):
     ring_downs: Annotated[int, Meta(ge=1, le=1_000_000)]
     """Ring-downs measured in all."""
     rejected: Annotated[int, Meta(ge=0, le=1_000_000)]
-    """Of them, those that could not be fitted."""
+    """Further configurations that were tried: the arm could not reach them, or no ring-down could be fitted."""
     measured_f_d_range: tuple[Frequency, Frequency]
     """Span of damped frequencies measured over the workspace [Hz]."""
     measured_zeta_range: tuple[DampingRatio, DampingRatio]

@@ -2,6 +2,7 @@
 
 import doctest
 import functools
+import importlib.util
 import json
 import os
 import re
@@ -118,6 +119,8 @@ def check_command(words):
         case "make":
             targets = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
             assert set(arguments) <= set(targets)
+        case "python" if arguments[0] == "-m":
+            assert importlib.util.find_spec(arguments[1]) is not None, arguments[1]
         case "python" | "cp":
             assert (ROOT / arguments[0]).exists(), arguments[0]
         case ".":

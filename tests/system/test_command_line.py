@@ -257,7 +257,7 @@ def test_identify_finds_the_same_calibration_over_the_network_as_in_process(lock
     for name, endpoint in (("network", (lockstep.endpoint,)), ("process", ())):
         path = tmp_path / f"{name}.json"
         said = tvist("identify", *endpoint, *options, "--output", path, timeout=110).assert_done().json
-        assert said["configurations"] + said["rejected"] == 38
+        assert said["configurations"] == 38
         found.append(json.loads(path.read_text(encoding="utf-8"))["polynomial"])
     assert found[0] == found[1]
 

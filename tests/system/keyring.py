@@ -1,0 +1,103 @@
+"""Keys made by `tvist keys`, and certificates that it would not make."""
+
+import os
+import subprocess
+import sys
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+from tests.conformance.served import PATIENCE, free_endpoint
+
+TLS = "transport/link/tls/"
+
+
+def free_tls_endpoint():
+    return free_endpoint().replace("tcp/", "tls/")
+
+
+def tvist(*arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "tvist_cli", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+
+
+def made(folder, *options):
+    """A folder of keys for a robot on this machine."""
+    ended = tvist("keys", folder, "--robot", "ur5e", "--host", "127.0.0.1", "--host", "localhost", *options)
+    assert ended.returncode == 0, ended.stderr
+    return folder
+
+
+def leave_out(folder, name):
+    """Take a name's rights away, as a person does."""
+    path = folder / "clients.toml"
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(line for line in lines if f'"{name}"' not in line))
+
+
+def shown(folder, authority=None, certificate=None, key=None):
+    """Settings of a Zenoh session that shows a client's certificate; any file may be another's."""
+    return {
+        f"{TLS}enable_mtls": True,
+        f"{TLS}root_ca_certificate": str(authority or folder / "authority.pem"),
+        f"{TLS}connect_certificate": str(certificate or folder / "client.pem"),
+        f"{TLS}connect_private_key": str(key or folder / "client.key"),
+    }
+
+
+def forge(
+    folder: Path, name, *, issuer=None, key=None, days=1.0, usage=ExtendedKeyUsageOID.CLIENT_AUTH, chain=False
+):
+    """A folder with a client's certificate of our own making; the authority in it is the robot's.
+
+    Args:
+        folder: Where to put it.
+        name: Its common name.
+        issuer: Certificate and key files that sign it; itself where there are none.
+        key: Key file it is made for; a new one where there is none.
+        days: When it ends, from now.
+        usage: What it is good for.
+        chain: Whether to show the issuer's certificate behind it.
+    """
+    folder.mkdir()
+    own = read_key(key) if key else ec.generate_private_key(ec.SECP256R1())
+    subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
+    signing, by, behind = own, subject, b""
+    if issuer is not None:
+        parent = x509.load_pem_x509_certificate(issuer[0].read_bytes())
+        signing, by = read_key(issuer[1]), parent.subject
+        behind = issuer[0].read_bytes() if chain else b""
+    now = datetime.now(UTC)
+    certificate = (
+        x509.CertificateBuilder()
+        .subject_name(subject)
+        .issuer_name(by)
+        .public_key(own.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - timedelta(days=30))
+        .not_valid_after(now + timedelta(days=days))
+        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        .add_extension(x509.ExtendedKeyUsage([usage]), critical=False)
+        .sign(signing, hashes.SHA256())
+    )
+    pem = serialization.Encoding.PEM
+    (folder / "client.pem").write_bytes(certificate.public_bytes(pem) + behind)
+    form = serialization.PrivateFormat.PKCS8
+    (folder / "client.key").write_bytes(own.private_bytes(pem, form, serialization.NoEncryption()))
+    return folder
+
+
+def read_key(path):
+    return serialization.load_pem_private_key(path.read_bytes(), password=None)
+
+
+def mode(path):
+    return os.stat(path).st_mode & 0o777  # noqa: PTH116  with Path.stat it reads no better

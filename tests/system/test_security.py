@@ -1,0 +1,327 @@
+"""Who may do what on a robot that others can reach: real sessions, real certificates."""
+
+import queue
+
+import msgpack
+import pytest
+import zenoh
+from cryptography.x509.oid import ExtendedKeyUsageOID
+from tests.conformance.served import Served
+from tests.conformance.wire import PATIENCE, Q1, Wire
+from zenoh.handlers import Callback
+
+from tvist_client import Robot
+from tvist_client.blocking import Robot as BlockingRobot
+from tvist_client.errors import NotConnectedError
+
+from .keyring import forge, free_tls_endpoint, leave_out, made, shown, tvist
+
+FAR = [1.0, *Q1[1:]]
+STREAMS = ("state", "event", "telemetry", "truth")
+REMOTE = zenoh.Locality.REMOTE
+
+
+@pytest.fixture(scope="module")
+def ring(tmp_path_factory):
+    """Keys of a robot with two operators, a viewer, and somebody whose rights were taken away."""
+    people = ("--operator", "anna", "--operator", "otto", "--viewer", "wall", "--viewer", "gone")
+    folder = made(tmp_path_factory.mktemp("keys") / "ring", *people)
+    leave_out(folder, "gone")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def elsewhere(tmp_path_factory):
+    """Keys of another robot, whose operator has the same name."""
+    return made(tmp_path_factory.mktemp("elsewhere") / "ring", "--operator", "anna")
+
+
+@pytest.fixture(scope="module")
+def served(ring):
+    """A robot that others could reach."""
+    endpoint = free_tls_endpoint()
+    with Served("--security", str(ring), "--truth", endpoint=endpoint) as served:
+        yield served
+
+
+@pytest.fixture
+def session(served, ring):
+    """Open a session as somebody; any file may be another's."""
+    opened = []
+
+    def open_as(name, mode="client", endpoint=served.endpoint, **files):
+        wire = Wire(endpoint, settings={"mode": mode, **shown(ring / name, **files)})
+        opened.append(wire)
+        return wire
+
+    yield open_as
+    for wire in opened:
+        wire.session.close()
+
+
+@pytest.fixture
+def operator(session):
+    return session("anna").listen(*STREAMS)
+
+
+@pytest.fixture(params=["client", "peer", "router"])
+def viewer(session, request):
+    """A viewer, also as one of Zenoh's nodes that are told more and pass on what others send."""
+    return session("wall", mode=request.param)
+
+
+def refused(served, settings):
+    """Whether no session comes about."""
+    with pytest.raises(zenoh.ZError), Wire(served.endpoint, settings=settings):
+        pass
+
+
+def arrived(wire):
+    """What this session has sent so far has arrived: a query goes the same way."""
+    return wire.info()
+
+
+def counted(operator, since):
+    """The server's own figures at a tick or later."""
+    return operator.wait("telemetry", lambda telemetry: telemetry["tick"] > since)
+
+
+def everything(wire):
+    """Whatever reaches a session from outside, on any key."""
+    heard = queue.Queue()
+    direct = Callback(heard.put, indirect=False)
+    leaves = (*STREAMS, "setpoint", "command", "info", "alive", "client/*")
+    for key in ("**", "tvist/**", "tvist/ur5e/*", "tvist/*/alive", *map(wire.key, leaves)):
+        wire.session.declare_subscriber(key, direct, allowed_origin=REMOTE)
+        wire.session.declare_queryable(key, direct, allowed_origin=REMOTE)
+        wire.session.liveliness().declare_subscriber(key, direct, history=True)
+    return heard
+
+
+def keys_in(heard):
+    """The keys of what has been heard."""
+    found = set()
+    while not heard.empty():
+        item = heard.get()
+        found.add(str(item.key_expr))
+        if isinstance(item, zenoh.Query):
+            item.drop()
+    return found
+
+
+class TestOperator:
+    def test_moves_and_sees_it(self, operator):
+        with operator.control("anna") as token:
+            motion = operator.command("move_j", token=token, q=FAR)["id"]
+            operator.wait("event", lambda event: event["kind"] == "motion_done" and event["id"] == motion)
+            assert operator.state()["target_q"] == pytest.approx(FAR, abs=1e-6)
+            assert operator.wait("truth")["type"] == "truth"
+
+    def test_streams_set_points(self, operator):
+        with operator.control("anna") as token:
+            operator.command("servo_start", token=token)
+            operator.setpoint(token=token, sequence=0, q=Q1)
+            operator.next("state", lambda state: state["setpoint_sequence"] == 0)
+            operator.command("servo_stop", token=token)
+
+    def test_loses_control_when_its_token_of_liveliness_goes(self, session, operator):
+        other = session("otto")
+        other.announce("otto")
+        assert other.command("take_control", client="otto")["type"] == "accepted"
+        other.session.close()
+        lost = operator.next("event", lambda event: event["kind"] == "lease_lost")
+        assert "otto" in lost["why"]
+
+    async def test_with_the_client_of_this_project(self, served, ring):
+        async with await Robot.connect(served.endpoint, security=ring / "anna") as robot:
+            async with robot.control("anna") as arm:
+                motion = await arm.move_j([0.1, *Q1[1:]])
+                await arm.reset(Q1)
+            assert motion.done is not None
+
+    def test_with_its_blocking_face(self, served, ring):
+        with BlockingRobot.connect(served.endpoint, security=str(ring / "anna")) as robot:
+            assert len(robot.state().actual_q) == 6
+
+
+class TestViewer:
+    def test_sees_all_that_the_robot_tells(self, viewer, operator):
+        viewer.listen(*STREAMS)
+        assert viewer.info()["type"] == "info"
+        with operator.control("anna") as token:
+            motion = operator.command("move_j", token=token, q=[0.1, *Q1[1:]])["id"]
+            viewer.wait("event", lambda event: event["kind"] == "motion_done" and event["id"] == motion)
+        for topic in STREAMS:
+            assert viewer.wait(topic)["tick"] > 0
+        alive = list(viewer.session.liveliness().get("tvist/*/alive", timeout=PATIENCE))
+        assert [str(reply.ok.key_expr) for reply in alive] == ["tvist/ur5e/alive"]
+
+    def test_s_commands_never_reach_the_controller_even_with_the_token_of_the_lease(self, viewer, operator):
+        with operator.control("anna") as token:
+            began = counted(operator, arrived(operator)["tick"])
+            for key in ("tvist/ur5e/command", "tvist/*/command", "tvist/ur5e/*", "tvist/**", "**"):
+                for fields in ({"type": "move_j", "token": token, "q": FAR}, {"type": "stop"}):
+                    assert viewer.ask(key, msgpack.packb(fields)) == []
+            ended = counted(operator, arrived(viewer)["tick"])
+            assert ended["commands"] == began["commands"]
+            assert operator.state()["target_q"] == Q1
+
+    def test_s_set_points_never_reach_it_either(self, viewer, operator):
+        with operator.control("anna") as token:
+            before = counted(operator, arrived(operator)["tick"])
+            operator.command("servo_start", token=token)
+            operator.setpoint(token=token, sequence=0, q=Q1)
+            began = operator.next("state", lambda state: state["setpoint_sequence"] == 0)
+            for sequence, key in enumerate(
+                ("tvist/ur5e/setpoint", "tvist/*/setpoint", "tvist/ur5e/*", "tvist/**", "**")
+            ):
+                spoilt = {"type": "setpoint", "token": token, "sequence": 1 + sequence, "q": [0.01, *Q1[1:]]}
+                viewer.session.put(key, msgpack.packb(spoilt))
+                viewer.session.delete(key)
+            until = arrived(viewer)["tick"]
+            operator.until(until + 10)
+            operator.command("servo_stop", token=token)
+            after = counted(operator, until)
+        states = [state for state in operator.received["state"] if state["tick"] >= began["tick"]]
+        assert {state["setpoint_sequence"] for state in states} <= {0, None}
+        assert all(state["target_q"] == Q1 for state in states)
+        assert after["setpoints_received"] == before["setpoints_received"] + 1
+
+    def test_cannot_end_an_operator_s_lease_with_a_token_of_its_name(self, viewer, operator):
+        # Where such a token is there when control is taken, its going ends the lease at once.
+        forged = viewer.session.liveliness().declare_token("tvist/ur5e/client/anna")
+        arrived(viewer)
+        with operator.control("anna") as token:
+            forged.undeclare()
+            until = arrived(viewer)["tick"]
+            operator.until(until + 10)
+            assert operator.command("keep_alive", token=token) == {"type": "done"}
+
+    def test_cannot_tell_others_what_the_robot_does_nor_answer_in_its_place(self, viewer, operator, session):
+        heard = everything(viewer)
+        other = session("otto").listen("state", "event")
+        for leaf in ("state", "event", "*"):
+            viewer.session.put(
+                viewer.key(leaf), msgpack.packb({"type": "forged"}), encoding="application/msgpack"
+            )
+        arrived(viewer)
+        with operator.control("anna") as token:
+            operator.command("servo_start", token=token)
+            operator.setpoint(token=token, sequence=0, q=Q1)
+            operator.next("state", lambda state: state["setpoint_sequence"] == 0)
+        operator.next("telemetry")
+        arrived(viewer)
+        for wire in (operator, other):
+            arrived(wire)
+            messages = [message for topic in wire.received.values() for message in topic]
+            assert "forged" not in {message["type"] for message in messages}
+        assert keys_in(heard) == {f"tvist/ur5e/{topic}" for topic in (*STREAMS, "alive")}
+
+    def test_s_client_says_what_is_the_matter(self, served, ring):
+        with (
+            BlockingRobot.connect(served.endpoint, security=ring / "wall") as robot,
+            pytest.raises(NotConnectedError, match="this certificate is an operator's"),
+            robot.control("wall"),
+        ):
+            pass
+
+
+class TestStranger:
+    @pytest.mark.parametrize("mode", ["client", "peer", "router"])
+    def test_with_a_certificate_and_no_role_sees_nothing(self, session, operator, mode):
+        stranger = session("gone", mode=mode)
+        heard = everything(stranger)
+        for key in ("tvist/ur5e/info", "tvist/ur5e/command", "tvist/ur5e/*", "tvist/**", "**"):
+            assert (
+                list(stranger.session.get(key, payload=b"", timeout=PATIENCE, allowed_destination=REMOTE))
+                == []
+            )
+            assert list(stranger.session.liveliness().get(key, timeout=PATIENCE)) == []
+        assert list(stranger.session.liveliness().get("tvist/*/alive", timeout=PATIENCE)) == []
+        with operator.control("anna") as token:
+            operator.command("servo_start", token=token)
+            operator.setpoint(token=token, sequence=0, q=Q1)
+            operator.next("state", lambda state: state["setpoint_sequence"] == 0)
+        operator.next("telemetry")
+        assert keys_in(heard) == set()
+
+    def test_s_client_says_what_is_the_matter(self, served, ring):
+        with pytest.raises(NotConnectedError, match="that the robot knows this certificate's name"):
+            BlockingRobot.connect(served.endpoint, security=ring / "gone")
+
+
+class TestNoSession:
+    """Where the handshake fails, nothing follows."""
+
+    def test_without_a_certificate(self, served, ring):
+        refused(served, {"transport/link/tls/root_ca_certificate": str(ring / "authority.pem")})
+
+    def test_with_another_authority_s_certificate_for_an_operator_s_name(self, served, ring, elsewhere):
+        refused(served, shown(elsewhere / "anna", authority=ring / "authority.pem"))
+
+    def test_with_a_robot_of_another_authority(self, served, ring, elsewhere):
+        refused(served, shown(ring / "anna", authority=elsewhere / "authority.pem"))
+
+    def test_over_plain_tcp(self, served):
+        refused(served, {"connect/endpoints": [served.endpoint.replace("tls/", "tcp/")]})
+
+    def test_with_a_viewer_s_key_and_an_operator_s_certificate(self, served, ring):
+        refused(served, shown(ring / "wall", certificate=ring / "anna" / "client.pem"))
+
+    @pytest.mark.parametrize("chain", [False, True])
+    def test_with_an_operator_s_name_signed_with_a_viewer_s_key(self, served, ring, tmp_path, chain):
+        issuer = (ring / "wall" / "client.pem", ring / "wall" / "client.key")
+        forged = forge(tmp_path / "anna", "anna", issuer=issuer, chain=chain)
+        refused(served, shown(forged, authority=ring / "authority.pem"))
+
+    def test_with_a_viewer_s_key_and_an_operator_s_name_signed_by_itself(self, served, ring, tmp_path):
+        forged = forge(tmp_path / "anna", "anna", key=ring / "wall" / "client.key")
+        refused(served, shown(forged, authority=ring / "authority.pem"))
+
+    def test_with_a_certificate_that_has_expired(self, served, ring, tmp_path):
+        issuer = (ring / "authority.pem", ring / "authority.key")
+        good = forge(tmp_path / "good", "anna", issuer=issuer)
+        with Wire(served.endpoint, settings=shown(good, authority=ring / "authority.pem")) as wire:
+            assert wire.info()["type"] == "info"
+        expired = forge(tmp_path / "expired", "anna", issuer=issuer, days=-1)
+        refused(served, shown(expired, authority=ring / "authority.pem"))
+
+    def test_with_the_robot_s_own_certificate_or_one_made_for_robots(self, served, ring, tmp_path):
+        refused(served, shown(ring, certificate=ring / "robot.pem", key=ring / "robot.key"))
+        issuer = (ring / "authority.pem", ring / "authority.key")
+        other = forge(tmp_path / "anna", "anna", issuer=issuer, usage=ExtendedKeyUsageOID.SERVER_AUTH)
+        refused(served, shown(other, authority=ring / "authority.pem"))
+
+    def test_where_a_client_s_certificate_stands_for_the_robot_s(self, ring):
+        endpoint = free_tls_endpoint()
+        config = zenoh.Config.from_json5(
+            f"""{{mode: "router", listen: {{endpoints: ["{endpoint}"]}},
+            scouting: {{delay: 0, multicast: {{enabled: false}}}},
+            transport: {{link: {{tls: {{listen_certificate: "{ring / "otto" / "client.pem"}",
+            listen_private_key: "{ring / "otto" / "client.key"}"}}}}}}}}"""
+        )
+        with zenoh.open(config), pytest.raises(NotConnectedError, match="not trusted"):
+            BlockingRobot.connect(endpoint, security=ring / "anna")
+
+    @pytest.mark.parametrize("days", [-1, None])
+    def test_the_client_of_this_project_says_why(self, served, ring, elsewhere, tmp_path, days):
+        folder = elsewhere / "anna"
+        if days is not None:
+            issuer = (ring / "authority.pem", ring / "authority.key")
+            folder = forge(tmp_path / "anna", "anna", issuer=issuer, days=days)
+            (folder / "authority.pem").write_bytes((ring / "authority.pem").read_bytes())
+        ended = tvist("check", served.endpoint, "--security", folder)
+        assert ended.returncode == 1
+        assert ("certificate expired" if days is not None else "not trusted") in ended.stderr
+        assert ended.stderr.count("\n") == 1
+
+
+def test_a_session_is_cut_when_its_certificate_expires(served, ring, operator, tmp_path):
+    issuer = (ring / "authority.pem", ring / "authority.key")
+    brief = forge(tmp_path / "otto", "otto", issuer=issuer, days=3 / 86400)
+    wire = Wire(served.endpoint, settings=shown(brief, authority=ring / "authority.pem"))
+    wire.announce("otto")
+    assert wire.command("take_control", client="otto")["type"] == "accepted"
+    lost = operator.wait("event", lambda event: event["kind"] == "lease_lost")
+    assert "otto" in lost["why"]
+    wire.session.close()

@@ -1,0 +1,107 @@
+"""What somebody without a key, or with one, can do to the others by sheer number and size."""
+
+import socket
+import ssl
+import time
+from itertools import pairwise
+
+import pytest
+from tests.conformance.served import Served
+from tests.conformance.wire import PATIENCE, Wire
+
+from tvist_client.blocking import Robot
+from tvist_protocol.codec import MAX_BYTES
+
+from .keyring import free_tls_endpoint, made, shown
+
+LONG = {"transport/unicast/open_timeout": 30_000}
+
+
+@pytest.fixture(scope="module")
+def ring(tmp_path_factory):
+    return made(tmp_path_factory.mktemp("keys") / "ring", "--operator", "anna")
+
+
+@pytest.fixture(scope="module")
+def served(ring):
+    """A robot that others could reach."""
+    with Served("--security", str(ring), endpoint=free_tls_endpoint()) as served:
+        yield served
+
+
+@pytest.fixture
+def operator(served, ring):
+    with Wire(served.endpoint, settings=shown(ring / "anna")) as wire:
+        yield wire.listen("state", "telemetry")
+
+
+def idle_connections(endpoint):
+    host, port = endpoint.partition("/")[2].split(":")
+    return [socket.create_connection((host, int(port))) for _ in range(100)]
+
+
+def test_a_hundred_idle_connections_lock_nobody_out(served, operator, ring, measured):
+    idle = idle_connections(served.endpoint)
+    began = time.monotonic()
+    with Wire(served.endpoint, settings=shown(ring / "anna")) as wire:
+        assert wire.info()["type"] == "info"
+    measured("to connect beside 100 idle connections, tls [s]", round(time.monotonic() - began, 3))
+    assert time.monotonic() - began < 2.0
+    for connection in idle:
+        connection.close()
+    # Zenoh now counts a hundred failed handshakes, and accepts nobody for 100 ms after each.
+    tick = operator.state()["tick"]
+    began = time.monotonic()
+    with Robot.connect(served.endpoint, security=ring / "anna") as robot:
+        assert robot.info().tick > tick
+    measured("to connect after 100 were given up at once, tls [s]", round(time.monotonic() - began, 3))
+    ticks = [state["tick"] for state in operator.received["state"] if state["tick"] >= tick]
+    assert max(after - before for before, after in pairwise(ticks)) < 250  # the connected notice nothing
+
+
+def test_nor_do_they_where_there_is_no_security(measured):
+    with Served() as plain:
+        idle = idle_connections(plain.endpoint)
+        began = time.monotonic()
+        with Wire(plain.endpoint) as wire:
+            assert wire.info()["type"] == "info"
+        measured("to connect beside 100 idle connections, tcp [s]", round(time.monotonic() - began, 3))
+        assert time.monotonic() - began < 1.5
+        for connection in idle:
+            connection.settimeout(PATIENCE)
+            assert connection.recv(1) == b""
+            connection.close()
+
+
+def test_a_hundred_that_shake_hands_half_way_lock_nobody_out_either(served, ring):
+    hello, nothing = ssl.MemoryBIO(), ssl.MemoryBIO()
+    half = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).wrap_bio(nothing, hello, server_hostname="localhost")
+    with pytest.raises(ssl.SSLWantReadError):
+        half.do_handshake()
+    first = hello.read()
+    idle = idle_connections(served.endpoint)
+    for connection in idle:
+        connection.sendall(first)
+    with Wire(served.endpoint, settings=shown(ring / "anna")) as wire:
+        assert wire.info()["type"] == "info"
+    for connection in idle:
+        connection.close()
+    # Those that come next wait until this has been got over.
+    with Wire(served.endpoint, settings={**shown(ring / "anna"), **LONG}) as wire:
+        assert wire.info()["type"] == "info"
+
+
+def test_a_message_above_the_cap_does_not_pass_and_the_next_one_does(served, operator):
+    tick = operator.info()["tick"]
+    began = operator.wait("telemetry", lambda telemetry: telemetry["tick"] > tick)
+    for size in (4 * MAX_BYTES, 20 * MAX_BYTES):
+        operator.put(bytes(size))
+        for ask in ({"payload": bytes(size)}, {"payload": b"", "attachment": bytes(size)}):
+            replies = list(operator.session.get(operator.key("command"), timeout=1.0, **ask))
+            # It came to nothing: the server never had it whole.
+            assert [reply.err.payload.to_bytes() for reply in replies] == [b"Timeout"]
+    assert operator.raw(bytes(MAX_BYTES + 1))["limit"] == MAX_BYTES
+    until = operator.info()["tick"]
+    after = operator.wait("telemetry", lambda telemetry: telemetry["tick"] > until)
+    assert after["setpoints_received"] == began["setpoints_received"]
+    served.assert_quiet()
