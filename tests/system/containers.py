@@ -1,0 +1,180 @@
+"""Podman with a store of its own, a base image made from the distribution, and robots in containers."""
+
+import json
+import os
+import select
+import shutil
+import signal
+import subprocess
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from tests.conformance.served import PATIENCE, Served, free_endpoint
+
+ROOT = Path(__file__).parents[2]
+TOOLS = {
+    "podman": "podman", "runc": "runc", "iptables": "iptables", "mmdebstrap": "mmdebstrap",
+    "/usr/lib/podman/netavark": "netavark", "/usr/lib/podman/aardvark-dns": "aardvark-dns",
+}  # fmt: skip
+"""Program, and the package that brings it."""
+BASE = (
+    "--variant=minbase", "--include=python3,python3-venv,ca-certificates", "--dpkgopt=path-exclude=/usr/share/doc/*",
+    "--dpkgopt=path-exclude=/usr/share/man/*", "--dpkgopt=path-exclude=/usr/share/locale/*", "bookworm",
+)  # fmt: skip
+"""As `python:3.11-slim-bookworm`: the same Debian and Python, and little else."""
+MACHINES_OWN = ("/etc/pip.conf", "/etc/ssl/certs", "/usr/local/share/ca-certificates")
+"""How this machine reaches package indexes, lent to a build."""
+BUILD_TIME = 600.0
+
+
+def not_tested(why):
+    """Say loudly that nothing was tested."""
+    pytest.skip(f"CONTAINER NOT TESTED: {why}")
+
+
+def said(result):
+    """The last that a program said."""
+    return " ".join((result.stderr or result.stdout).split())[-300:]
+
+
+def install(*packages):
+    """Have programs of the distribution, or say that they cannot be had."""
+    if os.geteuid() != 0:
+        not_tested(f"{', '.join(packages)} missing, and only root may install")
+    if shutil.which("apt-get") is None:
+        not_tested(f"{', '.join(packages)} missing, and no apt-get here to install with")
+    environment = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
+    for command in (["update"], ["install", "--yes", "--no-install-recommends", *packages]):
+        result = subprocess.run(
+            ["apt-get", "--quiet", *command],
+            capture_output=True, text=True, env=environment, timeout=BUILD_TIME, check=False,
+        )  # fmt: skip
+        if result.returncode != 0:
+            not_tested(f"apt-get cannot install {', '.join(packages)}: {said(result)}")
+
+
+class Engine:
+    """Podman as the tests use it, without any trace in the store or the networks of the machine.
+
+    Args:
+        folder: Where images, containers and networks are kept.
+    """
+
+    def __init__(self, folder):
+        missing = [package for program, package in TOOLS.items() if shutil.which(program) is None]
+        if missing:
+            install(*missing)
+        self.folder = folder
+        configuration = {
+            # Limits and runtime that also work where the tests are in a container or a small machine themselves.
+            "containers.conf": (
+                '[containers]\ndefault_ulimits = ["nofile=1024:10000", "nproc=4096:4096"]\n'
+                '[engine]\nruntime = "runc"\ncgroup_manager = "cgroupfs"\nevents_logger = "file"\n'
+                f'[network]\nnetwork_backend = "netavark"\nnetwork_config_dir = "{folder}/networks"\n'
+            ),
+            "storage.conf": (
+                f'[storage]\ndriver = "overlay"\ngraphroot = "{folder}/store"\nrunroot = "{folder}/run"\n'
+            ),
+        }
+        for name, content in configuration.items():
+            (folder / name).write_text(content, encoding="utf-8")
+        self.environment = {
+            **os.environ,
+            "CONTAINERS_CONF": str(folder / "containers.conf"),
+            "CONTAINERS_STORAGE_CONF": str(folder / "storage.conf"),
+        }
+
+    def __call__(self, *command, timeout=PATIENCE, check=True):
+        """Run `podman` with a command; what it says on stdout."""
+        return self.run("podman", *command, timeout=timeout, check=check).stdout.strip()
+
+    def run(self, *command, timeout=PATIENCE, check=True, **environment):
+        """Run a program that drives podman."""
+        result = subprocess.run(
+            list(map(str, command)),
+            capture_output=True, text=True, timeout=timeout, check=False, env=self.environment | environment,
+        )  # fmt: skip
+        assert not check or result.returncode == 0, (
+            f"{command}: {result.stdout[-2000:]}{result.stderr[-4000:]}"
+        )
+        return result
+
+    def base(self, name):
+        """Make a base image out of the distribution's own packages."""
+        archive = self.folder / "base.tar"
+        result = self.run("mmdebstrap", *BASE[:-1], BASE[-1], archive, timeout=BUILD_TIME, check=False)
+        if result.returncode != 0:
+            not_tested(f"mmdebstrap cannot make a base image: {said(result)}")
+        self("import", archive, name, timeout=BUILD_TIME)
+        archive.unlink()
+
+    def build(self, base, name):
+        """Build the image as docker/README.md says, over another base."""
+        lent = [f"--volume={path}:{path}:ro" for path in MACHINES_OWN if Path(path).exists()]
+        self(
+            "build", "--format=docker", "--network=host", *lent, f"--build-arg=BASE={base}",
+            "--file=docker/Dockerfile", f"--tag={name}", ".", timeout=BUILD_TIME,
+        )  # fmt: skip
+
+    def inspect(self, name, kind="container"):
+        """What podman knows of a container or an image."""
+        return json.loads(self(kind, "inspect", name))[0]
+
+    def close(self):
+        """Leave nothing running, mounted or routed."""
+        self("rm", "--all", "--force", "--time=0")
+        self("network", "prune", "--force")
+        self("image", "unmount", "--all", "--force", check=False)
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+class Contained(Served):
+    """A robot in a container: nothing to write to, no capabilities, on a bridge network.
+
+    Args:
+        engine: Podman.
+        options: Of `podman run`.
+        command: What stands behind the image; without, what the image runs by itself.
+    """
+
+    def __init__(self, engine, *options, command=()):
+        self.engine, self.name = engine, f"robot-{time.monotonic_ns()}"
+        self.endpoint, self.lines = free_endpoint(), []
+        port = self.endpoint.rpartition(":")[2]
+        self.began = time.monotonic()
+        self._news = threading.Condition()
+        self.process = subprocess.Popen(
+            [
+                "podman", "run", f"--name={self.name}", "--health-interval=disable", "--read-only",
+                "--read-only-tmpfs=false", "--cap-drop=ALL", "--security-opt=no-new-privileges", "--network=tests",
+                f"--publish=127.0.0.1:{port}:7447", *options, "tvist", *command,
+            ],
+            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=engine.environment,
+        )  # fmt: skip
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    @property
+    def pid(self):
+        """Of the container's first process, as seen from here."""
+        return self.engine.inspect(self.name)["State"]["Pid"]
+
+    def end(self, number=signal.SIGTERM):
+        """Send a signal to the first process and wait for its end; exit code, and how long it took [s]."""
+        watch = os.pidfd_open(self.pid)
+        try:
+            sent = time.monotonic()
+            signal.pidfd_send_signal(watch, number)
+            ended, _, _ = select.select([watch], [], [], PATIENCE)
+            took = time.monotonic() - sent
+        finally:
+            os.close(watch)
+        assert ended, f"still there {took:.0f} s after {signal.Signals(number).name}"
+        return self.wait(), took
+
+    def kill(self):
+        """Make sure that it is gone, and its network with it."""
+        self.engine("rm", "--force", "--ignore", "--time=0", self.name)
+        super().kill()

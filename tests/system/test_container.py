@@ -1,0 +1,280 @@
+"""The image of docker/, built and run: what it weighs, what it may, how it starts and ends, what it keeps up."""
+
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import msgpack
+import pytest
+from tests.conformance.served import free_endpoint
+from tests.conformance.wire import PATIENCE, Q1, TICK, Wire
+from tests.system.containers import ROOT, Contained, Engine, install
+from zenoh.handlers import Callback
+
+from tvist_client.check import check
+from tvist_lab.mcap_file import read
+
+pytestmark = [pytest.mark.nightly, pytest.mark.timeout(1500)]
+
+MB = 1_000_000
+NEVER_NEEDED = ("*.a", "*.h", "*.hpp", "*.stl", "*.dae", "*.obj", "tests", "include")
+FOREIGN_MACHINE = """
+import sys
+import llvmlite.binding as llvm
+llvm.get_host_cpu_name = lambda: "znver9"
+llvm.get_host_cpu_features = lambda: llvm.FeatureMap(sse2=True)
+from tvist_cli.main import main
+sys.argv[0] = "tvist"
+main()
+"""
+"""tvist, made to believe that it runs on a processor of another name."""
+SERVE = ("serve", "--listen", "tcp/0.0.0.0:7447", "--insecure")
+
+
+@pytest.fixture(scope="module")
+def engine(tmp_path_factory):
+    """Podman, and the image `tvist` in it."""
+    engine = Engine(tmp_path_factory.mktemp("containers"))
+    try:
+        engine.base("base")
+        engine.build("localhost/base", "tvist")
+        engine("network", "create", "tests")
+        yield engine
+    finally:
+        engine.close()
+
+
+@pytest.fixture(scope="module")
+def image(engine):
+    """The image's files, as a folder."""
+    yield Path(engine("image", "mount", "tvist"))
+    engine("image", "unmount", "tvist")
+
+
+@pytest.fixture(scope="module")
+def robot(engine):
+    """A robot in a container, with a client's view of it."""
+    with Contained(engine) as robot:
+        yield robot
+
+
+def status(engine, name):
+    """What the kernel says of a container's first process."""
+    pid = engine.inspect(name)["State"]["Pid"]
+    lines = Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines()
+    return {key: value.split() for key, _, value in (line.partition(":") for line in lines)}
+
+
+def drive(endpoint):
+    """Have every way of moving and every shaper compute."""
+    with Wire(endpoint) as wire, wire.control() as token:
+
+        def do(type, **fields):  # noqa: A002  the wire's name
+            answer = wire.command(type, token=token, **fields)
+            assert answer["type"] in {"accepted", "done"}, answer
+            return answer
+
+        wire.listen("state", "event")
+        for shaper in ("none", "zv", "zvd", "mzv", "ei", "ei2", "ei3"):
+            do("set_shaper", name=shaper)
+        do("set_estimator", name="fixed", f_d=[7.0], zeta=[0.02])
+        id = do("move_j", q=[0.2, *Q1[1:]])["id"]  # noqa: A001  the wire's name
+        wire.wait("event", lambda event: event["id"] == id and event["kind"] == "motion_done")
+        do("servo_start", period=TICK)
+        for sequence in range(50):
+            wire.setpoint(token=token, sequence=sequence, q=[0.2, *Q1[1:]])
+            wire.state()
+        do("servo_stop")
+        do("move_j", q=[1.0, *Q1[1:]])
+        wire.next("state", lambda state: state["target_qd"][0] > 0.1)
+        do("stop")
+        wire.next("state", lambda state: state["target_qd"][0] == 0.0)
+
+
+def test_the_image_weighs_at_most_700_mb_unpacked(engine, image, measured):
+    layers = engine.inspect("tvist", "image")["Size"]
+    on_disk = int(
+        engine.run("du", "--summarize", "--block-size=1", "--one-file-system", image).stdout.split()[0]
+    )
+    measured("sum of the layers [MB]", round(layers / MB))
+    measured("on the disk [MB]", round(on_disk / MB))
+    assert max(layers, on_disk) <= 700 * MB
+
+
+def test_what_only_building_and_looking_need_is_left_out(image):
+    assert (image / "opt/tvist/bin/tvist").exists()
+    assert not [path for pattern in NEVER_NEEDED for path in (image / "opt").rglob(pattern)]
+    assert not (image / "project").exists()
+    assert not (image / "build").exists()
+
+
+def test_it_is_nobody_with_no_rights_and_nothing_to_write_to(engine, robot):
+    configured = engine.inspect("tvist", "image")["Config"]
+    assert configured["User"] == "10001:10001"
+    seen = status(engine, robot.name)
+    assert seen["NSpid"][-1] == "1"
+    assert set(seen["Uid"]) == set(seen["Gid"]) == {"10001"}
+    assert seen["NoNewPrivs"] == ["1"]
+    assert {int(seen[name][0], 16) for name in ("CapInh", "CapPrm", "CapEff", "CapBnd", "CapAmb")} == {0}
+    for folder in ("/", "/tmp", "/recordings", "/opt/kernels"):  # noqa: S108  of the container
+        touched = engine.run("podman", "exec", robot.name, "touch", f"{folder}/here", check=False)
+        assert "Read-only file system" in touched.stderr
+
+
+def test_the_health_check_runs_and_is_tvist_check(engine, robot):
+    assert engine.inspect("tvist", "image")["Healthcheck"]["Test"] == ["CMD", "tvist", "check"]
+    assert engine.run("podman", "healthcheck", "run", robot.name).returncode == 0
+    (entry, *_) = engine.inspect(robot.name)["State"]["Health"]["Log"]
+    assert entry["ExitCode"] == 0
+
+
+def test_500_states_a_second_leave_it_across_a_bridge_for_a_minute(robot, measured):
+    """Counted here, outside, by the robot's own ticks: what was missed there, and what did not arrive."""
+    ticks, arrived, ended = [], [], threading.Event()
+    missed, wanted = [], round(60.0 / TICK)
+
+    def take(sample):
+        state = msgpack.unpackb(sample.payload.to_bytes())
+        arrived.append(time.monotonic())
+        ticks.append(state["tick"])
+        missed.append(state["missed_ticks"])
+        if state["tick"] >= ticks[0] + wanted:
+            ended.set()
+
+    with Wire(robot.endpoint) as wire:
+        subscriber = wire.session.declare_subscriber(wire.key("state"), Callback(take, indirect=False))
+        assert ended.wait(60.0 + PATIENCE)
+        subscriber.undeclare()
+    lost = ticks[-1] - ticks[0] + 1 - len(ticks)
+    late = missed[-1] - missed[0]
+    took = arrived[-1] - arrived[0]
+    measured("ticks missed in the container", late)
+    measured("states that did not arrive", lost)
+    measured("seconds for a minute of ticks", round(took, 4))
+    assert lost + late <= 0.0005 * wanted
+    assert took == pytest.approx((ticks[-1] - ticks[0]) * TICK, rel=0.0005)
+
+
+def test_a_check_from_outside_is_ok_within_three_seconds_of_the_start(engine, measured):
+    with Contained(engine) as robot:
+        report = check(robot.endpoint)
+        took = time.monotonic() - robot.began
+    assert report.ok, report
+    measured("podman run to check ok [s]", round(took, 2))
+    assert took <= 3.0
+
+
+def test_sigterm_ends_it_with_exit_code_0_within_a_second(engine, measured):
+    with Contained(engine) as robot, Wire(robot.endpoint) as wire:
+        wire.state()
+        code, took = robot.end()
+    measured("SIGTERM to exit [s]", round(took, 3))
+    assert code == 0
+    assert took <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("options", "command"),
+    [
+        pytest.param((), (), id="as it comes"),
+        pytest.param(
+            ("--env=NUMBA_CPU_NAME=haswell", "--env=NUMBA_CPU_FEATURES=+avx2"),
+            (),
+            id="another name asked for",
+        ),
+        pytest.param(
+            ("--unsetenv=NUMBA_CPU_NAME", "--unsetenv=NUMBA_CPU_FEATURES"), (), id="no name asked for"
+        ),
+        pytest.param(("--entrypoint=python",), ("-c", FOREIGN_MACHINE, *SERVE), id="another machine"),
+    ],
+)
+def test_on_a_processor_of_any_name_nothing_is_compiled(engine, options, command):
+    """numba files machine code under processor and features; it says what it loads, and what it compiles it saves."""
+    talk = ("--env=NUMBA_DEBUG_CACHE=1", "--env=PYTHONUNBUFFERED=1")
+    with Contained(engine, *talk, *options, command=command) as robot:
+        drive(robot.endpoint)
+        cache = engine("logs", robot.name)
+        code, _ = robot.end()
+    assert code == 0
+    assert "data loaded" in cache
+    assert "saved" not in cache
+    assert "compiling" not in robot.said
+
+
+def test_with_keys_mounted_it_shows_itself_to_who_has_one_and_to_nobody_else(engine, tmp_path):
+    """As docker/README.md says: the health check is a viewer, and the authority's key stays outside."""
+    keys = tmp_path / "keys"
+    host = ("--robot", "ur5e", "--host", "127.0.0.1")
+    engine.run(sys.executable, "-m", "tvist_cli", "keys", keys, *host, "--viewer", "health")
+    (keys / "authority.key").unlink()
+    for path in (keys, *keys.rglob("*")):
+        os.chown(path, 10001, 10001)
+    options = (
+        f"--volume={keys}:/security:ro",
+        "--health-cmd=tvist check tls/127.0.0.1:7447 --security /security/health",
+    )
+    command = ("serve", "--listen", "tls/0.0.0.0:7447", "--security", "/security")
+    with Contained(engine, *options, command=command) as robot:
+        assert engine.run("podman", "healthcheck", "run", robot.name).returncode == 0
+        assert not check(robot.endpoint).ok
+        assert check(robot.endpoint.replace("tcp/", "tls/"), security=keys / "health").ok
+
+
+@pytest.fixture(scope="module")
+def composed(engine):
+    """`podman-compose` with docker/compose.yaml, as a function."""
+    if shutil.which("podman-compose") is None:
+        install("podman-compose")
+    port = free_endpoint().rpartition(":")[2]
+
+    def compose(*command, **environment):
+        compose = ("podman-compose", "--file", ROOT / "docker/compose.yaml", "--project-name", "composed")
+        return engine.run(*compose, *command, PORT=port, **environment)
+
+    compose.endpoint = f"tcp/127.0.0.1:{port}"
+    yield compose
+    compose("down", "--volumes")
+
+
+def wait_until_listening(engine, name):
+    """Wait until a robot that runs in the background says that it listens."""
+    with subprocess.Popen(
+        ["podman", "logs", "--follow", name],
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=engine.environment,
+    ) as logs:  # fmt: skip
+        try:
+            assert any("listens on" in line for line in logs.stderr)
+        finally:
+            logs.kill()
+
+
+def test_the_compose_file_brings_up_a_robot(engine, composed):
+    composed("up", "--detach", "robot")
+    (name,) = engine("ps", "--format={{.Names}}", "--filter=label=io.podman.compose.project=composed").split()
+    wait_until_listening(engine, name)
+    assert check(composed.endpoint).ok
+    assert engine.inspect(name)["HostConfig"]["ReadonlyRootfs"]
+    assert int(status(engine, name)["CapBnd"][0], 16) == 0
+    (published,) = engine.inspect(name)["HostConfig"]["PortBindings"]["7447/tcp"]
+    assert published["HostIp"] == "127.0.0.1"
+    composed("down")
+    assert engine("ps", "--all", "--quiet", "--filter=label=io.podman.compose.project=composed") == ""
+
+
+def test_the_compose_file_brings_up_a_robot_with_a_recorder_whose_volume_stays(engine, composed):
+    composed("up", "--detach", "recorded", RECORDING="first", COMPOSE_PROFILES="recorded")
+    (name,) = engine("ps", "--format={{.Names}}", "--filter=label=io.podman.compose.project=composed").split()
+    wait_until_listening(engine, name)
+    with Wire(composed.endpoint) as wire:
+        last = wire.until(wire.state()["tick"] + 100)["tick"]
+    engine("stop", name)
+    assert engine.inspect(name)["State"]["ExitCode"] == 0
+    composed("down")
+    volume = Path(engine("volume", "inspect", "--format={{.Mountpoint}}", "composed_recordings"))
+    content = read(volume / "first.mcap")
+    assert content.complete
+    assert content.states[-1].tick >= last
