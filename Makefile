@@ -37,10 +37,14 @@ format: setup
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
-# The lock names versions and hashes, never where they come from.
+COMPILE := uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
+  --no-emit-index-url --no-annotate --no-header
+
+# The locks name versions and hashes, never where they come from.
 lock:
-	uv pip compile --quiet --universal --python-version 3.11 --extra dev --generate-hashes \
-	  --no-emit-index-url --no-annotate --no-header -o requirements.lock pyproject.toml
+	$(COMPILE) --extra dev -o requirements.lock pyproject.toml
+	$(COMPILE) --extra server -o docker/requirements.lock pyproject.toml
+	echo hatchling | $(COMPILE) -o docker/build.lock -
 
 schemas: setup
 	$(BIN)/python -m tvist_protocol.generate
