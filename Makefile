@@ -43,8 +43,8 @@ COMPILE := uv pip compile --quiet --universal --python-version 3.11 --generate-h
 # The locks name versions and hashes, never where they come from.
 lock:
 	$(COMPILE) --extra dev -o requirements.lock pyproject.toml
-	$(COMPILE) --extra server -o docker/requirements.lock pyproject.toml
-	echo hatchling | $(COMPILE) -o docker/build.lock -
+	$(COMPILE) --extra server -c requirements.lock -o docker/requirements.lock pyproject.toml
+	echo hatchling | $(COMPILE) -c requirements.lock -o docker/build.lock -
 
 schemas: setup
 	$(BIN)/python -m tvist_protocol.generate
