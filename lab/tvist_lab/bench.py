@@ -41,11 +41,12 @@ def bench(seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
         tell: Told of what is measured next.
     """
     setup = free_setup(truth=False)
-    motion = _motion(setup)
+    motion, payload = _motion(setup), body(setup.payload)
+    commands = _commands(setup, motion)
     tell("the plant")
-    plant = _plant(setup, motion)
+    plant = _arm(Plant(setup.description, payload), commands)
     tell("MuJoCo")
-    mujoco = _mujoco(setup, motion)
+    mujoco = _arm(SecondOpinion(setup.description, payload, MUJOCO_STEP), commands[:300])
     tell("filter and cycle")
     cycle = _cycle(setup)
     line = _line(setup)
@@ -85,26 +86,11 @@ def _commands(setup: Setup, motion: list[np.ndarray[Any, Any]]) -> list[DriveCom
     return [DriveCommand(q, np.zeros_like(q), dynamics.gravity(q)) for q in motion]
 
 
-def _plant(setup: Setup, motion: list[np.ndarray[Any, Any]]) -> float:
-    plant, commands = Plant(setup.description, body(setup.payload)), _commands(setup, motion)
-
+def _arm(arm: Plant | SecondOpinion, commands: list[DriveCommand]) -> float:
     def batch() -> int:
-        plant.reset(commands[0])
+        arm.reset(commands[0])
         for command in commands:
-            plant.step(command)
-        return len(commands)
-
-    return _fastest(batch)
-
-
-def _mujoco(setup: Setup, motion: list[np.ndarray[Any, Any]]) -> float:
-    plant = SecondOpinion(setup.description, body(setup.payload), MUJOCO_STEP)
-    commands = _commands(setup, motion)[:300]
-
-    def batch() -> int:
-        plant.reset(commands[0])
-        for command in commands:
-            plant.step(command)
+            arm.step(command)
         return len(commands)
 
     return _fastest(batch)
