@@ -19,7 +19,7 @@ def main(arguments: list[str] | None = None) -> int:
     checking.add_argument(
         "endpoint", nargs="?", default=ENDPOINT, help="where its server listens (%(default)s)"
     )
-    checking.add_argument("--name", default=NAME, help="the robot's name (%(default)s)")
+    checking.add_argument("--name", help=f"the robot's name ({NAME}, or the first that is there)")
     checking.add_argument(
         "--security", metavar="DIR", help="folder with this client's certificate, for tls/HOST:PORT"
     )

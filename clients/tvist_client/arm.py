@@ -11,17 +11,25 @@ from tvist_client.motion import Motion
 from tvist_client.servo import Servo
 from tvist_client.values import floats
 from tvist_protocol.commands import (
+    HandOver,
     KeepAlive,
     MoveJ,
+    Pause,
+    PowerOff,
+    PowerOn,
+    Resume,
     ServoStart,
     ServoStop,
     SetEstimator,
     SetPayload,
     SetShaper,
+    SetSpeed,
+    SimulationInject,
     SimulationReset,
     SimulationStep,
     StepSetpoint,
     Stop,
+    UnlockProtectiveStop,
 )
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.replies import Accepted, Done
@@ -137,6 +145,36 @@ class Arm:
         limit = None if deceleration is None else float(deceleration)
         await self.robot.request(Stop(token=self.token, deceleration=limit))
 
+    async def pause(self) -> None:
+        """Bring the running motion to a standstill on its way."""
+        await self.robot.request(Pause(token=self.token))
+
+    async def resume(self) -> None:
+        """Go on with a paused motion."""
+        await self.robot.request(Resume(token=self.token))
+
+    async def set_speed(self, fraction: float) -> None:
+        """Scale the speed of motions, as the slider of a teach pendant does; streams keep their own time.
+
+        Args:
+            fraction: Share of the programmed speed, 0 to 1 [-].
+        """
+        await self.robot.request(SetSpeed(token=self.token, fraction=float(fraction)))
+
+    # ------------------------------------------------------------------ power and protective stops
+
+    async def power_on(self) -> None:
+        """Power the arm and release its brakes."""
+        await self.robot.request(PowerOn(token=self.token))
+
+    async def power_off(self) -> None:
+        """Stop what moves, then take the arm's power."""
+        await self.robot.request(PowerOff(token=self.token))
+
+    async def unlock_protective_stop(self) -> None:
+        """Leave a protective stop, once the arm rests."""
+        await self.robot.request(UnlockProtectiveStop(token=self.token))
+
     # ------------------------------------------------------------------ setting up
 
     async def set_shaper(self, name: str, modes: int = 1) -> None:
@@ -236,7 +274,37 @@ class Arm:
         await self.robot.until(reply.tick)
         return reply.tick
 
+    async def inject(
+        self,
+        fault: str,
+        *,
+        joint: int | None = None,
+        seconds: float | None = None,
+        value: float | None = None,
+    ) -> None:
+        """Cause a fault on purpose; the protocol's README lists them.
+
+        Args:
+            fault: Its name.
+            joint: Joint that it concerns, from the base on.
+            seconds: How long it lasts [s].
+            value: How strong it is, in the fault's own unit.
+        """
+        await self.robot.request(
+            SimulationInject(
+                token=self.token,
+                fault=fault,
+                joint=None if joint is None else int(joint),
+                seconds=None if seconds is None else float(seconds),
+                value=None if value is None else float(value),
+            )
+        )
+
     # ------------------------------------------------------------------ lease
+
+    async def hand_over(self, client: str) -> None:
+        """Give control to another client, which has only to take it; this one has none any more."""
+        await self.robot.request(HandOver(token=self.token, client=client))
 
     async def keep_alive(self) -> None:
         """Renew the lease, as every command does; `Robot.control` sees to it."""

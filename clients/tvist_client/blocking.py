@@ -157,6 +157,30 @@ class Arm:
         """Come to rest now, past the shaper."""
         self._portal.call(lambda: self._arm.stop(deceleration))
 
+    def pause(self) -> None:
+        """Bring the running motion to a standstill on its way."""
+        self._portal.call(self._arm.pause)
+
+    def resume(self) -> None:
+        """Go on with a paused motion."""
+        self._portal.call(self._arm.resume)
+
+    def set_speed(self, fraction: float) -> None:
+        """Scale the speed of motions, as the slider of a teach pendant does."""
+        self._portal.call(lambda: self._arm.set_speed(fraction))
+
+    def power_on(self) -> None:
+        """Power the arm and release its brakes."""
+        self._portal.call(self._arm.power_on)
+
+    def power_off(self) -> None:
+        """Stop what moves, then take the arm's power."""
+        self._portal.call(self._arm.power_off)
+
+    def unlock_protective_stop(self) -> None:
+        """Leave a protective stop, once the arm rests."""
+        self._portal.call(self._arm.unlock_protective_stop)
+
     def set_shaper(self, name: str, modes: int = 1) -> None:
         """Choose the input shaper."""
         self._portal.call(lambda: self._arm.set_shaper(name, modes))
@@ -193,6 +217,21 @@ class Arm:
     def step(self, ticks: int, setpoints: Sequence[StepSetpoint] | None = None) -> int:
         """Let 1 to 1000 ticks pass at once, in lockstep and free."""
         return self._portal.call(lambda: self._arm.step(ticks, setpoints))
+
+    def inject(
+        self,
+        fault: str,
+        *,
+        joint: int | None = None,
+        seconds: float | None = None,
+        value: float | None = None,
+    ) -> None:
+        """Cause a fault on purpose."""
+        self._portal.call(lambda: self._arm.inject(fault, joint=joint, seconds=seconds, value=value))
+
+    def hand_over(self, client: str) -> None:
+        """Give control to another client."""
+        self._portal.call(lambda: self._arm.hand_over(client))
 
     def keep_alive(self) -> None:
         """Renew the lease; `Robot.control` sees to it."""

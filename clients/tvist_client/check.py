@@ -8,8 +8,10 @@ import msgspec
 from tvist_client.errors import ClientError, NotConnectedError, UnexpectedReplyError
 from tvist_client.robot import ENDPOINT, NAME, Robot
 from tvist_client.transports.certificates import Folder
+from tvist_client.transports.zenoh import robots_at
 from tvist_protocol.commands import MoveJ
 from tvist_protocol.errors import RefusedError, TvistError
+from tvist_protocol.keys import check_robot_name
 from tvist_protocol.stream import State
 from tvist_protocol.values import PROTOCOL_VERSION
 
@@ -35,7 +37,9 @@ class Report(msgspec.Struct, frozen=True):
     """Whether all is well."""
     endpoint: str
     robot: str
-    """Name of the robot."""
+    """Name of the robot; empty where none was found."""
+    robots: list[str]
+    """Names of all robots there."""
     protocol: int | None
     """Version of the protocol the robot speaks; null where it did not answer."""
     state_rate_hz: float | None
@@ -44,20 +48,21 @@ class Report(msgspec.Struct, frozen=True):
     """Step by step; a step that fails is the last."""
 
 
-def check(endpoint: str = ENDPOINT, name: str = NAME, *, security: Folder | None = None) -> Report:
+def check(endpoint: str = ENDPOINT, name: str | None = None, *, security: Folder | None = None) -> Report:
     """Shake hands with a robot, see a state, and have a command refused. Changes nothing.
 
     Args:
         endpoint: Where the server listens, `tcp/<host>:<port>`.
-        name: The robot's name.
+        name: The robot's name; None: `ur5e` where it is there, otherwise the first of those that are.
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
     """
     return asyncio.run(_Check(endpoint, name, security).run())
 
 
 class _Check:
-    def __init__(self, endpoint: str, name: str, security: Folder | None) -> None:
+    def __init__(self, endpoint: str, name: str | None, security: Folder | None) -> None:
         self.endpoint, self.name, self.security = endpoint, name, security
+        self.robots: list[str] = []
         self.protocol: int | None = None
         self.rate: float | None = None
         self.findings: list[Finding] = []
@@ -65,14 +70,25 @@ class _Check:
     async def run(self) -> Report:
         step = "connect"
         try:
+            if self.name is not None:
+                check_robot_name(self.name)
+            self.robots = await robots_at(self.endpoint, self.security)
+            self.name = self.name or (self.robots[0] if self.robots and NAME not in self.robots else NAME)
             async with await Robot.connect(self.endpoint, self.name, security=self.security) as robot:
-                self.passed(step, f"{self.name} at {self.endpoint}")
+                self.passed(step, f"{self.name} at {self.endpoint}{self.beside()}")
                 for step, run in (("info", self.info), ("state", self.state), ("refusal", self.refusal)):
                     self.passed(step, await run(robot))
         except TvistError as error:
             self.findings.append(Finding(step, ok=False, said=str(error)))
         ok = all(finding.ok for finding in self.findings)
-        return Report(ok, self.endpoint, self.name, self.protocol, self.rate, self.findings)
+        return Report(
+            ok, self.endpoint, self.name or "", self.robots, self.protocol, self.rate, self.findings
+        )
+
+    def beside(self) -> str:
+        """Which other robots there are."""
+        others = [robot for robot in self.robots if robot != self.name]
+        return f", beside {', '.join(others)}" if others else ""
 
     def passed(self, what: str, said: str) -> None:
         self.findings.append(Finding(what, ok=True, said=said))

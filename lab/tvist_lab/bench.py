@@ -1,36 +1,15 @@
-"""How fast it is on this machine: each part alone, the whole line, and a served robot's punctuality."""
+"""How fast it is on this machine: each part alone, the whole line, a served robot, and how many of them."""
 
 import asyncio
-import tempfile
-import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
-import numpy as np
+from tvist_lab.benchmark.many_robots import robots_at_500_hz
+from tvist_lab.benchmark.one_robot import one_robot
+from tvist_lab.benchmark.parts import parts
 
-from tvist_lab.in_process import free_setup
-from tvist_lab.paper.published import pose
-from tvist_lab.second_opinion import SecondOpinion
-from tvist_lab.served import served_robot
-from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import PERIOD, Plant
-from tvist_protocol.codec import encode
-from tvist_protocol.commands import MoveJ, SimulationReset, SimulationStep, TakeControl
-from tvist_protocol.stream import Telemetry
-from tvist_server.control.inverse_dynamics import InverseDynamics
-from tvist_server.cycle import ControlCycle
-from tvist_server.gateways.loopback import LoopbackHost
-from tvist_server.setup import Setup, body
-from tvist_server.trajectory import DoubleS, Limits
-from tvist_shaping import TvistFilter, shaper
-
-TICKS = 1250
-"""Of a motion: Q1 to Q3 without its last moment."""
-BATCHES = 5
-"""Repetitions, of which the fastest counts: what else the machine does only ever adds."""
-MUJOCO_STEP = 0.00025
-"""Step at which MuJoCo agrees with the plant [s]."""
+OF_MANY = 0.4
+"""Share of the time for one robot that each number of robots is watched."""
 
 
 def bench(seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
@@ -40,140 +19,8 @@ def bench(seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
         seconds: How long to watch a served robot; 0: not at all.
         tell: Told of what is measured next.
     """
-    setup = free_setup(truth=False)
-    motion, payload = _motion(setup), body(setup.payload)
-    commands = _commands(setup, motion)
-    tell("the plant")
-    plant = _arm(Plant(setup.description, payload), commands)
-    tell("MuJoCo")
-    mujoco = _arm(SecondOpinion(setup.description, payload, MUJOCO_STEP), commands[:300])
-    tell("filter and cycle")
-    cycle = _cycle(setup)
-    line = _line(setup)
-    result: dict[str, Any] = {
-        "plant_us_per_tick": plant,
-        "mujoco_us_per_tick": mujoco,
-        "plant_ratio": mujoco / plant,
-        "filter_us_per_tick": _filter(setup, motion),
-        "cycle_us_per_tick": cycle,
-        "line_us_per_tick": line,
-        "realtime_factor": PERIOD * 1e6 / line,
-        "start_s": _start(),
-    }
+    result: dict[str, Any] = parts(tell)
     if seconds > 0.0:
-        tell(f"a served robot for {seconds:g} s")
-        result["tick"] = asyncio.run(_punctuality(seconds))
+        result |= asyncio.run(one_robot(seconds, tell))
+        result["robots_at_500_hz"] = asyncio.run(robots_at_500_hz(max(2.0, OF_MANY * seconds), tell))
     return result
-
-
-def _motion(setup: Setup) -> list[np.ndarray[Any, Any]]:
-    trajectory = DoubleS(np.array(pose("Q1")), np.array(pose("Q3")), Limits(1.5, 2.0, 100.0), PERIOD)
-    return [np.array(setup.q), *(trajectory.next() for _ in range(TICKS))]
-
-
-def _fastest(batch: Callable[[], int]) -> float:
-    """Time of one of what a batch does many times [us]."""
-    best = float("inf")
-    for _ in range(BATCHES):
-        began = time.perf_counter()
-        count = batch()
-        best = min(best, (time.perf_counter() - began) / count)
-    return best * 1e6
-
-
-def _commands(setup: Setup, motion: list[np.ndarray[Any, Any]]) -> list[DriveCommand]:
-    dynamics = InverseDynamics(setup.description, body(setup.payload))
-    return [DriveCommand(q, np.zeros_like(q), dynamics.gravity(q)) for q in motion]
-
-
-def _arm(arm: Plant | SecondOpinion, commands: list[DriveCommand]) -> float:
-    def batch() -> int:
-        arm.reset(commands[0])
-        for command in commands:
-            arm.step(command)
-        return len(commands)
-
-    return _fastest(batch)
-
-
-def _filter(setup: Setup, motion: list[np.ndarray[Any, Any]]) -> float:
-    tvist = TvistFilter(shaper(setup.shaper), setup.estimator(), joints=setup.description.joints)
-
-    def batch() -> int:
-        tvist.reset(motion[0])
-        for q in motion:
-            tvist.filter(q)
-        return len(motion)
-
-    return _fastest(batch)
-
-
-def _cycle(setup: Setup) -> float:
-    tvist = TvistFilter(shaper(setup.shaper), setup.estimator(), joints=setup.description.joints)
-    payload = body(setup.payload)
-    start, target = np.array(pose("Q1")), np.array(pose("Q3"))
-    cycle = ControlCycle(setup.description, tvist, q=start, declared=payload, carried=payload, seed=0)
-
-    def batch() -> int:
-        cycle.reset(start)
-        cycle.start(cycle.plan(target, Limits(1.5, 2.0, 100.0)))
-        for _ in range(TICKS):
-            cycle.step()
-        return TICKS
-
-    return _fastest(batch)
-
-
-def _line(setup: Setup) -> float:
-    """The whole server in process: messages in, encoded states out."""
-    host = LoopbackHost(setup)
-    host.subscribe("state", len)
-    host.request("bench", encode(TakeControl(client="bench")))
-    token = host.controller.session.lease.token if host.controller.session.lease else ""
-
-    def batch() -> int:
-        host.request("bench", encode(SimulationReset(token=token, q=pose("Q1"))))
-        host.request("bench", encode(MoveJ(token=token, q=pose("Q3"))))
-        host.request("bench", encode(SimulationStep(token=token, ticks=1000)))
-        return 1000
-
-    return _fastest(batch)
-
-
-def _start() -> float:
-    """From the command to the first state, kernels compiled [s]."""
-
-    async def first_state() -> float:
-        began = time.monotonic()
-        async with served_robot([]) as (robot, _):
-            await robot.state()
-            return time.monotonic() - began
-
-    return asyncio.run(first_state())
-
-
-async def _punctuality(seconds: float) -> dict[str, float]:
-    """Lateness of a served robot's ticks, with one client that reads every state and a recorder."""
-    heard: list[Telemetry] = []
-    with tempfile.TemporaryDirectory() as folder:
-        async with served_robot(["--record", str(Path(folder) / "bench.mcap")]) as (robot, _):
-            states = 0
-
-            def count(_: object) -> None:
-                nonlocal states
-                states += 1
-
-            await robot.state()
-            missed_before = (await robot.state()).missed_ticks
-            robot.on_state(count)
-            robot.on_telemetry(heard.append)
-            await robot.advance(round(seconds / PERIOD))
-            missed = (await robot.state()).missed_ticks - missed_before
-    return {
-        "seconds": seconds,
-        "missed": missed,
-        "states_received": states,
-        "late_p50_us": float(np.median([one.late_p50_us for one in heard])) if heard else float("nan"),
-        "late_p99_us": float(np.max([one.late_p99_us for one in heard])) if heard else float("nan"),
-        "late_max_us": float(np.max([one.late_max_us for one in heard])) if heard else float("nan"),
-    }

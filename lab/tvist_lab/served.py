@@ -6,10 +6,13 @@ import subprocess
 import sys
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 
 from tvist_client.errors import ClientError
 from tvist_client.robot import Robot
 
+_BIND = "import os, sys; os.sched_setaffinity(0, {int(sys.argv[1])}); os.execv(sys.argv[2], sys.argv[2:])"
+"""Binds itself to a processor, and becomes the program behind."""
 PATIENCE = 60.0
 """How long a robot may take to answer at first [s]: a cold start compiles."""
 
@@ -25,22 +28,46 @@ def free_endpoint() -> str:
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
+@dataclass(frozen=True)
+class Served:
+    """A server that answers."""
+
+    endpoint: str
+    pid: int
+    took: float
+    """From its start until it answered [s]."""
+    robot: Robot
+    """A client of the robot, or the first of several."""
+
+
 @asynccontextmanager
-async def served_robot(options: Sequence[str], name: str = "ur5e") -> AsyncIterator[tuple[Robot, str]]:
-    """`tvist serve` with options, a client of it, and its endpoint; SIGTERM and a clean exit at the end.
+async def served(
+    options: Sequence[str], name: str = "ur5e", *, several: bool = False, core: int | None = None
+) -> AsyncIterator[Served]:
+    """`tvist serve` with options, and a client of it; SIGTERM and a clean exit at the end.
+
+    Args:
+        options: Of `tvist serve`, besides the endpoint.
+        name: The robot's name, or that of one of several.
+        several: Whether the options name the robots.
+        core: Processor the server is bound to.
 
     Raises:
         ServedError: It does not answer, or its exit code is not 0.
     """
     endpoint = free_endpoint()
-    command = [sys.executable, "-m", "tvist_cli", "serve", "--listen", endpoint, "--name", name, *options]
-    process = await asyncio.create_subprocess_exec(*command, stderr=subprocess.PIPE)
+    named = () if several else ("--name", name)
+    serve = [sys.executable, "-m", "tvist_cli", "serve", "--listen", endpoint, *named, *options]
+    bound = [] if core is None else [sys.executable, "-c", _BIND, str(core)]
+    loop = asyncio.get_running_loop()
+    began = loop.time()
+    process = await asyncio.create_subprocess_exec(*bound, *serve, stderr=subprocess.PIPE)
     assert process.stderr is not None
     told: list[bytes] = []
     reading = asyncio.create_task(_read(process.stderr, told))
     try:
         async with await _connect(process, endpoint, name, told) as robot:
-            yield robot, endpoint
+            yield Served(endpoint, process.pid, loop.time() - began, robot)
     finally:
         if process.returncode is None:
             process.terminate()
@@ -48,6 +75,17 @@ async def served_robot(options: Sequence[str], name: str = "ur5e") -> AsyncItera
         await reading
     if code != 0:
         raise ServedError(f"tvist serve ended with exit code {code}: {_last(told)}")
+
+
+@asynccontextmanager
+async def served_robot(options: Sequence[str], name: str = "ur5e") -> AsyncIterator[tuple[Robot, str]]:
+    """As `served`, for one robot; a client of it, and its endpoint.
+
+    Raises:
+        ServedError: It does not answer, or its exit code is not 0.
+    """
+    async with served(options, name) as server:
+        yield server.robot, server.endpoint
 
 
 async def _connect(process: asyncio.subprocess.Process, endpoint: str, name: str, told: list[bytes]) -> Robot:

@@ -205,14 +205,14 @@ class PowerOn(ClientMessage, frozen=True, kw_only=True, tag="power_on"):
 
 
 class PowerOff(ClientMessage, frozen=True, kw_only=True, tag="power_off"):
-    """Take the arm's power."""
+    """Take the arm's power; what moves is stopped before."""
 
     token: Token
     """Names the lease."""
 
 
 class UnlockProtectiveStop(ClientMessage, frozen=True, kw_only=True, tag="unlock_protective_stop"):
-    """Leave a protective stop."""
+    """Leave a protective stop, once the arm rests."""
 
     token: Token
     """Names the lease."""
@@ -230,7 +230,7 @@ class SimulationReset(ClientMessage, frozen=True, kw_only=True, tag="simulation.
     payload: Payload | None = None
     """What the arm carries, whatever the controller believes."""
     mode: ResetMode | None = None
-    """Robot mode to put it into."""
+    """Robot mode to put it into; any of them ends a protective stop."""
     shaper: Name | None = None
     """Shaper to choose, as `set_shaper` does."""
 
@@ -256,12 +256,14 @@ class SimulationStep(ClientMessage, frozen=True, kw_only=True, tag="simulation.s
 
 
 class SimulationInject(ClientMessage, frozen=True, kw_only=True, tag="simulation.inject"):
-    """Cause a fault on purpose."""
+    """Cause one of the [faults](#faults) on purpose."""
 
     token: Token
     """Names the lease."""
     fault: Name
     """Its name."""
+    joint: Annotated[int, Meta(ge=0, le=6)] | None = None
+    """Joint that it concerns, from the base on."""
     seconds: Annotated[float, Meta(ge=0, le=3600)] | None = None
     """How long it lasts [s]."""
     value: Annotated[float, Meta(ge=-1e6, le=1e6)] | None = None

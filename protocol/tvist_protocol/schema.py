@@ -39,14 +39,17 @@ def components(
 
 
 @cache
-def field_docs(struct: type[msgspec.Struct]) -> dict[str, str]:
-    """The docstring under each field of a struct, in the order of the fields."""
-    (body,) = ast.parse(inspect.getsource(struct)).body
+def field_docs(described: type) -> dict[str, str]:
+    """The docstring under each field of a struct or member of an enumeration, in their order."""
+    (body,) = ast.parse(inspect.getsource(described)).body
     assert isinstance(body, ast.ClassDef)
     docs: dict[str, str] = {}
     for field, below in zip(body.body, body.body[1:], strict=False):
         match field, below:
-            case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
+            case (
+                ast.AnnAssign(target=ast.Name(id=name)) | ast.Assign(targets=[ast.Name(id=name)]),
+                ast.Expr(value=ast.Constant(value=str(text))),
+            ):
                 docs[name] = " ".join(inspect.cleandoc(text).split())
     return docs
 

@@ -27,7 +27,7 @@ EVENT_MEANINGS: dict[EventKind, str] = {
     "motion_stopped": "the motion `id` ended before its target",
     "stream_stopped": "the stream of set-points ended; `why` says how",
     "lease_lost": "nobody has control any longer",
-    "protective_stop": "the robot stopped to protect itself; `code` says from what",
+    "protective_stop": "the robot stops to protect itself; `code` says from what",
     "shaper_changed": "another shaper or estimator is in use",
     "warning": "something a person should know of; nothing stopped",
 }
@@ -41,11 +41,11 @@ class State(Struct, frozen=True, kw_only=True, tag_field="type", tag="state", gc
     timestamp: float
     """tick·0.002 s; never the wall clock [s]."""
     robot_mode: int
-    """RTDE's number: 7 is RUNNING."""
+    """RTDE's number: 3 is POWER_OFF, 5 IDLE, 7 RUNNING."""
     safety_mode: int
-    """RTDE's number: 1 is NORMAL."""
+    """RTDE's number: 1 is NORMAL, 2 REDUCED, 3 PROTECTIVE_STOP."""
     runtime_state: int
-    """RTDE's number: 1 stopped, 2 playing."""
+    """RTDE's number: 0 is STOPPING, 1 STOPPED, 2 PLAYING, 3 PAUSING, 4 PAUSED."""
     setpoint_sequence: int | None
     """Newest set-point accepted at this tick; null before the first."""
     reference_q: list[float]
@@ -140,7 +140,7 @@ class Telemetry(Struct, frozen=True, kw_only=True, tag_field="type", tag="teleme
     missed_ticks: int
     """Control periods that began too late."""
     dropped_states: int
-    """States nobody could be given in time."""
+    """States the server could not hand to the network in time; what the network drops on its way it does not say."""
     recorder_dropped: int
     """Messages the recorder had no room for."""
     setpoints_received: int

@@ -8,11 +8,13 @@ import msgspec
 
 from tvist_protocol.channels import CHANNELS, COMMANDS, REPLIES, Channel, tag
 from tvist_protocol.commands import Setpoint, StepSetpoint
+from tvist_protocol.faults import FAULTS, Fault
 from tvist_protocol.info import CalibrationInfo, Info, Limits
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import CODE_MEANINGS
-from tvist_protocol.schema import components
+from tvist_protocol.schema import components, field_docs
 from tvist_protocol.stream import EVENT_MEANINGS, Event, State, Telemetry, Truth
+from tvist_protocol.transitions import HAPPENINGS, Activity, Control, diagram
 from tvist_protocol.values import PATTERN_MEANINGS, Payload
 
 Schema = Mapping[str, Any]
@@ -38,6 +40,18 @@ def tables() -> dict[str, str]:
         "events": _table(("kind", "meaning"), ((f"`{kind}`", text) for kind, text in EVENT_MEANINGS.items())),
         "info": _messages((Info, Limits, CalibrationInfo)),
         "modes": _table(("field", "numbers"), map(_mode_row, (RobotMode, SafetyMode, RuntimeState))),
+        "activities": _table(
+            ("state", "`robot_mode`", "`safety_mode`", "meaning"), map(_activity_row, Activity)
+        ),
+        "transitions": diagram(Activity),
+        "control": diagram(Control),
+        "happenings": _table(
+            ("trigger", "meaning"), ((f"`{name}`", text) for name, text in HAPPENINGS.items())
+        ),
+        "faults": _table(
+            ("fault", "meaning", "needs"),
+            ((f"`{name}`", fault.meaning, _needs(fault)) for name, fault in FAULTS.items()),
+        ),
     }
 
 
@@ -53,6 +67,17 @@ def _channel_row(channel: Channel) -> tuple[str, ...]:
 def _mode_row(enum: type[IntEnum]) -> tuple[str, str]:
     name = "".join(f"_{c.lower()}" if c.isupper() else c for c in enum.__name__).removeprefix("_")
     return f"`{name}`", ", ".join(f"{mode.value} {mode.name}" for mode in enum)
+
+
+def _activity_row(activity: Activity) -> tuple[str, ...]:
+    safety = activity.safety_mode(reduced=False)
+    shown = safety.name if safety is SafetyMode.PROTECTIVE_STOP else "NORMAL or REDUCED"
+    return f"`{activity}`", activity.robot_mode.name, shown, field_docs(Activity)[activity.name]
+
+
+def _needs(fault: Fault) -> str:
+    fields = [*(f"`{field}`" for field in fault.needs), *(f"`{field}` or not" for field in fault.may)]
+    return ", ".join(fields) or "–"
 
 
 def _messages(kinds: tuple[Struct, ...]) -> str:

@@ -12,6 +12,7 @@ from tvist_shaping.errors import (
     UnknownShaperError,
 )
 from tvist_shaping.estimators import Estimator, Fixed, Polynomial, terms
+from tvist_shaping.fade import Fade
 from tvist_shaping.filter import TvistFilter
 from tvist_shaping.impulses import Impulses, ei, ei2, ei3, mzv, none, product, zv, zvd
 from tvist_shaping.sensitivity import band, residual
@@ -22,6 +23,7 @@ __all__ = [
     "DelayLine",
     "Estimator",
     "EstimatorError",
+    "Fade",
     "FilterError",
     "Fixed",
     "ImpulseError",

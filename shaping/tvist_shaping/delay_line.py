@@ -131,6 +131,26 @@ class DelayLine:
         self._newest = (self._newest + 1) % self.capacity
         self._buffer[self._newest] = sample
 
+    def newest(self, count: int) -> Floats:
+        """The last samples, oldest first, shape (count, joints); count is at most the capacity."""
+        ages = np.arange(count - 1, -1, -1)
+        return self._buffer[(self._newest - ages) % self.capacity]
+
+    def take_over(self, other: "DelayLine") -> None:
+        """Hold what another line holds; where that is shorter, its oldest sample has been there for ever.
+
+        Args:
+            other: The line to copy from; it is left as it is.
+
+        Raises:
+            ShapingError: It holds samples of another shape.
+        """
+        kept = min(self.capacity, other.capacity)
+        samples = other.newest(kept)
+        self.fill(samples[0])
+        self._buffer[:kept] = samples
+        self._newest = kept - 1
+
     def gather(self, A: Floats, delays: Floats, out: Floats) -> None:
         """Convolve the reference with impulses, eq. (10) of the paper.
 

@@ -2,18 +2,15 @@
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
 from tvist_shaping._types import Floats
+from tvist_shaping.base import Filter
 from tvist_shaping.catalogue import Shaper
-from tvist_shaping.delay_line import DelayLine
 from tvist_shaping.errors import FilterError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.impulses import Impulses, product
 
 
-class TvistFilter:
+class TvistFilter(Filter):
     """Time-varying input shaping of a sampled reference, one filter for all joints.
 
     At tick i, with h the period,
@@ -67,11 +64,10 @@ class TvistFilter:
                 estimator's lowest frequency; or the estimator's highest damping is beyond the shaper's.
             EstimatorError: The estimator needs more joints.
         """
-        if joints < 1:
-            raise FilterError("joints", joints, "at least 1")
-        for name, value in (("period", period), ("max_delay", max_delay)):
-            if not 0.0 < value < math.inf:
-                raise FilterError(name, value, "a finite number of seconds above 0")
+        if not 0.0 < period < math.inf:
+            raise FilterError("period", period, "a finite number of seconds above 0")
+        if not 0.0 < max_delay < math.inf:
+            raise FilterError("max_delay", max_delay, "a finite number of seconds above 0")
         longest = estimator.modes * shaper.duration_periods / estimator.f_d_min
         if longest > max_delay:
             raise FilterError(
@@ -89,14 +85,10 @@ class TvistFilter:
                 f"less than {shaper.zeta_max:g}, as shaper {shaper.name!r} demands",
                 "take another shaper or an estimator with a lower highest damping",
             )
-        self.shaper = shaper
-        self.estimator = estimator
-        self.joints = joints
-        self.period = period
-        self.max_delay = max_delay
         # One tick more than max_delay, against rounding of τ/h; the rest is what interpolation wants.
-        self._line = DelayLine(joints, math.ceil(max_delay / period) + 5)
-        self._q_star: Floats = np.zeros(joints)
+        super().__init__(shaper.name, estimator, joints, period, math.ceil(max_delay / period) + 5)
+        self.shaper = shaper
+        self.max_delay = max_delay
         self.reset(self._q_star)
 
     def __repr__(self) -> str:
@@ -110,40 +102,10 @@ class TvistFilter:
         """Time of the last impulse of the last tick [s]: how much later the shaped reference ends."""
         return self.impulses.duration
 
-    def reset(self, q: npt.ArrayLike) -> None:
-        """Start anew at rest: the reference has been at q for ever.
-
-        Args:
-            q: Joint angles [rad], shape (joints,), finite.
-
-        Raises:
-            ShapingError: q has another shape.
-        """
-        self._line.fill(q)
-        self._q_star[:] = q
-        self._update()
-
-    def filter(self, q_ref: npt.ArrayLike) -> Floats:
-        """Shape one sample.
-
-        Args:
-            q_ref: Reference x_i [rad], shape (joints,), finite.
-
-        Returns:
-            Shaped reference x*_i [rad], shape (joints,), the caller's own.
-
-        Raises:
-            ShapingError: q_ref has another shape.
-        """
-        self._line.push(q_ref)
-        self._update()
-        self._line.gather(self.impulses.A, self.impulses.tau / self.period, self._q_star)
-        return self._q_star.copy()
-
     def replace(self, *, shaper: Shaper | None = None, estimator: Estimator | None = None) -> "TvistFilter":
-        """A filter with another shaper or estimator, at rest where this one is.
+        """A filter with another shaper or estimator that goes on where this one is.
 
-        For a reference at rest only: what of a motion is still in the delay line is not handed over.
+        In motion its output is another than this one's would have been: `Fade` leads from one to the other.
 
         Args:
             shaper: Another shaper; None for the same.
@@ -162,13 +124,22 @@ class TvistFilter:
             period=self.period,
             max_delay=self.max_delay,
         )
-        changed.reset(self._q_star)
+        changed.take_over(self)
         return changed
 
-    def _update(self) -> None:
+    def with_estimator(self, estimator: Estimator) -> "TvistFilter":
+        """As `replace`."""
+        return self.replace(estimator=estimator)
+
+    def _start(self) -> None:
         """Impulses for the modes at the last shaped reference: the z⁻¹ of Figure 8."""
         self.f_d, self.zeta = self.estimator.estimate(self._q_star)
         trains = [
             self.shaper.function(f, z) for f, z in zip(self.f_d.tolist(), self.zeta.tolist(), strict=True)
         ]
         self.impulses = trains[0] if len(trains) == 1 else product(trains)
+
+    def _weigh(self) -> None:
+        """Impulses of this tick, and what they gather."""
+        self._start()
+        self._line.gather(self.impulses.A, self.impulses.tau / self.period, self._q_star)

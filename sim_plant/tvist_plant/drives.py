@@ -19,9 +19,12 @@ from tvist_plant.description import Drives
 from tvist_plant.model import FlexibleModel, Floats
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True, eq=False)
 class DriveCommand:
-    """Set-points of all drives for the end of a tick; the drives interpolate linearly from the last ones."""
+    """Set-points of all drives for the end of a tick; the drives interpolate linearly from the last ones.
+
+    Not frozen: one is made every tick, and that would cost five times as much.
+    """
 
     q: Floats
     """Position q_r, shape (n,) [rad]."""

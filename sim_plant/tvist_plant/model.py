@@ -126,5 +126,9 @@ def _lumps(description: RobotDescription, number: int) -> tuple[pin.Inertia, pin
 def _add_flange(model: pin.Model, parent: int, placement: pin.SE3, payload: Payload) -> None:
     model.addFrame(pin.Frame(FLANGE, parent, 0, placement, pin.FrameType.OP_FRAME))
     if payload.mass > 0.0:
-        body = pin.Inertia(payload.mass, np.array(payload.com), _matrix(payload.inertia))
-        model.appendBodyToJoint(parent, body, placement)
+        model.appendBodyToJoint(parent, payload_inertia(payload), placement)
+
+
+def payload_inertia(payload: Payload) -> pin.Inertia:
+    """Mass, centre of mass and inertia of a payload in the frame of the flange."""
+    return pin.Inertia(payload.mass, np.array(payload.com), _matrix(payload.inertia))

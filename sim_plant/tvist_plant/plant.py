@@ -30,9 +30,12 @@ class PlantError(ArithmeticError):
     """The arm's state is no longer finite: it was driven beyond what the physics is good for."""
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True, eq=False)
 class Measurement:
-    """What a robot can measure of itself."""
+    """What a robot can measure of itself.
+
+    Not frozen: one is made every tick, and that would cost five times as much.
+    """
 
     q: Floats
     """Link-side joint angles, shape (n,) [rad]."""
@@ -91,6 +94,7 @@ class Plant:
         self._phase = np.zeros(n)
         self._accelerometer = Accelerometer(description.sensors.accelerometer_noise, 0)
         self._command = np.zeros((3, n))
+        self._external: Floats | None = None
 
     def _load(self, payload: Payload) -> None:
         """Models of the arm with this payload, and room for its state."""
@@ -121,6 +125,7 @@ class Plant:
         """
         if payload is not None:
             self._load(payload)
+        self._external = None
         self._phase = gear_phases(self.description.joints, seed)
         self._accelerometer = Accelerometer(self.description.sensors.accelerometer_noise, seed)
         self._command = np.array([command.q, command.qd, command.torque])
@@ -173,11 +178,25 @@ class Plant:
         self._evaluate()
         return self._measure()
 
+    def push(self, torque: Floats) -> None:
+        """Let something outside push the joints from now on, until it is changed or the arm is reset.
+
+        Args:
+            torque: On the link side, shape (n,) [N m].
+        """
+        self._external = torque.copy() if torque.any() else None
+
+    def spoil(self) -> None:
+        """Make the state not a number, as a fault: the next step finds it."""
+        self._speed[:] = math.nan
+
     def _evaluate(self) -> None:
         """Mass matrix, bias, link accelerations and motor torques at the present state."""
         model, data, linear, nonlinear = self._flexible.model, self._data, self._linear, self._nonlinear
         pin.crba(model, data, self._q)
         self._bias = pin.nonLinearEffects(model, data, self._q, self._qd).copy()
+        if self._external is not None:
+            self._bias[self._flexible.joints] -= self._external
         balance(
             self._y, self._v, self._s, data.M, self._bias, self._command, self._flexible.joints,
             linear.stiffness, linear.damping,

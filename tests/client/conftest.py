@@ -15,7 +15,7 @@ from tvist_protocol.info import Info, Limits
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.stream import Event, State, Truth
 from tvist_protocol.values import Payload
-from tvist_server.gateways.zenoh import ZenohGateway
+from tvist_server.gateways.network import Network
 
 JOINTS = 6
 MOVE_TICKS = 120
@@ -208,9 +208,10 @@ class Served:
         self._unanswered = []
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
-        self._gateway = ZenohGateway("ur5e", [endpoint], self, lockstep=robot.clock != "realtime", truth=True)
+        self._network = Network([endpoint])
+        gateway = self._network.gateway("ur5e", self, lockstep=robot.clock != "realtime", truth=True)
         for topic in ("state", "event", "truth"):
-            robot.subscribe(topic, lambda data, topic=topic: self._gateway.publish(topic, data))
+            robot.subscribe(topic, lambda data, topic=topic: gateway.publish(topic, data))
         self._thread.start()
 
     def request(self, data, reply):
@@ -243,7 +244,7 @@ class Served:
         self.post(lambda: None)
         if self._thread.is_alive():
             self._thread.join()
-        self._gateway.close()
+        self._network.close()
 
     def _run(self):
         realtime = self.robot.clock == "realtime"

@@ -186,6 +186,14 @@ async def test_what_is_said_reaches_the_robot_as_it_was_said(fake, free):
         await arm.set_estimator("polynomial", calibration={"a": 1})
         assert await arm.reset(Q, seed=3, payload=payload, mode="RUNNING", shaper="zvd") == 0
         await arm.stop(2.5)
+        await arm.pause()
+        await arm.resume()
+        await arm.set_speed(1)
+        await arm.power_off()
+        await arm.power_on()
+        await arm.inject("torque", joint=1, seconds=1, value=-30)
+        await arm.unlock_protective_stop()
+        await arm.hand_over("you")
     token = "me#1"
     assert fake.commands == [
         c.TakeControl(client="me", lease_s=7.0),
@@ -193,6 +201,14 @@ async def test_what_is_said_reaches_the_robot_as_it_was_said(fake, free):
         c.SetEstimator(token=token, name="polynomial", calibration={"a": 1}),
         c.SimulationReset(token=token, q=Q, seed=3, payload=payload, mode="RUNNING", shaper="zvd"),
         c.Stop(token=token, deceleration=2.5),
+        c.Pause(token=token),
+        c.Resume(token=token),
+        c.SetSpeed(token=token, fraction=1.0),
+        c.PowerOff(token=token),
+        c.PowerOn(token=token),
+        c.SimulationInject(token=token, fault="torque", joint=1, seconds=1.0, value=-30.0),
+        c.UnlockProtectiveStop(token=token),
+        c.HandOver(token=token, client="you"),
         c.ReleaseControl(token=token),
     ]
 

@@ -21,15 +21,19 @@ def free_endpoint():
 
 
 class Served:
-    """A robot in a process of its own."""
+    """A robot in a process of its own; several where there is no name but the option --robots."""
+
+    program = ("-m", "tvist_cli", "serve")
+    """What Python runs."""
 
     def __init__(self, *options, name="ur5e", endpoint=None):
         self.name, self.endpoint = name, endpoint or free_endpoint()
         self.lines = []
+        named = () if name is None else ("--name", name)
         self.began = time.monotonic()
         self._news = threading.Condition()
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "tvist_cli", "serve", "--listen", self.endpoint, "--name", name, *options],
+            [sys.executable, *self.program, "--listen", self.endpoint, *named, *options],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,

@@ -1,5 +1,8 @@
 """Configuration: what is wrong is said in one sentence that names the key."""
 
+import json
+import tomllib
+
 import pytest
 
 from tvist_protocol.calibration import calibration_to_json
@@ -155,3 +158,51 @@ def test_a_setup_of_any_number_of_joints_is_checked_for_that_number(joints):
     setup(description).check()
     with pytest.raises(ValueError, match=f"{joints} joints"):
         setup(description, q=(0.0,) * (joints + 1)).check()
+
+
+STATE = """
+q = [0.0, -1.5, 1.5, 0.0, 0.0, 0.0]
+mode = "POWER_OFF"
+shaper = "ei"
+seed = 3
+
+[payload]
+mass = 1.5
+com = [0.0, 0.0, 0.05]
+inertia = [0.01, 0, 0, 0.01, 0, 0.01]
+"""
+
+
+@pytest.mark.parametrize("name", ["state.toml", "state.json"])
+def test_a_state_to_start_in_goes_before_the_rest(tmp_path, name):
+    file = tmp_path / name
+    content = tomllib.loads(STATE)
+    file.write_text(json.dumps(content) if name.endswith("json") else STATE)
+    found = config(state=str(file), shaper="zv", start="Q1").setup()
+    assert (found.q, found.mode, found.shaper, found.seed) == (tuple(content["q"]), "POWER_OFF", "ei", 3)
+    assert found.carried.mass == 1.5
+    assert found.payload.mass == 5.0
+    assert Setup.from_builtins(found.to_builtins()) == found
+
+
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        ("q = [0, 0]", "start has 2 angles"),
+        ("q = [0, 0, 0, 0, 0, 9]", "start q[5] is 9"),
+        ('mode = "BOOTING"', "mode"),
+        ("speed = 1", "speed"),
+        ("q = ", "state"),
+        ('shaper = "zvdd"', "did you mean 'zvd'"),
+        ("[payload]\nmass = 1\ncom = [0, 0, 0]\ninertia = [1, 0, 0, 1, 0, 9]", "payload.inertia"),
+        ("[payload]\nmass = -1\ncom = [0, 0, 0]\ninertia = [1, 0, 0, 1, 0, 1]", "payload.mass"),
+    ],
+)
+def test_a_state_that_cannot_be(tmp_path, content, named):
+    file = tmp_path / "state.toml"
+    file.write_text(content)
+    assert named in sentence(config(state=str(file)).setup)
+
+
+def test_a_state_that_is_not_there(tmp_path):
+    assert "No such file" in sentence(config(state=str(tmp_path / "no.toml")).setup)

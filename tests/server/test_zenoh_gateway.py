@@ -15,7 +15,7 @@ import zenoh
 
 from tvist_protocol.codec import MAX_BYTES
 from tvist_server.gateways.base import GatewayError
-from tvist_server.gateways.zenoh import ZenohGateway
+from tvist_server.gateways.network import Network
 
 WAIT = 10.0
 
@@ -100,17 +100,20 @@ def desk():
 
 
 @pytest.fixture
-def gateway(endpoint, desk):
-    gateway = ZenohGateway("ur5e", [endpoint], desk, lockstep=False, truth=False)
-    yield gateway
-    gateway.close()
+def network(endpoint):
+    network = Network([endpoint])
+    yield network
+    network.close()
 
 
 @pytest.fixture
-def lockstep_gateway(endpoint, desk):
-    gateway = ZenohGateway("ur5e", [endpoint], desk, lockstep=True, truth=True)
-    yield gateway
-    gateway.close()
+def gateway(network, desk):
+    return network.gateway("ur5e", desk, lockstep=False, truth=False)
+
+
+@pytest.fixture
+def lockstep_gateway(network, desk):
+    return network.gateway("ur5e", desk, lockstep=True, truth=True)
 
 
 @pytest.fixture
@@ -207,23 +210,23 @@ def test_in_lockstep_events_states_and_truth_keep_their_order(lockstep_gateway, 
     assert [received.get(timeout=WAIT).payload.to_string() for _ in sent] == sent
 
 
-def test_nothing_is_served_before_alive_is_there_and_alive_goes_with_close(gateway, session):
+def test_nothing_is_served_before_alive_is_there_and_alive_goes_with_close(gateway, network, session):
     seen = queue.Queue()
     session.liveliness().declare_subscriber("tvist/*/alive", seen.put, history=True)
     assert seen.get(timeout=WAIT).kind == zenoh.SampleKind.PUT
-    gateway.close()
+    network.close()
     assert seen.get(timeout=WAIT).kind == zenoh.SampleKind.DELETE
 
 
-def test_close_ends_what_is_unanswered_and_a_late_reply_goes_nowhere(gateway, desk, session):
+def test_close_ends_what_is_unanswered_and_a_late_reply_goes_nowhere(network, gateway, desk, session):
     desk.hold = True
     pending = session.get("tvist/ur5e/command", payload=b"wait", timeout=60.0)
     assert desk.next() == ("request", b"wait")
-    gateway.close()
+    network.close()
     assert list(pending) == []
     desk.held[0]()
     gateway.publish("state", b"nobody hears it")
-    gateway.close()
+    network.close()
 
 
 def test_a_client_that_left_before_its_reply_disturbs_nobody(gateway, desk, session, endpoint):
@@ -247,16 +250,16 @@ def test_a_client_that_left_before_its_reply_disturbs_nobody(gateway, desk, sess
         ("tcp/192.0.2.1:7447", "no such address"),
     ],
 )
-def test_an_endpoint_that_cannot_be_listened_on_is_one_clear_sentence(desk, endpoint, sentence):
+def test_an_endpoint_that_cannot_be_listened_on_is_one_clear_sentence(endpoint, sentence):
     with pytest.raises(GatewayError) as raised:
-        ZenohGateway("ur5e", [endpoint], desk, lockstep=False, truth=False)
+        Network([endpoint])
     assert endpoint in str(raised.value)
     assert sentence in str(raised.value)
 
 
-def test_a_port_in_use_is_one_clear_sentence(gateway, desk, endpoint):
+def test_a_port_in_use_is_one_clear_sentence(network, endpoint):
     with pytest.raises(GatewayError, match=rf"^cannot listen on {endpoint}: the port is in use: stop"):
-        ZenohGateway("other", [endpoint], desk, lockstep=False, truth=False)
+        Network([endpoint])
 
 
 READER = """
@@ -303,14 +306,14 @@ def test_a_reader_that_stops_loses_states_but_no_event_and_never_holds_up_the_pu
 
 FORGETFUL = """
 import sys, time, zenoh
-from tvist_server.gateways.zenoh import ZenohGateway
+from tvist_server.gateways.network import Network
 class Desk:
     def request(self, data, reply): reply(b"")
     def setpoint(self, data): pass
     def info(self, reply): reply(b"")
     def client_seen(self, name): pass
     def client_gone(self, name): pass
-gateway = ZenohGateway("ur5e", [sys.argv[1]], Desk(), lockstep=False, truth=False)
+gateway = Network([sys.argv[1]]).gateway("ur5e", Desk(), lockstep=False, truth=False)
 gateway.publish("state", b"x")
 print("end of main")
 """

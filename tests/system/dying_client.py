@@ -1,6 +1,6 @@
 """A client that takes control, moves or streams, and goes on until it is killed.
 
-python dying_client.py ENDPOINT move|stream [announced] [lease_s=SECONDS]
+python dying_client.py ENDPOINT move|stream [announced] [lease_s=SECONDS] [amplitude=RADIANS] [rate=RADIANS/SECOND]
 """
 
 import math
@@ -14,7 +14,11 @@ from tests.conformance.wire import Q1, Wire
 
 
 def main(endpoint, what, *options):
-    lease_s = next((float(option[8:]) for option in options if option.startswith("lease_s=")), 30.0)
+    given = dict(option.split("=") for option in options if "=" in option)
+    lease_s, amplitude, rate = (
+        float(given.get(name, usual))
+        for name, usual in (("lease_s", 30.0), ("amplitude", 0.1), ("rate", 1.0))
+    )
     with Wire(endpoint) as wire:
         if "announced" in options:
             wire.announce("dying")
@@ -23,14 +27,15 @@ def main(endpoint, what, *options):
         if what == "move":
             assert wire.command("move_j", token=token, q=[2.0, *Q1[1:]])["type"] == "accepted"
         else:
-            assert wire.command("servo_start", token=token, period=0.008) == {"type": "done"}
+            answer = wire.command("servo_start", token=token, period=0.008)
+            assert answer == {"type": "done"}, answer
         print("under way", flush=True)  # noqa: T201  whoever started it waits for that
         if what == "move":
             threading.Event().wait()
         tick = wire.state()["tick"]
         for sequence in range(100_000):  # a set-point every 8 ms, by the robot's own ticks
             tick = wire.until(tick + 4)["tick"]
-            offset = 0.1 * (1.0 - math.cos(0.008 * sequence))
+            offset = amplitude * (1.0 - math.cos(0.008 * rate * sequence))
             wire.setpoint(token=token, sequence=sequence, q=[offset, *Q1[1:]])
 
 

@@ -289,8 +289,33 @@ def test_the_paper_in_one_run_prints_its_tables(tmp_path):
 @pytest.mark.slow
 def test_the_bench_gives_its_figures():
     said = tvist("bench", "--seconds", 0, "--json", timeout=110).assert_done().json
-    assert {"plant_us_per_tick", "cycle_us_per_tick", "realtime_factor"} <= said.keys()
+    assert {"plant_us_per_tick", "mujoco_us_per_tick", "plant_ratio", "filter_us_per_tick"} <= said.keys()
+    assert {"cycle_us_per_tick", "line_us_per_tick", "realtime_factor"} <= said.keys()
     assert said["realtime_factor"] > 5.0
+
+
+@pytest.mark.nightly
+@pytest.mark.timeout(900)
+def test_the_bench_gives_the_figures_of_served_robots():
+    said = tvist("bench", "--seconds", 3, "--json", timeout=800).assert_done().json
+    assert {"cpu_share", "start_s", "rss_mb", "robots_at_500_hz"} <= said.keys()
+    assert said["tick"].keys() == {
+        "seconds", "missed", "states_received", "late_p50_us", "late_p99_us", "late_max_us",
+    }  # fmt: skip
+    for what in ("setpoint_to_state_ms", "command_ms"):
+        assert 0.0 < said[what]["p50"] <= said[what]["p99"]
+    assert said["robots_at_500_hz"] >= 1
+
+
+@pytest.mark.slow
+def test_a_short_soak_loses_nothing_and_says_what_it_saw():
+    said = tvist("bench", "--soak", 0.1, "--json", timeout=110).assert_done().json
+    assert said["samples_lost"] == 0
+    assert said["states_recorded"] >= said["ticks"] > 0
+    assert said["observers"] == 5
+    assert said["states_observed"] + said["states_lost_by_observers"] >= 5 * said["ticks"]
+    assert 0 < said["setpoints_sent"] <= 3001
+    assert {"missed_percent", "late_p99_us", "memory_growth_percent"} <= said.keys()
 
 
 @pytest.mark.slow

@@ -110,6 +110,81 @@ def test_a_client_that_has_stopped_reading_does_not_hold_up_the_end(clock, tmp_p
     assert read(path).complete
 
 
+SIGNALLED = """
+import importlib, os, signal, sys
+from tvist_cli.main import main
+module, _, name = sys.argv.pop(1).rpartition(".")
+module = importlib.import_module(module)
+original = getattr(module, name)
+def signalled(*arguments, **named):
+    os.kill(os.getpid(), signal.SIGTERM)
+    return original(*arguments, **named)
+setattr(module, name, signalled)
+sys.argv[0] = "tvist"
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    "where",
+    [
+        "tvist_plant.plant.is_compiled",  # nothing is there yet
+        "tvist_server.server.Network",  # the recording has begun
+    ],
+)
+def test_a_signal_before_it_serves_is_a_clean_end_that_leaves_nothing_behind(where, tmp_path):
+    ended = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            SIGNALLED,
+            where,
+            "serve",
+            "--listen",
+            free_endpoint(),
+            "--record",
+            tmp_path / "x.mcap",
+        ],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
+    assert list(tmp_path.iterdir()) == []
+
+
+ENDS = 200
+
+
+@pytest.mark.nightly
+@pytest.mark.timeout(1800)
+def test_two_hundred_starts_and_ends_with_clients_attached(measured):
+    """No hang, no orphan, none that takes longer than a second; at moments of a motion that differ."""
+    slowest = 0.0
+    for number in range(ENDS):
+        with Served() as served:
+            with Wire(served.endpoint) as mover, Wire(served.endpoint) as watcher:
+                watcher.listen("state", "event")
+                token = mover.command("take_control", client="mover")["token"]
+                mover.command("move_j", token=token, q=FAR)
+                watcher.until(watcher.state()["tick"] + number)
+                code, took = served.end(signal.SIGINT if number % 2 else signal.SIGTERM)
+            assert code == 0, served.said
+            served.assert_quiet()
+            assert not [line for line in _processes() if served.endpoint in line]
+        slowest = max(slowest, took)
+        assert took < SECOND
+    measured("slowest from signal to exit [s]", round(slowest, 3))
+
+
+def _processes():
+    """Command lines of all processes there are."""
+    return subprocess.run(
+        ["ps", "-eo", "args"], capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+
+
 def test_a_second_signal_while_it_ends_does_no_harm(tmp_path):
     path = tmp_path / "run.mcap"
     with Served("--record", str(path)) as served:

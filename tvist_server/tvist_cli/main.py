@@ -1,7 +1,8 @@
 """Entry of the `tvist` program: which commands there are. Each is imported when it is called."""
 
+import os
+import signal
 import sys
-from importlib.metadata import version
 
 COMMANDS = {
     "serve": "Run a robot on the network.",
@@ -22,6 +23,12 @@ COMMANDS = {
 
 def main() -> None:
     """Run the program."""
+    if sys.argv[1:2] == ["serve"]:
+        # Nothing is served yet, so whoever ends it gets what was asked for. As the first process of a container
+        # it has no default to end by.
+        signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
+    from importlib.metadata import version
+
     try:
         import cyclopts
     except ImportError:

@@ -45,7 +45,7 @@ def info_of(controller: Controller) -> Info:
             f_d_range=calibration.provenance.measured_f_d_range,
             zeta_range=calibration.provenance.measured_zeta_range,
         ),
-        shaper=tvist.shaper.name,
+        shaper=tvist.name,
         modes=tvist.estimator.modes,
         estimator=controller.estimator_name,
         calibrations=sorted({*available(), *own}),

@@ -1,49 +1,70 @@
-"""Who lets time pass for a served robot: the wall clock, or a client's steps.
+"""Who lets time pass for served robots: the wall clock, or a client's steps.
 
-Either way one thread owns the controller; jobs from elsewhere reach it through a queue.
+Either way one thread owns a controller; jobs from elsewhere reach it through a queue.
 """
 
+import contextlib
+import ctypes
 import logging
+import os
 import threading
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from queue import Empty, SimpleQueue
 
-import numpy as np
-
 from tvist_server.host import Host
+from tvist_server.lateness import Lateness, Punctuality
+from tvist_server.schedule import Schedule
 
 log = logging.getLogger(__name__)
 
 Job = Callable[[], None]
 
-CATCH_UP = 50
-"""Periods that are made up for after a delay; what is more is left out, so that no burst lasts longer than that."""
+LONGEST_SLEEP = 0.1
+"""How long the tick thread sleeps at most without a look at whether it should end [s]."""
+HAND_ON_EVERY = 0.0009
+"""Time that passes at least between two calls of whoever hands on what robots say [s]. One call costs two changes
+of threads, as much as a tick: of a single robot each tick is handed on at once, of several those of a
+millisecond together."""
+SET_TIMER_SLACK = 29
+"""Of prctl: how much later than asked for a thread may be woken, in nanoseconds."""
+PRIORITY = 50
+"""Of the tick thread among those of the system that have real-time priority: in the middle of 1 to 99."""
 
 
-@dataclass(frozen=True)
-class Punctuality:
-    """Lateness of the ticks since the last look."""
+class Driven:
+    """A robot as a clock drives it: its host, and what waits to be done between two of its ticks.
 
-    ticks: int
-    seconds: float
-    p50_us: float
-    p99_us: float
-    max_us: float
+    Args:
+        host: The controller.
+    """
+
+    def __init__(self, host: Host) -> None:
+        self.host = host
+        self.jobs: SimpleQueue[Job] = SimpleQueue()
+        self.lateness = Lateness()
+
+    def post(self, job: Job) -> None:
+        """Run a job in the controller's thread before its next tick. From any thread; never waits."""
+        self.jobs.put(job)
+
+    def run_jobs(self) -> None:
+        """Run what waits now; what comes meanwhile waits for the next tick, lest a flood hold up this one."""
+        jobs = self.jobs
+        for _ in range(jobs.qsize()):
+            jobs.get()()
 
 
 class Clock(ABC):
     """A thread that runs jobs and ticks.
 
     Args:
-        host: The controller to drive.
+        robots: Whose.
     """
 
-    def __init__(self, host: Host) -> None:
-        self.host = host
-        self._jobs: SimpleQueue[Job] = SimpleQueue()
+    def __init__(self, robots: Sequence[Driven]) -> None:
+        self._robots = robots
         self._running = True
         self._thread = threading.Thread(target=self._guarded, name="tvist-tick", daemon=True)
 
@@ -51,38 +72,47 @@ class Clock(ABC):
         """Begin."""
         self._thread.start()
 
-    def post(self, job: Job) -> None:
-        """Run a job in the controller's thread before its next tick. From any thread; never waits."""
-        self._jobs.put(job)
-
     def close(self) -> None:
-        """End, after the jobs that are waiting."""
+        """End, after the job that is being done; in real time after all that wait."""
         self._running = False
-        self.post(_nothing)
+        for robot in self._robots:
+            robot.post(_nothing)
         if self._thread.is_alive():
             self._thread.join()
 
-    def punctuality(self) -> Punctuality | None:
-        """Lateness since the last look; None where time does not pass by itself."""
-        return None
+    @abstractmethod
+    def punctuality(self, robot: Driven) -> Punctuality | None:
+        """Lateness of a robot's ticks since the last look; None where time does not pass by itself."""
 
     def _guarded(self) -> None:
         try:
             self._run()
         except Exception:
             log.exception("the controller's thread ended")
-            self.host.failure = "the controller's thread ended by an error: see the log"
+            for robot in self._robots:
+                robot.host.failure = "the controller's thread ended by an error: see the log"
 
     @abstractmethod
     def _run(self) -> None: ...
 
 
 class Lockstep(Clock):
-    """Time passes when a client steps; the last state is told again once a second for those who come late."""
+    """Time passes when a client steps; the last state is told again once a second for those who come late.
 
-    def __init__(self, host: Host, repeat: Job) -> None:
-        super().__init__(host)
+    A thread for each robot: a step of one may take long, and clients of another do not wait for it.
+
+    Args:
+        robot: The robot.
+        repeat: Tells its last state again.
+    """
+
+    def __init__(self, robot: Driven, repeat: Job) -> None:
+        super().__init__([robot])
+        self._jobs = robot.jobs
         self._repeat = repeat
+
+    def punctuality(self, robot: Driven) -> None:
+        """There is none: a client lets time pass."""
 
     def _run(self) -> None:
         while self._running:
@@ -93,58 +123,80 @@ class Lockstep(Clock):
 
 
 class Realtime(Clock):
-    """A tick at every period of the monotonic clock, by absolute deadlines.
-
-    A tick that begins more than a period late is counted as missed, made up for at once, and the deadlines stay
-    where they were: after a week it is still on time.
+    """Ticks at every period of the monotonic clock, for all robots in one thread, by a `Schedule`.
 
     Args:
-        host: The controller to drive.
+        robots: Whose.
+        hand_on: Called after ticks, to hand on what the robots said.
         period: Tick [s].
-        speed: Of its time against the clock's [-].
+        speed: Of their time against the clock's [-].
+        priority: Whether to ask the system for real-time priority.
     """
 
-    def __init__(self, host: Host, period: float, speed: float = 1.0) -> None:
-        super().__init__(host)
+    def __init__(
+        self,
+        robots: Sequence[Driven],
+        hand_on: Job,
+        period: float,
+        speed: float = 1.0,
+        *,
+        priority: bool = False,
+    ) -> None:
+        super().__init__(robots)
+        self._hand_on = hand_on
         self._period = period / speed
-        self._late = np.zeros(4096)
-        self._count = 0
-        self._looked, self._looked_at = 0, time.monotonic()
+        self._priority = priority
+
+    def punctuality(self, robot: Driven) -> Punctuality:
+        """Lateness since the last look."""
+        return robot.lateness.look()
 
     def _run(self) -> None:
-        jobs, host, period = self._jobs, self.host, self._period
-        deadline = time.monotonic()
+        _wake_sharply()
+        if self._priority:
+            _ask_for_priority()
+        robots, now, sleep = self._robots, time.monotonic, time.sleep
+        alone, handed_on = len(robots) == 1, -HAND_ON_EVERY
+        schedule = Schedule(len(robots), self._period, now())
         while self._running:
-            deadline += period
-            wait = deadline - time.monotonic()
+            wait = schedule.due - now()
             if wait > 0.0:
-                time.sleep(wait)
-            late = time.monotonic() - deadline
-            self._late[self._count % len(self._late)] = late
-            self._count += 1
-            if late >= period:
-                host.missed(1)
-                if late > CATCH_UP * period:
-                    left_out = int(late / period) - CATCH_UP
-                    host.missed(left_out)
-                    deadline += left_out * period
-            while not jobs.empty():
-                jobs.get()()
-            host.tick()
-        while not jobs.empty():
-            jobs.get()()
+                sleep(min(wait, LONGEST_SLEEP))
+                if wait > LONGEST_SLEEP:
+                    continue
+            begun = now()
+            number, late, missed = schedule.begin(begun)
+            robot = robots[number]
+            robot.lateness.note(late)
+            if missed:
+                robot.host.missed(missed)
+            robot.run_jobs()
+            robot.host.tick()
+            if alone or begun - handed_on >= HAND_ON_EVERY:
+                handed_on = begun
+                self._hand_on()
+        for robot in robots:
+            robot.run_jobs()
+        self._hand_on()
 
-    def punctuality(self) -> Punctuality | None:
-        """Lateness since the last look."""
-        count, now = self._count, time.monotonic()
-        first = max(self._looked, count - len(self._late))
-        late = self._late[np.arange(first, count) % len(self._late)] * 1e6
-        seconds, ticks = now - self._looked_at, count - self._looked
-        self._looked, self._looked_at = count, now
-        if not len(late):
-            return Punctuality(0, seconds, 0.0, 0.0, 0.0)
-        p50, p99 = np.percentile(late, (50, 99))
-        return Punctuality(ticks, seconds, float(p50), float(p99), float(late.max()))
+
+def _wake_sharply() -> None:
+    """Have the calling thread woken when it asks to be; by default the system may take 50 µs longer."""
+    with contextlib.suppress(OSError, AttributeError):  # a system without: ticks are that much later
+        ctypes.CDLL(None).prctl(SET_TIMER_SLACK, 1, 0, 0, 0)
+
+
+def _ask_for_priority() -> None:
+    """Put the calling thread before all that have no real-time priority; where that may not be, say so and go on."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+    except OSError as error:
+        log.warning(
+            "real-time priority is not permitted (%s), ticks keep the ordinary one: "
+            "it takes CAP_SYS_NICE, or a limit (ulimit -r) of %d",
+            error.strerror,
+            PRIORITY,
+        )
 
 
 def _nothing() -> None:

@@ -43,18 +43,24 @@ class CollisionModel:
     """
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
-        self._model = rigid_model(description, payload)
+        self._model = rigid_model(description, Payload())
         self._data = self._model.createData()
         self._geometry = pin.GeometryModel()
         self._names: list[str] = []
         collision = description.collision
         for body in collision.bodies:
             self._add(body, description)
-        if collision.bodies and payload.mass > 0.0:
-            self._add_payload(payload, collision.payload_radius)
+        if collision.bodies:
+            self._add_payload(collision.payload_radius)
         self._add_pairs(description)
         self._fine, self._coarse = (self._request(margin) for margin in (CLEARANCE, FAR))
         self._distances = self._geometry.createData()
+        self._pairs = list(self._geometry.collisionPairs)
+        if self._names:
+            self._with_payload = np.array(
+                [self._payload in (pair.first, pair.second) for pair in self._pairs]
+            )
+            self.carry(payload)
 
     def meeting(self, q: Floats) -> Meeting | None:
         """The nearest pair at a posture, where it is nearer than the clearance.
@@ -105,9 +111,11 @@ class CollisionModel:
 
     def _nearest(self, q: Floats) -> Meeting:
         pin.computeDistances(self._model, self._data, self._geometry, self._distances, q)
-        distances = [result.min_distance for result in self._distances.distanceResults]
+        distances = np.array([result.min_distance for result in self._distances.distanceResults])
+        if not self._loaded:
+            distances[self._with_payload] = np.inf
         number = int(np.argmin(distances))
-        pair = self._geometry.collisionPairs[number]
+        pair = self._pairs[number]
         return Meeting(self._names[pair.first], self._names[pair.second], float(distances[number]))
 
     def _add(self, body: Body, description: RobotDescription) -> None:
@@ -118,22 +126,34 @@ class CollisionModel:
             frame = link_frame(description, body.link)
             self._add_capsule(body.name, body.link + 1, frame, start, end, body.radius)
 
-    def _add_payload(self, payload: Payload, radius: float) -> None:
+    def _add_payload(self, radius: float) -> None:
         flange = self._model.frames[self._model.getFrameId(FLANGE)]
+        self._flange, self._radius, self._payload = flange.placement, radius, len(self._names)
+        nowhere = np.zeros(3)
+        self._add_capsule(PAYLOAD, flange.parentJoint, flange.placement, nowhere, nowhere, radius)
+
+    def carry(self, payload: Payload) -> None:
+        """Change the payload, in place: building a model takes a good part of a tick.
+
+        Args:
+            payload: What the controller believes that the arm carries.
+        """
+        if not self._names:
+            return
         centre = np.array(payload.com)
         distance = float(np.linalg.norm(centre))
-        inset = centre * min(radius / distance, 1.0) if distance > 0.0 else centre
-        self._add_capsule(PAYLOAD, flange.parentJoint, flange.placement, inset, 2.0 * centre - inset, radius)
+        inset = centre * min(self._radius / distance, 1.0) if distance > 0.0 else centre
+        body = self._geometry.geometryObjects[self._payload]
+        body.placement, length = _placed(self._flange, inset, 2.0 * centre - inset)
+        body.geometry.halfLength = length / 2.0
+        self._loaded = payload.mass > 0.0
+        body.disableCollision = not self._loaded
 
     def _add_capsule(
         self, name: str, joint: int, frame: pin.SE3, start: Floats, end: Floats, radius: float
     ) -> None:
-        axis = end - start
-        length = float(np.linalg.norm(axis))
-        up = np.array([0.0, 0.0, 1.0])
-        rotation = pin.Quaternion.FromTwoVectors(up, axis / length).matrix() if length > 0.0 else np.eye(3)
-        placement = frame * pin.SE3(rotation, (start + end) / 2.0)
-        shape = coal.Capsule(radius, max(length, 1e-6))
+        placement, length = _placed(frame, start, end)
+        shape = coal.Capsule(radius, length)
         self._geometry.addGeometryObject(pin.GeometryObject(name, joint, placement, shape))
         self._names.append(name)
 
@@ -152,3 +172,12 @@ class CollisionModel:
         self._names.append(FLOOR)
         for number in bodies[2:]:  # the base stands on the floor, and the shoulder cannot reach it
             self._geometry.addCollisionPair(pin.CollisionPair(number, len(self._names) - 1))
+
+
+def _placed(frame: pin.SE3, start: Floats, end: Floats) -> tuple[pin.SE3, float]:
+    """Placement of a capsule and the length of its axis [m], from the ends of the axis in a frame."""
+    axis = end - start
+    length = float(np.linalg.norm(axis))
+    up = np.array([0.0, 0.0, 1.0])
+    rotation = pin.Quaternion.FromTwoVectors(up, axis / length).matrix() if length > 0.0 else np.eye(3)
+    return frame * pin.SE3(rotation, (start + end) / 2.0), max(length, 1e-6)

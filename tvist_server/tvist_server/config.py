@@ -1,19 +1,29 @@
 """How a robot is served: from the command line, or from a TOML file."""
 
+import dataclasses
+import tempfile
 import tomllib
 from pathlib import Path
 from typing import Annotated
 
 import msgspec
 from msgspec import Meta, Struct
+from msgspec.structs import replace
 
 from tvist_plant.description import RobotDescription, load
 from tvist_protocol.info import Clock
 from tvist_protocol.values import RobotName, Seed
 from tvist_server import calibrations
+from tvist_server.fleet import members
+from tvist_server.initial import read_state
 from tvist_server.setup import Setup, paper_payload
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+_INSTEAD = {
+    "name": "several robots are named after their files, leave name out",
+    "robot": "put it into the list of robots",
+}
+"""What to do about a key that `robots` excludes."""
 
 
 class ConfigError(ValueError):
@@ -27,6 +37,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Name on the network."""
     robot: str = "ur5e"
     """Robot that comes with the package, or path of a robot file."""
+    robots: str | None = None
+    """Several of them, ROBOT[*COUNT] with commas, named after their files; instead of `name` and `robot`."""
     listen: tuple[str, ...] = (DEFAULT_ENDPOINT,)
     """Zenoh endpoints to listen on."""
     security: str | None = None
@@ -43,17 +55,45 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Who lets time pass."""
     speed: Annotated[float, Meta(gt=0, le=100)] = 1.0
     """Of the robot's time against the clock's; real time only [-]."""
+    realtime_priority: bool = False
+    """Ask the system to put the ticks before all else; real time only."""
     start: str | tuple[float, ...] = "Q1"
     """A pose of the robot file, or joint angles [rad]."""
+    state: str | None = None
+    """TOML or JSON file with the state to start in: any of q, payload (carried), mode, shaper, seed."""
     seed: Seed = 0
-    """Of sensor noise and gear errors."""
+    """Of sensor noise and gear errors; of several robots each has one of its own, counted on from here."""
     record: str | None = None
-    """MCAP file to record into."""
+    """MCAP file to record into; of several robots each has its own, with its name at the end."""
+    dump: str = tempfile.gettempdir()
+    """Folder for the last second before the simulated arm failed."""
     truth: bool = False
     """Tell what no robot can know, too."""
 
+    def setups(self) -> list[Setup]:
+        """The start of every robot's controller.
+
+        Raises:
+            ConfigError: As `setup`.
+        """
+        if self.robots is None:
+            return [self.setup()]
+        try:
+            found = members(self.robots)
+        except ValueError as error:
+            raise ConfigError(str(error)) from error
+        # By its own start each is what it would be alone, apart from the noise.
+        starts: dict[str, Setup] = {}
+        for member in found:
+            if member.robot not in starts:
+                starts[member.robot] = replace(self, robot=member.robot).setup()
+        return [
+            dataclasses.replace(starts[member.robot], name=member.name, seed=self.seed + index)
+            for index, member in enumerate(found)
+        ]
+
     def setup(self) -> Setup:
-        """The controller's start.
+        """The controller's start, of one robot.
 
         Raises:
             ConfigError: A value does not fit the others, or names something that is not there.
@@ -73,6 +113,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 clock=self.clock,
                 truth=self.truth,
             )
+            if self.state is not None:
+                setup = read_state(self.state).on(setup)
             setup.check()
         except ValueError as error:
             raise ConfigError(str(error)) from error
@@ -100,8 +142,12 @@ def from_mapping(content: object, source: str) -> ServeConfig:
     """Check values by name.
 
     Raises:
-        ConfigError: A key is unknown or a value out of range.
+        ConfigError: A key is unknown, a value out of range, or one key excludes another.
     """
+    if isinstance(content, dict) and content.get("robots") is not None:
+        for key in ("name", "robot"):
+            if content.get(key) is not None:
+                raise ConfigError(f"{source}: robots and {key} exclude each other: {_INSTEAD[key]}")
     try:
         return msgspec.convert(content, ServeConfig)
     except msgspec.ValidationError as error:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tvist_plant.plant import PERIOD
+from tvist_plant.plant import PERIOD, PlantError
 from tvist_protocol import commands as c
 from tvist_protocol.calibration import Calibration
 from tvist_protocol.replies import Accepted, Code, Done, Refused, Reply
@@ -19,13 +19,14 @@ from tvist_server.calibrations import fits
 from tvist_server.choices import choose_estimator, choose_filter
 from tvist_server.collision import CollisionModel
 from tvist_server.cycle import ControlCycle
+from tvist_server.faults import Faults
 from tvist_server.motion import MotionControl
 from tvist_server.refusal import RefusalError, check_body, check_joints, check_motion
 from tvist_server.reporting import Reporter
 from tvist_server.session import NoControlError, Session
 from tvist_server.setup import Setup, body
 from tvist_server.trajectory import Limits
-from tvist_shaping.filter import TvistFilter
+from tvist_shaping.base import Filter
 
 
 @dataclass
@@ -67,14 +68,15 @@ class Controller:
             tvist,
             q=np.array(setup.q, dtype=float),
             declared=body(setup.payload),
-            carried=body(setup.payload),
+            carried=body(setup.carried or setup.payload),
             seed=setup.seed,
         )
         self._reporter = Reporter(setup.description)
         self._events: list[Event] = []
         self._seed = setup.seed
         collisions = CollisionModel(setup.description, body(setup.payload))
-        self.motion = MotionControl(self.cycle, collisions, self._emit)
+        self.motion = MotionControl(self.cycle, collisions, self._emit, setup.mode)
+        self._faults = Faults(self.motion)
         self._warn_of_payload()
 
     @property
@@ -133,13 +135,19 @@ class Controller:
     def tick(self) -> tuple[State, list[Event]]:
         """One control period."""
         self._watch_time()
-        sample = self.motion.step()
+        try:
+            sample = self.motion.step()
+        except PlantError as error:
+            self._faults.clear()
+            sample = self.motion.recover(error, self._seed)
         self.tick_number += 1
         events, self._events = self._events, []
         state = self._reporter.state(
             self.tick_number,
             sample,
             self.cycle.tvist,
+            robot_mode=self.motion.activity.robot_mode,
+            safety_mode=self.motion.safety_mode,
             runtime=self.motion.runtime,
             speed=self.motion.speed,
             setpoint_sequence=self.motion.sequence,
@@ -163,7 +171,8 @@ class Controller:
         self._events.append(Event(tick=self.tick_number + 1, kind=kind, id=id, code=code, why=why))
 
     def _watch_time(self) -> None:
-        """End what nobody keeps up."""
+        """End what is over, and what nobody keeps up."""
+        self._faults.end(self.tick_number + 1)
         if self.session.expired(self.now):
             self._lose_lease("the lease ran out: no command renewed it")
         if self.setup.clock == "realtime":
@@ -172,7 +181,7 @@ class Controller:
     def _lose_lease(self, why: str) -> None:
         self.session.release()
         self._emit("lease_lost", why=why)
-        self.motion.stop(None, why)
+        self.motion.interrupt(why)
 
     # ------------------------------------------------------------------ commands
 
@@ -201,7 +210,7 @@ class Controller:
         """End the lease, and motion with it."""
         self._authorize(command.token)
         self.session.release()
-        self.motion.stop(None, "control was released")
+        self.motion.interrupt("control was released")
         return Done()
 
     def move_j(self, command: c.MoveJ) -> Reply:
@@ -251,6 +260,24 @@ class Controller:
         self.motion.set_speed(command.fraction)
         return Done()
 
+    def power_on(self, command: c.PowerOn) -> Reply:
+        """Power the arm and release its brakes."""
+        self._authorize(command.token)
+        self.motion.power_on()
+        return Done()
+
+    def power_off(self, command: c.PowerOff) -> Reply:
+        """Stop, then take the arm's power."""
+        self._authorize(command.token)
+        self.motion.power_off()
+        return Done()
+
+    def unlock_protective_stop(self, command: c.UnlockProtectiveStop) -> Reply:
+        """Leave a protective stop."""
+        self._authorize(command.token)
+        self.motion.unlock()
+        return Done()
+
     def set_shaper(self, command: c.SetShaper) -> Reply:
         """Choose the shaper."""
         self._authorize(command.token)
@@ -258,7 +285,6 @@ class Controller:
             raise RefusalError("out_of_range", "modes", f"modes is {command.modes}; the estimators give 1", 1)
         estimator, joints = self.cycle.tvist.estimator, self.setup.description.joints
         tvist = choose_filter(command.name, estimator, joints, where="name")
-        self.motion.check_rest()
         self._use(tvist)
         return Done()
 
@@ -267,9 +293,8 @@ class Controller:
         self._authorize(command.token)
         estimator, calibration = choose_estimator(command, self.setup)
         where = "f_d" if calibration is None else "calibration"
-        shaper, joints = self.cycle.tvist.shaper.name, self.setup.description.joints
+        shaper, joints = self.cycle.tvist.name, self.setup.description.joints
         tvist = choose_filter(shaper, estimator, joints, where=where)
-        self.motion.check_rest()
         self.calibration, self.estimator_name = calibration, command.name
         self._use(tvist)
         self._warn_of_payload()
@@ -280,10 +305,9 @@ class Controller:
         self._authorize(command.token)
         payload = Payload(mass=command.mass, com=command.com, inertia=command.inertia)
         check_body(payload, rated=self.setup.description.limits.payload)
-        self.motion.check_rest()
         self.declared = payload
         self.cycle.declare(body(payload))
-        self.motion.collisions = CollisionModel(self.setup.description, body(payload))
+        self.motion.collisions.carry(body(payload))
         self._warn_of_payload()
         return Done()
 
@@ -295,13 +319,11 @@ class Controller:
             check_joints(command.q, description)
         if command.payload is not None:
             check_body(command.payload, "payload")
-        if command.mode not in {None, "RUNNING"}:
-            why = f"mode is {command.mode!r}; this version knows RUNNING only"
-            raise RefusalError("out_of_range", "mode", why)
         tvist = None
         if command.shaper is not None:
             tvist = choose_filter(command.shaper, self.cycle.tvist.estimator, description.joints)
         self.motion.abandon("simulation.reset")
+        self._faults.clear()
         q = self.cycle.position if command.q is None else np.array(command.q, dtype=float)
         carried = None if command.payload is None else body(command.payload)
         if tvist is not None:
@@ -309,6 +331,7 @@ class Controller:
         if command.seed is not None:
             self._seed = command.seed
         self.cycle.reset(q, carried=carried, seed=self._seed)
+        self.motion.put(command.mode)
         self._reporter.forget_modes()
         return Done(tick=self.tick_number)
 
@@ -328,18 +351,18 @@ class Controller:
             check_joints(setpoint.q, self.setup.description, f"setpoints[{number}].q")
         return Done(tick=self.tick_number + command.ticks)
 
-    def not_yet(self, command: c.Command) -> Reply:
-        """Refuse a command of the protocol that this version does not carry out."""
-        name = type(command).__struct_config__.tag
-        raise RefusalError("unknown_type", "type", f"{name} is not carried out by this version of the server")
+    def simulation_inject(self, command: c.SimulationInject) -> Reply:
+        """Cause a fault."""
+        self._authorize(command.token)
+        self._faults.inject(command, self.tick_number + 1)
+        return Done()
 
     def _authorize(self, token: str) -> None:
         self.session.renew(token, self.now)
 
-    def _use(self, tvist: TvistFilter) -> None:
-        tvist.reset(self.cycle.reference)
-        self.cycle.tvist = tvist
-        self._emit("shaper_changed", why=f"{tvist.shaper.name} with estimator {self.estimator_name}")
+    def _use(self, tvist: Filter) -> None:
+        self.cycle.use(tvist)
+        self._emit("shaper_changed", why=f"{tvist.name} with estimator {self.estimator_name}")
 
     def _warn_of_payload(self) -> None:
         if self.calibration is not None and not fits(self.calibration, self.declared):
@@ -369,8 +392,8 @@ _HANDLERS: dict[type, Callable[[Controller, Any], Reply]] = {
     c.Pause: Controller.pause,
     c.Resume: Controller.resume,
     c.SetSpeed: Controller.set_speed,
-    c.PowerOn: Controller.not_yet,
-    c.PowerOff: Controller.not_yet,
-    c.UnlockProtectiveStop: Controller.not_yet,
-    c.SimulationInject: Controller.not_yet,
+    c.PowerOn: Controller.power_on,
+    c.PowerOff: Controller.power_off,
+    c.UnlockProtectiveStop: Controller.unlock_protective_stop,
+    c.SimulationInject: Controller.simulation_inject,
 }

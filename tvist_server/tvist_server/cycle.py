@@ -1,19 +1,20 @@
 """One control period: the paper's Figure 6, left to right."""
 
 import math
-from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
+from msgspec import Struct
 
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import PERIOD, Measurement, Plant
 from tvist_server.control.differentiator import Differentiator, Floats, Target
 from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.control.joint_controllers import JointControllers
-from tvist_server.safety import StopPlan, plan_stop
+from tvist_server.safety import StopPlan, TorqueRoom, plan_stop
 from tvist_server.trajectory import DoubleS, Limits, Rest, SetpointStream, Stop, Trajectory
-from tvist_shaping.filter import TvistFilter
+from tvist_shaping.base import Filter
+from tvist_shaping.fade import Fade
 
 T = TypeVar("T", bound=Trajectory)
 
@@ -21,8 +22,7 @@ STILL = 1e-7
 """A reference that moves less than this between two ticks is at rest [rad]."""
 
 
-@dataclass(frozen=True)
-class Sample:
+class Sample(Struct, frozen=True, eq=False, gc=False):
     """What went along the line in one tick."""
 
     reference: Floats
@@ -50,7 +50,7 @@ class ControlCycle:
     def __init__(
         self,
         description: RobotDescription,
-        tvist: TvistFilter,
+        tvist: Filter,
         *,
         q: Floats,
         declared: Payload,
@@ -59,6 +59,14 @@ class ControlCycle:
     ) -> None:
         self.description = description
         self.tvist = tvist
+        """The filter chosen last: in force, or about to be."""
+        self._fade: Fade | None = None
+        self._limits = Limits(
+            min(description.limits.velocity),
+            min(description.limits.acceleration),
+            min(description.limits.jerk),
+        )
+        """Of the present motion."""
         self.arm = Plant(description, carried)
         self.inverse_dynamics = InverseDynamics(description, declared)
         self._joint_controllers = JointControllers(description, PERIOD)
@@ -72,24 +80,60 @@ class ControlCycle:
         """Whether a stop bypasses the filter."""
         self._deceleration = math.inf
         self.reset(q, carried=carried, seed=seed)
-        # The first step loads compiled code, which lasts many ticks: it is made here, and taken back.
-        self.step()
+        # The first steps load compiled code, which lasts many ticks: they are made here, and taken back.
+        self._fade = self._fade_to(tvist.with_estimator(tvist.estimator), tvist)
+        for _ in range(3):
+            self.step()
         self.reset(q, seed=seed)
 
     def step(self) -> Sample:
         """One tick."""
         reference = self.reference = self.trajectory.next()  # q [rad]
-        shaped = reference if self.stopping else self.tvist.filter(reference)  # q* [rad]
+        shaped = reference if self.stopping else self._shape(reference)  # q* [rad]
         target = self._differentiator.update(shaped)  # q*, q̇*, q̈* of the tick before
+        self.inverse_dynamics.advance()
         torque = self.inverse_dynamics.torque(target.q, target.qd, target.qdd)  # τ* [N m]
         gravity = self.inverse_dynamics.gravity(target.q)
         measured = self.arm.step(self._joint_controllers.command(target, torque, gravity))
         self._settle(reference, target)
         return Sample(reference, target, torque, measured)
 
+    def _shape(self, reference: Floats) -> Floats:
+        """Shaped reference, on the way from one filter to another where there is one."""
+        fade = self._fade
+        if fade is None:
+            return self.tvist.filter(reference)
+        shaped = fade.filter(reference)
+        if fade.new is not self.tvist:  # it waits for its turn
+            self.tvist.filter(reference)
+        if fade.finished:
+            self._fade = None if fade.new is self.tvist else self._fade_to(fade.new, self.tvist)
+        return shaped
+
+    def _fade_to(self, old: Filter, new: Filter) -> Fade:
+        limits = self._limits
+        return Fade(old, new, velocity=limits.velocity, acceleration=limits.acceleration, jerk=limits.jerk)
+
+    def use(self, tvist: Filter) -> None:
+        """Change the filter: at once where the arm is at rest, else within the limits of the motion.
+
+        While one change is under way the next waits for its turn; of several that wait the newest does.
+
+        Args:
+            tvist: The filter to come; its joints and period are the present one's.
+        """
+        fade = self._fade
+        if self.at_rest or self.stopping:
+            tvist.reset(self.reference)
+        elif fade is None or fade.share == 0.0:
+            self._fade = self._fade_to(self.tvist if fade is None else fade.old, tvist)
+        else:
+            tvist.take_over(self.tvist)
+        self.tvist = tvist
+
     def _settle(self, reference: Floats, target: Target) -> None:
         """Notice the end of a motion: its trajectory is over and the shaped reference rests on it."""
-        if self.at_rest or not self.trajectory.finished:
+        if self.at_rest or self._fade is not None or not self.trajectory.finished:
             return
         step = PERIOD * (
             target.qd - 0.5 * PERIOD * target.qdd
@@ -120,11 +164,17 @@ class ControlCycle:
 
     def stream(self, stream_period: float, limits: Limits) -> SetpointStream:
         """Start to follow set-points; the arm must be at rest."""
-        return self.start(SetpointStream(self.reference, stream_period, limits, PERIOD))
+        reach = np.array(self.description.limits.position)
+        torque = TorqueRoom(self.description, self.inverse_dynamics)
+        return self.start(
+            SetpointStream(self.reference, stream_period, limits, PERIOD, reach=reach, torque=torque)
+        )
 
     def start(self, trajectory: T) -> T:
         """Follow a trajectory that begins where the reference is."""
         self.trajectory = trajectory
+        if isinstance(trajectory, DoubleS | SetpointStream):
+            self._limits = trajectory.limits
         self.at_rest = False
         return trajectory
 
@@ -156,13 +206,14 @@ class ControlCycle:
             return None
         plan = self.plan_stop(deceleration)
         self.start(plan.trajectory)
-        self.stopping, self._deceleration = True, wanted
+        self.stopping, self._deceleration, self._fade = True, wanted, None
         return plan
 
     def reset(self, q: Floats, *, carried: Payload | None = None, seed: int = 0) -> None:
         """Put the arm at rest somewhere, in static equilibrium; everything on the line starts anew."""
         self.trajectory, self.reference = Rest(q), q
-        self.at_rest, self.stopping = True, False
+        self.at_rest, self.stopping, self._fade = True, False, None
+        self.inverse_dynamics.settle()
         self.tvist.reset(q)
         self._differentiator.reset(q)
         self._joint_controllers.reset()
@@ -172,5 +223,5 @@ class ControlCycle:
         self.arm.reset(command, payload=carried, seed=seed)
 
     def declare(self, payload: Payload) -> None:
-        """Change the payload that inverse dynamics counts on."""
-        self.inverse_dynamics = InverseDynamics(self.description, payload)
+        """Change the payload that inverse dynamics counts on; torque goes there without a step."""
+        self.inverse_dynamics.declare(payload)

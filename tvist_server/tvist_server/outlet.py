@@ -1,4 +1,4 @@
-"""The way out: one thread that hands states, events and replies to gateways and recorder, in their order.
+"""The way out of one robot: states, events and replies wait here, in their order, for the thread that hands them on.
 
 The controller's thread only puts into a queue. Where the network is slow the queue grows to its bound; then states
 are dropped and counted in real time, and the controller waits in lockstep, where every state counts.
@@ -6,23 +6,29 @@ are dropped and counted in real time, and the controller waits in lockstep, wher
 
 import logging
 import threading
-from collections.abc import Callable, Sequence
-from queue import SimpleQueue
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from tvist_protocol.codec import encode
 from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, State, Telemetry, Truth
-from tvist_server.gateways.base import Gateway, Topic
+from tvist_server.gateways.base import Gateway, Reply, Topic
 
 log = logging.getLogger(__name__)
 
 MAX_WAITING = 2048
 """Messages that may wait, four seconds of states."""
+PAUSE = 0.02
+"""How long the controller waits at most, where it does, before it looks for room again [s]."""
 
-
-CLOSE_WAIT = 0.2
-"""How long the last messages may take at close [s]; a client that has stopped reading holds them up for 5 s."""
+Message = State | Event | Truth | Telemetry
+TOPICS: Mapping[type[Message], Topic] = {
+    State: "state",
+    Event: "event",
+    Truth: "truth",
+    Telemetry: "telemetry",
+}
 
 
 class Recorder(Protocol):
@@ -42,7 +48,7 @@ class Recorder(Protocol):
 
 
 class Outlet:
-    """A `host.Sink` with a thread behind it.
+    """A `host.Sink` that others empty.
 
     Args:
         recorder: Records everything, where there is one.
@@ -53,47 +59,58 @@ class Outlet:
         self._recorder = recorder
         self._lossless = lossless
         self._gateways: Sequence[Gateway] = ()
-        self._queue: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
-        self._room = threading.Semaphore(MAX_WAITING)
+        self._wake: Callable[[], None] = _nobody
+        self._queue: deque[Message | tuple[Reply, bytes]] = deque()
+        self._room = threading.Event()
         self._last: State | None = None
         self.dropped = 0
         """Messages of a tick that found no room."""
-        self._thread = threading.Thread(target=self._run, name="tvist-outlet", daemon=True)
 
-    def start(self, gateways: Sequence[Gateway]) -> None:
-        """Begin to hand on."""
+    def open(self, gateways: Sequence[Gateway], wake: Callable[[], None] | None = None) -> None:
+        """Say where messages go to.
+
+        Args:
+            gateways: They get everything.
+            wake: Called with every message, where nobody looks by himself.
+        """
         self._gateways = gateways
-        self._thread.start()
+        self._wake = wake or _nobody
 
     def hurry(self) -> None:
         """Wait for nobody from now on: the robot is about to end, and a client may have stopped reading."""
         self._lossless = False
-        self._room.release()  # whoever waits for room
+        self._room.set()  # whoever waits for room
 
-    def close(self) -> None:
-        """Hand on what is waiting, as far as that is quick, and end."""
-        self._queue.put(None)
-        if self._thread.is_alive():
-            self._thread.join(CLOSE_WAIT)
+    def hand_on(self) -> None:
+        """Hand on what waits now; what comes meanwhile is the next round's, lest other robots wait for ever."""
+        queue = self._queue
+        for _ in range(len(queue)):
+            item = queue.popleft()
+            if self._lossless:
+                self._room.set()
+            try:
+                self._publish(item)
+            except Exception:
+                log.exception("could not hand on a message")
 
     def state(self, state: State) -> None:
         """Queue a state; the recorder's own queue takes it at once."""
         self._last = state
         if self._recorder is not None:
             self._recorder.state(state)
-        self._offer("state", state)
+        self._offer(state)
 
     def event(self, event: Event) -> None:
         """Queue an event."""
         if self._recorder is not None:
             self._recorder.event(event)
-        self._queue.put(lambda: self._publish("event", event))
+        self._put(event)
 
     def truth(self, truth: Truth) -> None:
         """Queue what no robot can know."""
         if self._recorder is not None:
             self._recorder.truth(truth)
-        self._offer("truth", truth)
+        self._offer(truth)
 
     def journal(self, entry: Entry) -> None:
         """Record what reached the controller."""
@@ -102,38 +119,40 @@ class Outlet:
 
     def telemetry(self, telemetry: Telemetry) -> None:
         """Queue the server's own figures."""
-        self._queue.put(lambda: self._publish("telemetry", telemetry))
+        self._put(telemetry)
 
-    def reply(self, reply: Callable[[bytes], None], data: bytes) -> None:
+    def reply(self, reply: Reply, data: bytes) -> None:
         """Queue a reply, behind the states that came before it."""
-        self._queue.put(lambda: reply(data))
+        self._put((reply, data))
 
     def repeat(self) -> None:
         """Tell the last state again, for those who come late."""
         if self._last is not None:
-            state = self._last
-            self._queue.put(lambda: self._publish("state", state))
+            self._put(self._last)
 
-    def _offer(self, topic: Topic, message: State | Truth) -> None:
+    def _offer(self, message: State | Truth) -> None:
         """Queue a message of every tick, where there is room."""
-        if not self._room.acquire(blocking=self._lossless):
+        while self._lossless and len(self._queue) >= MAX_WAITING:
+            self._room.clear()
+            self._room.wait(PAUSE)
+        if len(self._queue) < MAX_WAITING:
+            self._put(message)
+        else:
             self.dropped += 1
+
+    def _put(self, item: Message | tuple[Reply, bytes]) -> None:
+        self._queue.append(item)
+        self._wake()
+
+    def _publish(self, item: Message | tuple[Reply, bytes]) -> None:
+        if isinstance(item, tuple):
+            reply, data = item
+            reply(data)
             return
-
-        def hand_on() -> None:
-            self._room.release()
-            self._publish(topic, message)
-
-        self._queue.put(hand_on)
-
-    def _publish(self, topic: Topic, message: State | Event | Truth | Telemetry) -> None:
-        data = encode(message)
+        topic, data = TOPICS[type(item)], encode(item)
         for gateway in self._gateways:
             gateway.publish(topic, data)
 
-    def _run(self) -> None:
-        while (job := self._queue.get()) is not None:
-            try:
-                job()
-            except Exception:
-                log.exception("could not hand on a message")
+
+def _nobody() -> None:
+    pass

@@ -5,10 +5,19 @@ from collections.abc import Sequence
 
 from tvist_plant.description import RobotDescription, is_real_body
 from tvist_protocol.replies import Code, Refused
+from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload
 
 SLOWEST = {"velocity": 1e-3, "acceleration": 1e-2, "jerk": 0.1}
 """Limits of a motion below which it would take for ever [rad/s, rad/s^2, rad/s^3]."""
+
+_NOTHING_TO = {
+    "pause": "no motion is running: there is nothing to pause",
+    "resume": "no motion is paused: there is nothing to resume",
+    "servo_stop": "no stream is running: send servo_start first",
+    "unlock_protective_stop": "there is no protective stop to unlock",
+    "power_on": "the arm has its power",
+}
 
 
 class RefusalError(Exception):
@@ -17,6 +26,27 @@ class RefusalError(Exception):
     def __init__(self, code: Code, where: str, why: str, limit: float | None = None) -> None:
         super().__init__(why)
         self.reply = Refused(code=code, where=where, why=why, limit=limit)
+
+
+def out_of_turn(command: str, activity: Activity) -> RefusalError:
+    """The refusal of a command that leads nowhere from what the robot is doing.
+
+    Args:
+        command: Its `type`.
+        activity: What the robot is doing.
+    """
+    code: Code = "wrong_mode"
+    if activity is Activity.PROTECTIVE_STOPPING:
+        why = "safety_mode is PROTECTIVE_STOP: send unlock_protective_stop once the arm rests"
+    elif activity is Activity.PROTECTIVE_STOP:
+        why = "safety_mode is PROTECTIVE_STOP: send unlock_protective_stop first"
+    elif command in _NOTHING_TO:
+        why = _NOTHING_TO[command]
+    elif activity in {Activity.POWER_OFF, Activity.IDLE}:
+        why = f"robot_mode is {activity}: send power_on first"
+    else:
+        code, why = "busy", "the arm is moving: wait for motion_done or send stop"
+    return RefusalError(code, "", why)
 
 
 def check_joints(q: Sequence[float], description: RobotDescription, where: str = "q") -> None:

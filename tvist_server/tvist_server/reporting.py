@@ -6,7 +6,7 @@ from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.stream import State, Truth
 from tvist_server.control.kinematics import ForwardKinematics, rotation_vector
 from tvist_server.cycle import Sample
-from tvist_shaping.filter import TvistFilter
+from tvist_shaping.base import Filter
 
 TRUE_MODES_EVERY = 50
 """Ticks between two computations of the arm's true modes: an eigenvalue problem takes a good part of one."""
@@ -28,8 +28,10 @@ class Reporter:
         self,
         tick: int,
         sample: Sample,
-        tvist: TvistFilter,
+        tvist: Filter,
         *,
+        robot_mode: RobotMode,
+        safety_mode: SafetyMode,
         runtime: RuntimeState,
         speed: float,
         setpoint_sequence: int | None,
@@ -41,8 +43,8 @@ class Reporter:
         return State(
             tick=tick,
             timestamp=tick * PERIOD,
-            robot_mode=RobotMode.RUNNING.value,
-            safety_mode=SafetyMode.NORMAL.value,
+            robot_mode=robot_mode.value,
+            safety_mode=safety_mode.value,
             runtime_state=runtime.value,
             setpoint_sequence=setpoint_sequence,
             reference_q=sample.reference.tolist(),

@@ -6,11 +6,11 @@ from typing import Any
 import msgspec
 
 from tvist_plant.description import Payload as Body
-from tvist_plant.description import RobotDescription
+from tvist_plant.description import RobotDescription, is_real_body
 from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Clock
-from tvist_protocol.values import Payload
+from tvist_protocol.values import Payload, ResetMode
 from tvist_server.calibrations import estimator_of
 from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.base import Estimator
@@ -26,7 +26,7 @@ class Setup:
     q: tuple[float, ...]
     """Where the arm rests [rad]."""
     payload: Payload
-    """Declared, and carried until a client says otherwise."""
+    """Declared."""
     calibration: Calibration | None
     """Of the polynomial estimator; None: it is `fixed` at 10 Hz and 0.2, for a robot to be identified."""
     name: str = "ur5e"
@@ -37,6 +37,10 @@ class Setup:
     """Of sensor noise and gear errors."""
     clock: Clock = "realtime"
     """Who lets time pass. Only in real time do leases and streams time out."""
+    carried: Payload | None = None
+    """Carried until a client says otherwise; None: what is declared."""
+    mode: ResetMode = "RUNNING"
+    """Robot mode to start in."""
     truth: bool = False
     """Whether to tell what no robot can know."""
 
@@ -53,6 +57,9 @@ class Setup:
         for number, (angle, limit) in enumerate(zip(self.q, self.description.limits.position, strict=True)):
             if not abs(angle) <= limit:
                 raise ValueError(f"start q[{number}] is {angle}: must be within ±{limit} rad")
+        if self.carried is not None and not is_real_body(self.carried.inertia):
+            inertia = list(self.carried.inertia)
+            raise ValueError(f"payload.inertia is {inertia}: no body has these moments of inertia")
         shaper(self.shaper)
 
     def estimator(self) -> Estimator:
@@ -65,6 +72,8 @@ class Setup:
             "description": msgspec.to_builtins(self.description),
             "q": list(self.q),
             "payload": msgspec.to_builtins(self.payload),
+            "carried": msgspec.to_builtins(self.carried),
+            "mode": self.mode,
             "calibration": msgspec.to_builtins(self.calibration),
             "name": self.name,
             "shaper": self.shaper,
@@ -87,6 +96,8 @@ class Setup:
                     description=msgspec.convert(content["description"], RobotDescription),
                     q=tuple(map(float, content["q"])),
                     payload=msgspec.convert(content["payload"], Payload),
+                    carried=msgspec.convert(content["carried"], Payload | None),
+                    mode=msgspec.convert(content["mode"], ResetMode),
                     calibration=None if calibration is None else calibration_of(calibration),
                 ),
                 **{key: content[key] for key in ("name", "shaper", "seed", "clock", "truth")},

@@ -5,6 +5,7 @@ and no thread of Python's has to be joined at the end. They make bytes of payloa
 """
 
 import asyncio
+import re
 from collections.abc import Callable, Mapping
 from functools import partial
 
@@ -218,7 +219,7 @@ class ZenohTransport(Transport):
             async with asyncio.timeout(FIND_S):
                 await self._alive.wait()
         except TimeoutError:
-            robots = await self._robots()
+            robots = await _robots(self._session)
             there = f"those there are {', '.join(robots)}" if robots else "no robot is there"
             check = "check name and endpoint" + self._if_secured(
                 "that the robot knows this certificate's name"
@@ -226,22 +227,43 @@ class ZenohTransport(Transport):
             why = f"there is no robot {self._robot!r} at {self._endpoint}; {there}: {check}"
             raise NotConnectedError(why) from None
 
-    async def _robots(self) -> list[str]:
-        """Names of the robots that can be reached."""
-        names: list[str] = []
-        ended = asyncio.Event()
 
-        def on_reply(reply: zenoh.Reply) -> None:
-            if reply.ok is not None:
-                names.append(str(reply.ok.key_expr).split("/")[1])
+async def robots_at(endpoint: str, security: Folder | None = None) -> list[str]:
+    """Names of the robots at an endpoint, sorted.
 
-        self._session.liveliness().get(
-            keys.ANY_ALIVE,
-            Callback(on_reply, partial(wake, self._loop, ended.set), indirect=False),
-            timeout=FIND_S,
-        )
-        await ended.wait()
-        return sorted(names)
+    Args:
+        endpoint: Where the server listens, `tcp/127.0.0.1:7447`.
+        security: Folder with this client's certificate, for `tls/<host>:<port>`.
+
+    Raises:
+        NotConnectedError: Nobody listens there.
+    """
+    session = await asyncio.to_thread(open_session, endpoint, security)
+    try:
+        return await _robots(session)
+    finally:
+        await asyncio.to_thread(close_session, session)
+
+
+async def _robots(session: zenoh.Session) -> list[str]:
+    """Names of the robots that can be reached, sorted: ur5e-2 before ur5e-10."""
+    loop = asyncio.get_running_loop()
+    names: list[str] = []
+    ended = asyncio.Event()
+
+    def on_reply(reply: zenoh.Reply) -> None:
+        if reply.ok is not None:
+            names.append(str(reply.ok.key_expr).split("/")[1])
+
+    session.liveliness().get(
+        keys.ANY_ALIVE, Callback(on_reply, partial(wake, loop, ended.set), indirect=False), timeout=FIND_S
+    )
+    await ended.wait()
+    return sorted(names, key=_by_number)
+
+
+def _by_number(name: str) -> list[int | str]:
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
 
 
 def _settle(answer: asyncio.Future[bytes], outcome: bytes | ClientError) -> None:

@@ -1,15 +1,21 @@
 """`tvist bench`: how fast it is on this machine."""
 
-from tvist_cli.output import err, out, print_json, table
+import asyncio
+
+from tvist_cli.output import err, out, print_json, say, table
 
 
-def bench(*, seconds: float = 10.0, json: bool = False) -> None:
-    """Measure plant, filter, control cycle and the whole line, and the punctuality of a served robot.
+def bench(*, seconds: float = 10.0, soak: float | None = None, json: bool = False) -> None:
+    """Measure plant, filter, control cycle and whole line, a served robot, and how many of them a core takes.
 
     Args:
         seconds: How long to watch a served robot tick in real time, with one client and a recorder; 0: not at all.
+        soak: Instead, serve a robot for so many minutes under load, and see whether it stays as it is.
         json: Print one JSON object.
     """
+    if soak is not None:
+        _soak(soak, json)
+        return
     from tvist_lab.bench import bench as run
 
     result = run(seconds, tell=lambda what: err.print(f"measuring {what} ..."))
@@ -17,12 +23,19 @@ def bench(*, seconds: float = 10.0, json: bool = False) -> None:
         print_json(result)
         return
     flat = {key: value for key, value in result.items() if not isinstance(value, dict)}
-    table(
-        "in this process, one core",
-        ("what", "figure"),
-        [(key, f"{value:.4g}") for key, value in flat.items()],
-    )
+    table("on this machine", ("what", "figure"), [(key, f"{value:.4g}") for key, value in flat.items()])
     for key, values in result.items():
         if isinstance(values, dict):
             table(key, ("what", "figure"), [(name, f"{value:.4g}") for name, value in values.items()])
     out.print("Figures are of this machine under what else it was doing; ratios travel, microseconds do not.")
+
+
+def _soak(minutes: float, json: bool) -> None:
+    from tvist_lab.benchmark.soak import soak
+
+    say(f"a robot in real time for {minutes:g} minutes: a recorder, a stream of set-points, five observers")
+    result = asyncio.run(soak(minutes, tell=say))
+    if json:
+        print_json(result)
+        return
+    table("soak", ("what", "figure"), [(key, f"{value:.6g}") for key, value in result.items()])

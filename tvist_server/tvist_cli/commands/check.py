@@ -9,7 +9,7 @@ from tvist_cli.output import out, print_json
 def check(
     endpoint: str = "tcp/127.0.0.1:7447",
     *,
-    name: str = "ur5e",
+    name: str | None = None,
     security: Path | None = None,
     json: bool = False,
 ) -> None:
@@ -17,7 +17,7 @@ def check(
 
     Args:
         endpoint: Zenoh endpoint of the robot.
-        name: Its name.
+        name: Its name [ur5e, or where there is none the first of those that are there, all of which are named].
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         json: Print one JSON object.
     """

@@ -2,17 +2,24 @@
 
 import asyncio
 import os
+import signal
+import sys
 import time
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import say
+
+if TYPE_CHECKING:
+    from tvist_server.setup import Setup
 
 
 def serve(
     *,
     name: str | None = None,
     robot: str | None = None,
+    robots: str | None = None,
     listen: list[str] | None = None,
     security: str | None = None,
     insecure: bool = False,
@@ -21,17 +28,21 @@ def serve(
     calibration: str | None = None,
     clock: str | None = None,
     speed: float | None = None,
+    realtime_priority: bool = False,
     start: str | None = None,
+    state: str | None = None,
     seed: int | None = None,
     record: str | None = None,
+    dump: str | None = None,
     truth: bool = False,
     config: str | None = None,
 ) -> None:
-    """Run a robot on the network until Control+C.
+    """Run a robot on the network, or several, until Control+C.
 
     Args:
         name: Name on the network [ur5e].
         robot: Robot that comes with the package, or path of a robot file [ur5e].
+        robots: Several instead, ROBOT[*COUNT] with commas: ur5e*2,other.toml serves ur5e-1, ur5e-2 and other.
         listen: Zenoh endpoint, repeatable [tcp/127.0.0.1:7447].
         security: Folder made by tvist keys; the endpoint is then tls/ADDRESS:PORT, and who has no role sees nothing.
         insecure: Listen beyond this machine without: anybody there may move the robot.
@@ -40,17 +51,21 @@ def serve(
         calibration: Calibration that comes with the package, or path of one; none for a robot to be identified.
         clock: realtime, or lockstep: a client lets time pass [realtime].
         speed: Of the robot's time against the clock's [1].
+        realtime_priority: Put the ticks before all else on this machine (SCHED_FIFO), where the system permits it.
         start: Q1, Q2, Q3, or joint angles in rad with commas [Q1].
-        seed: Of sensor noise and gear errors [0].
-        record: MCAP file to record into.
+        state: TOML or JSON file with the state to start in: any of q, payload (what is carried), mode, shaper, seed.
+        seed: Of sensor noise and gear errors [0]; of several robots the first one's, the next has the next.
+        record: MCAP file to record into; of several robots each has its own, FILE-NAME.mcap.
+        dump: Folder for the last second before the simulated arm failed [the system's for temporary files].
         truth: Tell what no robot can know, on tvist/NAME/truth and in the recording.
         config: TOML file with any of these; the command line goes before it.
     """
     given: dict[str, Any] = {
-        "name": name, "robot": robot, "listen": listen, "security": security,
+        "name": name, "robot": robot, "robots": robots, "listen": listen, "security": security,
         "insecure": insecure or None, "payload": payload, "shaper": shaper,
-        "calibration": calibration, "clock": clock, "speed": speed, "start": start, "seed": seed,
-        "record": record, "truth": truth or None,
+        "calibration": calibration, "clock": clock, "speed": speed,
+        "realtime_priority": realtime_priority or None, "start": start, "state": state, "seed": seed,
+        "record": record, "dump": dump, "truth": truth or None,
     }  # fmt: skip
     began = time.monotonic()
     from tvist_plant.plant import is_compiled
@@ -67,26 +82,42 @@ def serve(
         content |= {key: value for key, value in given.items() if value is not None}
         checked = from_mapping(content, "configuration" if config is None else f"configuration {config}")
         with told(GatewayError, RecordingError):
+            # From here on there is something to clean up, which an exception sees to.
+            signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
             server = Server(checked)
 
     def ready() -> None:
         took = time.monotonic() - began
-        setup = server.controller.setup
         say(
-            f"{setup.name} ({setup.description.robot.model}, {setup.payload.mass:g} kg, shaper {setup.shaper}) "
-            f"listens on {', '.join(checked.listen)}, clock {setup.clock}; ready after {took:.1f} s. Control+C ends it."
+            f"{_introduction([robot.setup for robot in server.robots])} on {', '.join(checked.listen)}, "
+            f"clock {checked.clock}; ready after {took:.1f} s. Control+C ends it."
         )
 
+    whom = "this robot" if len(server.robots) == 1 else "these robots"
     for endpoint in checked.listen if checked.insecure else ():
-        say(f"anybody who reaches {endpoint} can move this robot")
+        say(f"anybody who reaches {endpoint} can move {whom}")
     asyncio.run(server.run(ready))
     if server.failure is not None:
         raise Failure(server.failure)
-    if server.recorder is not None:
-        if server.recorder.error is not None:
-            raise Failure(server.recorder.error)
-        note = f", {server.recorder.dropped} messages dropped" if server.recorder.dropped else ""
-        say(f"recorded into {checked.record}{note}")
+    recorders = [robot.recorder for robot in server.robots if robot.recorder is not None]
+    for recorder in recorders:
+        if recorder.error is None:
+            note = f", {recorder.dropped} messages dropped" if recorder.dropped else ""
+            say(f"recorded into {recorder.path}{note}")
+    errors = [recorder.error for recorder in recorders if recorder.error is not None]
+    if errors:
+        raise Failure("; ".join(errors))
     if not server.left:
         # Zenoh would wait for ten seconds, for a client that has stopped reading. All that is ours is closed.
         os._exit(0)
+
+
+def _introduction(setups: Sequence["Setup"]) -> str:
+    """Who listens: the robot with how it is set up, or the names of several."""
+    first = setups[0]
+    if len(setups) == 1:
+        model = first.description.robot.model
+        return f"{first.name} ({model}, {first.payload.mass:g} kg, shaper {first.shaper}) listens"
+    names = [setup.name for setup in setups]
+    listed = ", ".join(names) if len(names) < 8 else f"{', '.join(names[:3])} … {names[-1]}"
+    return f"a server of {len(names)} robots ({listed}; shaper {first.shaper}) listens"

@@ -1,15 +1,13 @@
 """Velocity and acceleration of the shaped reference."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
 
 Floats = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Target:
+class Target(Struct, frozen=True, eq=False, gc=False):
     """Shaped reference with its derivatives, all of one tick."""
 
     q: Floats

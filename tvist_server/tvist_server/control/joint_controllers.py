@@ -26,10 +26,10 @@ class JointControllers:
         self._period = period
         self._rotor = np.array(drives.rotor_inertia)
         self._compliance = np.array(drives.windup_feedforward) / np.array(drives.gear_stiffness)
-        friction, none = np.array(drives.coulomb_friction), np.zeros(description.joints)
-        linear = drives.linear_friction
-        self._viscous = friction / drives.friction_width if linear else none
-        self._coulomb = none if linear else drives.friction_feedforward * friction
+        friction = np.array(drives.coulomb_friction)
+        self._linear = drives.linear_friction
+        self._viscous = friction / drives.friction_width
+        self._coulomb = drives.friction_feedforward * friction
         self._width = drives.friction_feedforward_width
         self._windup = np.zeros(description.joints)
 
@@ -48,7 +48,9 @@ class JointControllers:
         windup = self._compliance * (torque - gravity)
         windup_speed = (windup - self._windup) / self._period
         self._windup = windup
-        friction = self._viscous * target.qd + self._coulomb * np.tanh(target.qd / self._width)
+        friction = (
+            self._viscous * target.qd if self._linear else self._coulomb * np.tanh(target.qd / self._width)
+        )
         return DriveCommand(
             q=target.q + windup,
             qd=target.qd + windup_speed,

@@ -36,6 +36,9 @@ class Desk(Protocol):
 class Gateway(ABC):
     """One way in and out."""
 
+    setpoints_refused: int
+    """Set-points that never reached the desk: put on a key with a wildcard, or too large."""
+
     @abstractmethod
     def publish(self, topic: Topic, payload: bytes) -> None:
         """Put an encoded message. Called from one thread; raises nothing for the network's sake."""

@@ -18,8 +18,9 @@ class Answers:
     """Sends replies to queries.
 
     A reply has the quality of service its client asked for, BLOCK unless it says otherwise: a client that
-    sends queries and stops reading holds the thread that answers for 5 s, until its link is cut. That thread
-    is this one, so what the publisher puts 500 times a second is not late for the others.
+    sends queries and stops reading holds the thread that answers until its link is cut, after 1 s in real time
+    and 5 s in lockstep. That thread is this one, so what the publisher puts 500 times a second is not late for
+    the others.
     """
 
     def __init__(self) -> None:

@@ -48,6 +48,8 @@ class DoubleS(Trajectory):
             ) from error
         self._target = np.array(target, dtype=float)
         self._period = period
+        self.limits = limits
+        """That it keeps."""
         self.speed = speed
         """Rate that its time is to go at, 0 to 1 [-]."""
         self._pace = Pace(limits, period, speed)

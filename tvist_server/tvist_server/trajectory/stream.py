@@ -1,48 +1,71 @@
 """Set-points from a client, played out by their sequence numbers."""
 
-from dataclasses import dataclass, replace
+import math
+from collections import deque
 
 import numpy as np
 
+from tvist_server.trajectory.b_spline import cubic, linear
 from tvist_server.trajectory.base import Floats, Limits, Trajectory
-from tvist_server.trajectory.limiter import Limiter
+from tvist_server.trajectory.limiter import Limiter, TorqueRoom
+from tvist_server.trajectory.play_out import PlayOut
 from tvist_server.trajectory.stop import Stop
 
-LONGEST_RAMP = 0.02
-"""Longest time that taking back an acceleration may last, whatever the jerk limit: the arm moves on [s]."""
+BRIDGED = 2
+"""Set-points in a row that are made up where none came."""
 
 
 class SetpointStream(Trajectory):
     """A reference made of a client's set-points.
 
-    At the controller's own rate set-points pass straight through. Slower ones are played one period late, by
-    cubic Hermite interpolation between the two neighbours: the slope at each set-point is that of the
-    parabola through it and the two before, so it is known when the set-point arrives and velocity never
-    steps. One that is late or lost is bridged by that parabola for at most one period; after that the
-    reference comes to rest inside the limits until the stream goes on.
+    At the controller's own rate set-points pass straight through. Slower ones are the control points of a cubic
+    B-spline, which keeps the limits that they keep: it needs two periods, and a third is spare for jitter, so it is
+    three periods less a tick late. Where they come later, or by another clock, play-out waits as long as it has
+    to (`PlayOut`). One that is missing when its turn
+    comes is made up, of the parabola through its neighbours; where none come at all, the reference comes to rest
+    inside the limits until the stream goes on. After a break, and where the sender runs ahead, the newest wins.
+    Whatever comes of it goes through the `Limiter`.
 
     Args:
         q: Where the arm rests, shape (n,) [rad].
         stream_period: Time between set-points, at least a tick [s].
         limits: Of velocity, acceleration and jerk, for every joint.
         period: Tick [s].
+        reach: Joints' range either way, shape (n,) [rad]; None for no end.
+        torque: What torque leaves to acceleration; None for enough.
     """
 
-    def __init__(self, q: Floats, stream_period: float, limits: Limits, period: float) -> None:
+    def __init__(
+        self,
+        q: Floats,
+        stream_period: float,
+        limits: Limits,
+        period: float,
+        *,
+        reach: Floats | None = None,
+        torque: TorqueRoom | None = None,
+    ) -> None:
         self._rest = np.array(q, dtype=float)
-        self._stride = period / stream_period
-        self._direct = self._stride >= 1.0
-        self._period, self._stream_period = period, stream_period
-        self.limits = replace(limits, jerk=max(limits.jerk, limits.acceleration / LONGEST_RAMP))
-        """Of what the reference does where it is not at the set-points."""
-        self._limiter = Limiter(self._rest, self.limits, period)
+        self._ticks = max(round(stream_period / period, 9), 1.0)
+        direct = self._ticks == 1.0
+        self._curve, self._look_ahead = (linear, 1) if direct else (cubic, 2)
+        self._period = period
+        self.limits = limits
+        """Of the reference."""
+        self._reach = math.inf if reach is None else np.array(reach, dtype=float)
+        self._limiter = Limiter(self._rest, limits, period, reach=reach, torque=torque)
+        self._play_out: PlayOut | None = None
         self._waiting: dict[int, Floats] = {}
-        self._nodes: list[_Node] = []
-        # Play-out position in sequence numbers: an exact origin, a lead and ticks since.
-        self._origin, self._lead, self._ticks = 0, 0.0, 0
+        self._heard: list[int] = []
+        # The last four points of the curve, and the number of the newest: once there they stay what they are.
+        self._points: deque[Floats] = deque([self._rest] * 4, maxlen=4)
+        self._head = 0
+        # The last three set-points that really came, with their numbers.
+        self._real: deque[tuple[int, Floats]] = deque(maxlen=3)
+        self._speed = 0.0
         self._pause: Stop | None = None
         self.sequence: int | None = None
-        """Newest set-point that reached the reference."""
+        """Newest set-point that was taken in; the reference gets there by the delay later."""
         self.late = 0
         """Set-points that came too late to be played, or twice."""
         self.lost = 0
@@ -55,27 +78,24 @@ class SetpointStream(Trajectory):
 
     def offer(self, sequence: int, q: Floats) -> bool:
         """Take a set-point; False where it comes too late to be played, or the room to wait is full."""
-        known = bool(self._nodes) and sequence <= self._nodes[-1].sequence
+        known = bool(self._real) and sequence <= self._real[-1][0]
         if known or sequence in self._waiting or len(self._waiting) >= self.MAX_WAITING:
             self.late += 1
             return False
         self._waiting[sequence] = q
+        self._heard.append(sequence)
         return True
 
     def next(self) -> Floats:
         """Reference of the next tick."""
-        if self._nodes:
-            self._ticks += 1
-        elif self._waiting:
-            first = min(self._waiting)
-            self._play_from(first)
-            still = np.zeros_like(self._rest)
-            self._nodes = [_Node(first - 1, self._rest, still, still)]
-        else:
+        if self._play_out is not None:
+            self._play_out.advance(self._speed, self._limiter.behind)
+        if self._heard:
+            self._receive()
+        if self._play_out is None:
             return self._rest
-        self._admit()
-        q, slope = self._evaluate()
-        reference = self._limiter.follow(q, slope / self._stream_period)
+        q, qd = self._evaluate(self._play_out)
+        reference = self._limiter.follow(q, qd)
         self.limited += self._limiter.limited
         return reference
 
@@ -87,48 +107,102 @@ class SetpointStream(Trajectory):
     @property
     def state(self) -> tuple[Floats, Floats, Floats]:
         """Position, velocity and acceleration of the reference, each of shape (n,)."""
-        return self._limiter.q, self._limiter.qd, self._limiter.qdd
+        return self._limiter.state
 
     @property
-    def _offset(self) -> float:
-        """Play-out position less origin; rounded, so that it meets whole numbers where it should."""
-        return round(self._lead + self._ticks * self._stride, 9)
+    def delay(self) -> float:
+        """Between a set-point that comes as early as any, and when the curve has got there [s]."""
+        return 0.0 if self._play_out is None else self._play_out.delay * self._period
 
-    def _play_from(self, sequence: int) -> None:
-        """Put the play-out position where a set-point that has just come belongs."""
-        self._origin, self._lead, self._ticks = sequence, 0.0 if self._direct else -1.0, 0
+    def _receive(self) -> None:
+        """Take in what arrived since the last tick."""
+        play_out, newest = self._play_out, max(self._waiting)
+        self.sequence = newest
+        if play_out is None:
+            play_out = self._begin(min(self._waiting))
+        if newest in self._heard and play_out.breaks(newest):
+            # A break, or a sender ahead of its own clock: the newest wins from here.
+            play_out = self._restart(newest)
+        for sequence in self._heard:
+            play_out.hear(sequence)
+        self._heard.clear()
+        for sequence in sorted(number for number in self._waiting if number <= self._head):
+            # It was made up meanwhile; but what is made up next had better know it.
+            self._keep(sequence, self._waiting.pop(sequence))
+            self.late += 1
 
-    def _admit(self) -> None:
-        """Move set-points whose time has come from waiting to nodes."""
-        if self._waiting:
-            ahead = max(self._waiting) - self._origin - self._offset
-            if ahead < -1.0 or ahead > (2.0 if self._direct else 3.0):
-                # A break longer than a period, or a sender ahead of its own clock: the newest wins from here.
-                self._play_from(max(self._waiting))
-        reach = self._offset + (0.5 if self._direct else 1.0)
-        while self._waiting and (first := min(self._waiting)) - self._origin < reach:
-            node = _Node.after(self._nodes, first, self._waiting.pop(first))
-            self.lost += min(first - self._nodes[-1].sequence - 1, self.MAX_WAITING)
-            self._nodes = [*self._nodes[-2:], node]
-            self.sequence = first
+    def _begin(self, first: int) -> PlayOut:
+        self._real.extend(((first - 2, self._rest), (first - 1, self._rest)))
+        self._head = first - 1
+        return self._play_from(first)
 
-    def _evaluate(self) -> tuple[Floats, Floats]:
-        """Position [rad] and slope [rad per sequence number] of the stream at the play-out position."""
-        last = self._nodes[-1]
-        ahead = self._offset - (last.sequence - self._origin)
-        if ahead > 1.0:
+    def _restart(self, newest: int) -> PlayOut:
+        """Go on with the newest set-point; those that wait with it are the curve's last points."""
+        self._head = self._real[-1][0]
+        for sequence in sorted(self._waiting):
+            if sequence != newest:
+                self._put(sequence)
+        self._heard.clear()
+        return self._play_from(newest)
+
+    def _play_from(self, sequence: int) -> PlayOut:
+        self._play_out = PlayOut(sequence, self._look_ahead, self._ticks, self.limits, self._period)
+        return self._play_out
+
+    def _needed(self, play_out: PlayOut) -> int:
+        """Number of the newest set-point that the curve needs now."""
+        origin, offset = play_out.position
+        return origin + math.ceil(offset) + self._look_ahead - 1
+
+    def _evaluate(self, play_out: PlayOut) -> tuple[Floats, Floats]:
+        """Position [rad] and velocity [rad/s] of the stream."""
+        if not self._complete(self._needed(play_out)):
             return self._wait()
         self._pause = None
-        if ahead == 0.0:
-            return last.q, last.slope
-        if ahead > 0.0:
-            slope = last.slope + ahead * last.curvature
-            return last.q + 0.5 * ahead * (last.slope + slope), slope
-        for before, after in zip(self._nodes[-2::-1], self._nodes[:0:-1], strict=True):
-            since = self._offset - (before.sequence - self._origin)
-            if since >= 0.0:
-                return _hermite(since, before, after)
-        return self._nodes[0].q, self._nodes[0].slope
+        _, offset = play_out.position
+        q, slope = self._curve(self._points, offset - math.ceil(offset) + 1.0)
+        qd = (play_out.rate / self._period) * slope
+        self._speed = float(np.abs(qd).max())
+        return q, qd
+
+    def _complete(self, needed: int) -> bool:
+        """Lengthen the curve up to a number, as far as there is something to make it of."""
+        while self._head < needed:
+            missing = self._head + 1
+            if self._waiting:
+                coming = min(self._waiting)
+                if coming == missing:
+                    self._put(coming)
+                else:
+                    missing = max(missing, min(coming, needed) - 3)  # earlier ones have gone off the curve
+                    self._make_up(missing, (*self._real, (coming, self._waiting[coming]))[-3:])
+            elif missing - self._real[-1][0] <= BRIDGED:
+                self._make_up(missing, tuple(self._real))
+            else:
+                return False
+        return True
+
+    def _put(self, sequence: int) -> None:
+        q = self._waiting.pop(sequence)
+        self._keep(sequence, q)
+        self._points.append(q)
+        self._head = sequence
+
+    def _keep(self, sequence: int, q: Floats) -> None:
+        self.lost += min(sequence - self._real[-1][0] - 1, self.MAX_WAITING)
+        self._real.append((sequence, q))
+
+    def _make_up(self, sequence: int, known: tuple[tuple[int, Floats], ...]) -> None:
+        """A point in the place of one that is missing, of the parabola through those before and after."""
+        (last, q), (before, q_before) = known[-1], known[-2]
+        chord = (q - q_before) / (last - before)
+        point = q + (sequence - last) * chord
+        if len(known) == 3 and last - before <= BRIDGED + 1:  # across a break it is the straight line
+            first, q_first = known[0]
+            bend = (chord - (q_before - q_first) / (before - first)) / (last - first)
+            point = point + (sequence - last) * (sequence - before) * bend
+        self._points.append(np.clip(point, -self._reach, self._reach))
+        self._head = sequence
 
     def _wait(self) -> tuple[Floats, Floats]:
         """Come to rest and stay until the stream goes on."""
@@ -137,38 +211,4 @@ class SetpointStream(Trajectory):
             self._pause = Stop(
                 *self.state, acceleration=limits.acceleration, jerk=limits.jerk, period=self._period
             )
-        return self._pause.next(), self._pause.velocity * self._stream_period
-
-
-@dataclass(frozen=True)
-class _Node:
-    """A set-point that has been admitted; derivatives by sequence number."""
-
-    sequence: int
-    q: Floats
-    slope: Floats
-    curvature: Floats
-
-    @classmethod
-    def after(cls, nodes: "list[_Node]", sequence: int, q: Floats) -> "_Node":
-        """A new set-point, its slope that of the parabola through it and the two before."""
-        last = nodes[-1]
-        step = sequence - last.sequence
-        chord = (q - last.q) / step
-        if len(nodes) < 2:
-            curvature = 2.0 * (chord - last.slope) / step
-        else:
-            before = nodes[-2]
-            earlier = (last.q - before.q) / (last.sequence - before.sequence)
-            curvature = 2.0 * (chord - earlier) / (sequence - before.sequence)
-        return cls(sequence, q, chord + 0.5 * curvature * step, curvature)
-
-
-def _hermite(since: float, before: _Node, after: _Node) -> tuple[Floats, Floats]:
-    """Position and slope of the cubic between two set-points, `since` sequence numbers after the first."""
-    span = after.sequence - before.sequence
-    u, rise = since / span, after.q - before.q
-    a, b = span * before.slope - rise, rise - span * after.slope
-    q = before.q + u * rise + u * (1.0 - u) * ((1.0 - u) * a + u * b)
-    slope = rise + (1.0 - 2.0 * u) * ((1.0 - u) * a + u * b) + u * (1.0 - u) * (b - a)
-    return q, slope / span
+        return self._pause.next(), self._pause.velocity

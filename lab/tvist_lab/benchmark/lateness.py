@@ -1,0 +1,35 @@
+"""Lateness over minutes, out of what a robot tells of every second."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tvist_protocol.stream import Telemetry
+
+
+def over_all(heard: Sequence[Telemetry]) -> dict[str, float]:
+    """Lateness of all ticks that some seconds' telemetries are about [µs].
+
+    The largest is exact. The 99th percentile is a bound, above which no more than one tick in a hundred can have
+    been: of a second it is known that no tick was later than its largest, one in a hundred than its 99th
+    percentile, and half than its median.
+    """
+    if not heard:
+        nothing = float("nan")
+        return {"late_p50_us": nothing, "late_p99_us": nothing, "late_max_us": nothing}
+    p50, p99, largest = np.array([(one.late_p50_us, one.late_p99_us, one.late_max_us) for one in heard]).T
+    return {
+        "late_p50_us": float(np.median(p50)),
+        "late_p99_us": _bound(p50, p99, largest),
+        "late_max_us": float(largest.max()),
+    }
+
+
+def _bound(p50: np.ndarray[Any, Any], p99: np.ndarray[Any, Any], largest: np.ndarray[Any, Any]) -> float:
+    limits = np.unique(np.concatenate([p50, p99, largest]))
+    for limit in limits:
+        later = np.select([limit >= largest, limit >= p99, limit >= p50], [0.0, 0.01, 0.5], 1.0)
+        if later.mean() <= 0.01:
+            return float(limit)
+    return float(limits[-1])

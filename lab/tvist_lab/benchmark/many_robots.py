@@ -1,0 +1,83 @@
+"""How many robots one process keeps at 500 Hz on one core."""
+
+import asyncio
+import os
+from collections import defaultdict
+from collections.abc import Callable
+
+import zenoh
+from zenoh.handlers import Callback
+
+from tvist_client.transports.session import close_session, open_session
+from tvist_lab.served import ServedError, served
+from tvist_protocol import keys
+from tvist_protocol.codec import decode_telemetry
+from tvist_protocol.stream import Telemetry
+
+NUMBERS = (1, 2, 4, 8, 12, 16, 20, 24, 28, 32, 40, 48, 64)
+"""Tried one after another."""
+FAILURES = 2
+"""Numbers in a row that fail before more robots are not tried: one may have been the machine's fault."""
+TRIES = 2
+"""The better counts: what else the machine does only ever adds."""
+MISSED = 0.001
+"""Share of its ticks that no robot may miss more of."""
+SETTLE = 2
+"""Telemetries that are left out at first: the start is not what is measured."""
+
+
+async def robots_at_500_hz(seconds: float, tell: Callable[[str], None]) -> int:
+    """The largest number of robots in one process on one core none of which misses more than `MISSED`.
+
+    A client on another core, where there is one, reads every state of every robot.
+
+    Args:
+        seconds: How long each number is watched.
+        tell: Told of what is measured next.
+    """
+    most, failed = 0, 0
+    for number in NUMBERS:
+        shares: list[float] = []
+        while not shares or (len(shares) < TRIES and min(shares) > MISSED):
+            tell(f"{number} robots on one core for {seconds:g} s")
+            shares.append(await worst_share(number, seconds))
+        if min(shares) <= MISSED:
+            most, failed = number, 0
+        elif (failed := failed + 1) == FAILURES:
+            break
+    return most
+
+
+async def worst_share(number: int, seconds: float) -> float:
+    """Share of its ticks that the worst of some robots misses in a process bound to one core."""
+    core = max(os.sched_getaffinity(0))
+    name = "ur5e" if number == 1 else "ur5e-1"
+    heard: dict[str, list[Telemetry]] = defaultdict(list)
+    loop, enough = asyncio.get_running_loop(), asyncio.Event()
+
+    def on_telemetry(sample: zenoh.Sample) -> None:
+        told = heard[str(sample.key_expr)]
+        told.append(decode_telemetry(sample.payload.to_bytes()))
+        if len(heard) == number and all(len(one) > SETTLE + seconds for one in heard.values()):
+            loop.call_soon_threadsafe(enough.set)
+
+    try:
+        async with served(["--robots", f"ur5e*{number}"], name, several=True, core=core) as server:
+            session = await asyncio.to_thread(open_session, server.endpoint)
+            session.declare_subscriber(f"{keys.PREFIX}/*/state", Callback(_ignore, indirect=False))
+            session.declare_subscriber(f"{keys.PREFIX}/*/telemetry", Callback(on_telemetry, indirect=False))
+            async with asyncio.timeout(10.0 + 3.0 * seconds):
+                await enough.wait()
+            await asyncio.to_thread(close_session, session)
+    except (TimeoutError, ServedError):
+        return 1.0  # beyond what it can do it does not even answer in time
+    return max(_share(told[SETTLE:]) for told in heard.values())
+
+
+def _share(told: list[Telemetry]) -> float:
+    first, last = told[0], told[-1]
+    return (last.missed_ticks - first.missed_ticks) / max(1, last.tick - first.tick)
+
+
+def _ignore(_: zenoh.Sample) -> None:
+    pass

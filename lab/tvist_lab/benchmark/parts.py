@@ -1,0 +1,128 @@
+"""How long each part of the line takes in this process, one core."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from tvist_lab.in_process import free_setup
+from tvist_lab.paper.published import pose
+from tvist_lab.second_opinion import SecondOpinion
+from tvist_plant.drives import DriveCommand
+from tvist_plant.plant import PERIOD, Plant
+from tvist_protocol.codec import encode
+from tvist_protocol.commands import MoveJ, SimulationReset, SimulationStep, TakeControl
+from tvist_server.control.inverse_dynamics import InverseDynamics
+from tvist_server.cycle import ControlCycle
+from tvist_server.gateways.loopback import LoopbackHost
+from tvist_server.setup import Setup, body
+from tvist_server.trajectory import DoubleS, Limits
+from tvist_shaping import TvistFilter, shaper
+
+TICKS = 1250
+"""Of a motion: Q1 to Q3 without its last moment."""
+BATCHES = 5
+"""Repetitions, of which the fastest counts: what else the machine does only ever adds."""
+MUJOCO_STEP = 0.00025
+"""Step at which MuJoCo agrees with the plant [s]."""
+
+
+def parts(tell: Callable[[str], None]) -> dict[str, float]:
+    """Time of a tick of each part and of the whole line [us], how many times faster than MuJoCo and than time.
+
+    Args:
+        tell: Told of what is measured next.
+    """
+    setup = free_setup(truth=False)
+    motion, payload = _motion(setup), body(setup.payload)
+    commands = _commands(setup, motion)
+    tell("the plant")
+    plant = _arm(Plant(setup.description, payload), commands)
+    tell("MuJoCo")
+    mujoco = _arm(SecondOpinion(setup.description, payload, MUJOCO_STEP), commands[:300])
+    tell("filter, cycle and line")
+    filtering, cycle, line = _filter(setup, motion), _cycle(setup), _line(setup)
+    return {
+        "plant_us_per_tick": plant,
+        "mujoco_us_per_tick": mujoco,
+        "plant_ratio": mujoco / plant,
+        "filter_us_per_tick": filtering,
+        "cycle_us_per_tick": cycle,
+        "line_us_per_tick": line,
+        "realtime_factor": PERIOD * 1e6 / line,
+    }
+
+
+def _motion(setup: Setup) -> list[np.ndarray[Any, Any]]:
+    trajectory = DoubleS(np.array(pose("Q1")), np.array(pose("Q3")), Limits(1.5, 2.0, 100.0), PERIOD)
+    return [np.array(setup.q), *(trajectory.next() for _ in range(TICKS))]
+
+
+def _fastest(batch: Callable[[], int]) -> float:
+    """Time of one of what a batch does many times [us]."""
+    best = float("inf")
+    for _ in range(BATCHES):
+        began = time.perf_counter()
+        count = batch()
+        best = min(best, (time.perf_counter() - began) / count)
+    return best * 1e6
+
+
+def _commands(setup: Setup, motion: list[np.ndarray[Any, Any]]) -> list[DriveCommand]:
+    dynamics = InverseDynamics(setup.description, body(setup.payload))
+    return [DriveCommand(q, np.zeros_like(q), dynamics.gravity(q)) for q in motion]
+
+
+def _arm(arm: Plant | SecondOpinion, commands: list[DriveCommand]) -> float:
+    def batch() -> int:
+        arm.reset(commands[0])
+        for command in commands:
+            arm.step(command)
+        return len(commands)
+
+    return _fastest(batch)
+
+
+def _filter(setup: Setup, motion: list[np.ndarray[Any, Any]]) -> float:
+    tvist = TvistFilter(shaper(setup.shaper), setup.estimator(), joints=setup.description.joints)
+
+    def batch() -> int:
+        tvist.reset(motion[0])
+        for q in motion:
+            tvist.filter(q)
+        return len(motion)
+
+    return _fastest(batch)
+
+
+def _cycle(setup: Setup) -> float:
+    tvist = TvistFilter(shaper(setup.shaper), setup.estimator(), joints=setup.description.joints)
+    payload = body(setup.payload)
+    start, target = np.array(pose("Q1")), np.array(pose("Q3"))
+    cycle = ControlCycle(setup.description, tvist, q=start, declared=payload, carried=payload, seed=0)
+
+    def batch() -> int:
+        cycle.reset(start)
+        cycle.start(cycle.plan(target, Limits(1.5, 2.0, 100.0)))
+        for _ in range(TICKS):
+            cycle.step()
+        return TICKS
+
+    return _fastest(batch)
+
+
+def _line(setup: Setup) -> float:
+    """The whole server in process: messages in, encoded states out."""
+    host = LoopbackHost(setup)
+    host.subscribe("state", len)
+    host.request("bench", encode(TakeControl(client="bench")))
+    token = host.controller.session.lease.token if host.controller.session.lease else ""
+
+    def batch() -> int:
+        host.request("bench", encode(SimulationReset(token=token, q=pose("Q1"))))
+        host.request("bench", encode(MoveJ(token=token, q=pose("Q3"))))
+        host.request("bench", encode(SimulationStep(token=token, ticks=1000)))
+        return 1000
+
+    return _fastest(batch)

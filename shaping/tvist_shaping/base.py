@@ -1,0 +1,120 @@
+"""What every filter is: a delay line, an estimator, and weights that follow the modes."""
+
+from abc import ABC, abstractmethod
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from tvist_shaping._types import Floats
+from tvist_shaping.delay_line import DelayLine
+from tvist_shaping.errors import FilterError
+from tvist_shaping.estimators.base import Estimator
+
+
+class Filter(ABC):
+    """Time-varying shaping of a sampled reference, one filter for all joints.
+
+    Attributes:
+        name: What it is called: of a shaper, or of a design.
+        estimator: The modes as functions of q.
+        joints: Entries of a sample.
+        period: h [s].
+        f_d: Damped frequencies it works with [Hz], shape (modes,).
+        zeta: Damping ratios it works with [-], shape (modes,).
+        clipped: Whether it could not do what it should at the last tick: a delay was beyond what it holds.
+    """
+
+    name: str
+    estimator: Estimator
+    joints: int
+    period: float
+    f_d: Floats
+    zeta: Floats
+    clipped: bool
+
+    def __init__(self, name: str, estimator: Estimator, joints: int, period: float, capacity: int) -> None:
+        """The parts that all filters have; a filter of its own kind then calls `reset`.
+
+        Args:
+            name: What it is called.
+            estimator: The estimator.
+            joints: Entries of a sample, >= 1.
+            period: Time between two samples h [s], > 0.
+            capacity: Samples to keep.
+
+        Raises:
+            FilterError: A number is out of range.
+        """
+        if joints < 1:
+            raise FilterError("joints", joints, "at least 1")
+        if not 0.0 < period < np.inf:
+            raise FilterError("period", period, "a finite number of seconds above 0")
+        self.name, self.estimator = name, estimator
+        self.joints, self.period = joints, period
+        self.clipped = False
+        self._line = DelayLine(joints, capacity)
+        self._q_star: Floats = np.zeros(joints)
+
+    @property
+    @abstractmethod
+    def delay(self) -> float:
+        """Time of the last weight of the last tick [s]: how much later the shaped reference ends."""
+
+    @abstractmethod
+    def _start(self) -> None:
+        """Weights for the modes at the last shaped reference, nothing remembered."""
+
+    @abstractmethod
+    def _weigh(self) -> None:
+        """Weights of the next tick, and with them the next shaped reference."""
+
+    @abstractmethod
+    def with_estimator(self, estimator: Estimator) -> Self:
+        """The same filter with another estimator, that goes on where this one is; this one is left as it is.
+
+        Raises:
+            FilterError: The two do not fit.
+        """
+
+    def reset(self, q: npt.ArrayLike) -> None:
+        """Start anew at rest: the reference has been at q for ever.
+
+        Args:
+            q: Joint angles [rad], shape (joints,), finite.
+
+        Raises:
+            ShapingError: q has another shape.
+        """
+        self._line.fill(q)
+        self._q_star[:] = q
+        self._start()
+
+    def filter(self, q_ref: npt.ArrayLike) -> Floats:
+        """Shape one sample.
+
+        Args:
+            q_ref: Reference x_i [rad], shape (joints,), finite.
+
+        Returns:
+            Shaped reference x*_i [rad], shape (joints,), the caller's own.
+
+        Raises:
+            ShapingError: q_ref has another shape.
+        """
+        self._line.push(q_ref)
+        self._weigh()
+        return self._q_star.copy()
+
+    def take_over(self, other: "Filter") -> None:
+        """Go on where another filter is: with the reference it was given, from the shaped one it gave.
+
+        Args:
+            other: The filter to go on from; it is left as it is.
+
+        Raises:
+            ShapingError: It has other joints.
+        """
+        self._line.take_over(other._line)  # noqa: SLF001  one of its own kind
+        self._q_star[:] = other._q_star  # noqa: SLF001  likewise
+        self._start()

@@ -1,0 +1,105 @@
+"""Weights of the newest samples instead of impulses: what a filter of constant mean delay is made of.
+
+Taps h_n, n = 0 … N-1, at delays of n ticks say the same as impulses between ticks, each spread over four taps by
+Lagrange's cubic. Unlike impulses they can be averaged: a mean of tap vectors has the mean of their sums and of their
+mean delays.
+"""
+
+import math
+
+import numpy as np
+
+from tvist_shaping._compiled import compiled
+from tvist_shaping._types import Floats
+
+
+@compiled
+def mean_delay(f_d: Floats, zeta: Floats) -> float:
+    """Mean delay Σ A_j τ_j of the product of the modes' zero-vibration shapers [s].
+
+    Args:
+        f_d: Damped frequencies [Hz], shape (modes,).
+        zeta: Damping ratios [-], shape (modes,).
+    """
+    total = 0.0
+    for k in range(f_d.shape[0]):
+        K = math.exp(-math.pi * zeta[k] / math.sqrt(1.0 - zeta[k] * zeta[k]))
+        total += K / (1.0 + K) / (2.0 * f_d[k])
+    return total
+
+
+@compiled
+def product_taps(f_d: Floats, zeta: Floats, mean: float, period: float, taps: Floats) -> bool:
+    """The product of the modes' zero-vibration shapers, held back so that its mean delay is a given one.
+
+    Args:
+        f_d: Damped frequencies [Hz], shape (modes,).
+        zeta: Damping ratios [-], shape (modes,).
+        mean: Mean delay wanted [s].
+        period: Tick [s].
+        taps: Result, shape (N,).
+
+    Returns:
+        Whether it can be had: False where the product's own mean delay is longer, and stands, or the last impulse
+        is beyond the last tap, and is put on it.
+    """
+    modes, N = f_d.shape[0], taps.shape[0]
+    own = mean_delay(f_d, zeta)
+    back = max(mean - own, 0.0)
+    fits = own <= mean
+    taps[:] = 0.0
+    for choice in range(1 << modes):
+        A, delay = 1.0, back
+        for k in range(modes):
+            K = math.exp(-math.pi * zeta[k] / math.sqrt(1.0 - zeta[k] * zeta[k]))
+            if choice >> k & 1:
+                A *= K / (1.0 + K)
+                delay += 0.5 / f_d[k]
+            else:
+                A /= 1.0 + K
+        ticks = delay / period
+        if ticks > N - 3:
+            fits, ticks = False, N - 3.0
+        start = max(int(ticks) - 1, 0)
+        s = ticks - start
+        taps[start] -= A * (s - 1.0) * (s - 2.0) * (s - 3.0) / 6.0
+        taps[start + 1] += A * s * (s - 2.0) * (s - 3.0) / 2.0
+        taps[start + 2] -= A * s * (s - 1.0) * (s - 3.0) / 2.0
+        taps[start + 3] += A * s * (s - 1.0) * (s - 2.0) / 6.0
+    return fits
+
+
+@compiled
+def average(taps: Floats, past: Floats, sums: Floats, row: int, out: Floats) -> None:
+    """Three running means, one after the other, over the last tap vectors of each.
+
+    Args:
+        taps: The newest vector, shape (N,).
+        past: What each mean is of, shape (3, ticks, N); a row of each is replaced.
+        sums: Their sums, shape (3, N); changed.
+        row: Oldest row of each.
+        out: The third mean, shape (N,), its sum 1.
+    """
+    ticks, N = past.shape[1], taps.shape[0]
+    out[:] = taps
+    for stage in range(3):
+        for n in range(N):
+            sums[stage, n] += out[n] - past[stage, row, n]
+            past[stage, row, n] = out[n]
+            out[n] = sums[stage, n] / ticks
+        if row == 0:  # once in a while anew, lest roundings add up over days
+            for n in range(N):
+                fresh = 0.0
+                for i in range(ticks):
+                    fresh += past[stage, i, n]
+                sums[stage, n] = fresh
+    total = 0.0
+    for n in range(N):
+        total += out[n]
+    for n in range(N):
+        out[n] /= total
+
+
+def length(taps: Floats) -> int:
+    """Number of the last tap that counts."""
+    return int(np.flatnonzero(np.abs(taps) > 1e-12)[-1])

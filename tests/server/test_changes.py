@@ -1,0 +1,335 @@
+"""Filter and payload changed while the arm moves: no step, nothing beyond the limits, atomic, deterministic."""
+
+import msgspec
+import numpy as np
+import pytest
+
+from tvist_protocol import commands as c
+from tvist_protocol.replies import Done
+from tvist_server.collision import CollisionModel
+from tvist_server.control.inverse_dynamics import SLEW, InverseDynamics
+from tvist_server.cycle import STILL
+from tvist_server.safety import TORQUE_SHARE
+from tvist_server.setup import body, paper_payload
+from tvist_server.trajectory import Limits
+from tvist_shaping.catalogue import SHAPERS, shaper
+from tvist_shaping.estimators.fixed import Fixed
+from tvist_shaping.estimators.polynomial import Polynomial
+from tvist_shaping.filter import TvistFilter
+
+from .robots import PAPER, POLYNOMIAL, Q1, Q2, Q3, UR5E, H, Robot, calibration, cycle, without_arm
+
+DISC = paper_payload(UR5E)
+TOLERANCE = 5e-3
+"""Share of the limits: 0.3 % was the most in 500 random motions."""
+
+
+def a_filter(random, name=None):
+    estimator = Polynomial(**POLYNOMIAL)
+    if random.random() < 0.5:
+        estimator = Fixed([random.uniform(5.0, 15.0)], [random.uniform(0.02, 0.4)])
+    return TvistFilter(shaper(name or random.choice(list(SHAPERS))), estimator, joints=6)
+
+
+def a_line(tvist):
+    line = without_arm(cycle())
+    line.use(tvist)
+    return line
+
+
+class Alone:
+    """The shaped references of filters that are fed what a line is fed, and the bounds they give."""
+
+    def __init__(self, tvist):
+        self.filters, self.shaped = [tvist.replace()], [[]]
+
+    def add(self, tvist):
+        other = tvist.replace()
+        other.take_over(self.filters[-1])
+        self.filters.append(other)
+        self.shaped.append([])
+
+    def feed(self, reference):
+        for tvist, shaped in zip(self.filters, self.shaped, strict=True):
+            shaped.append(tvist.filter(reference))
+
+    def bound(self, order, limit, length):
+        """Largest of the limit and what one of them gives, shape (length - order, n)."""
+        bound = np.full((length - order, 6), float(limit))
+        for shaped in self.shaped:
+            if len(shaped) > order:
+                own = np.abs(np.diff(shaped, order, axis=0)) / H**order
+                bound[-len(own) :] = np.maximum(bound[-len(own) :], own)
+        return bound
+
+
+def drive(line, first, changes, limits, most=4000):
+    """Run to rest with changes of the filter at their ticks; shaped reference and what was promised of it."""
+    alone, shaped = Alone(first), []
+    for tick in range(most):
+        if tick in changes:
+            alone.add(changes[tick])
+            line.use(changes[tick])
+        line.step()
+        alone.feed(line.reference)
+        shaped.append(line.position)
+        if line.at_rest:
+            break
+    shaped = np.array(shaped)
+    for order, limit in ((1, limits.velocity), (2, limits.acceleration)):
+        own = np.abs(np.diff(shaped, order, axis=0)) / H**order
+        assert (own / alone.bound(order, limit, len(shaped))).max() < 1.0 + TOLERANCE
+    return shaped
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_motion_keeps_its_limits_and_its_target_through_changes_of_the_filter(seed):
+    random = np.random.default_rng(seed)
+    first = a_filter(random)
+    line = a_line(first)
+    limits = PAPER if seed % 2 else Limits(*random.uniform((0.5, 1.0, 50.0), (3.0, 8.0, 1000.0)))
+    target = Q1 + random.uniform(-1.0, 1.0, 6) * random.uniform(0.1, 2.0)
+    duration = line.start(line.plan(target, limits)).duration
+    ticks = np.sort(random.integers(0, int(duration / H), 3))
+    changes = {int(tick): a_filter(random) for tick in ticks}
+    shaped = drive(line, first, changes, limits)
+    assert line.at_rest
+    assert np.abs(shaped[-1] - target).max() <= STILL
+    assert line.tvist is list(changes.values())[-1]
+    for _ in range(20):
+        line.step()
+    assert (line.position == target).all()
+
+
+def test_of_changes_during_a_change_the_newest_is_what_remains():
+    random = np.random.default_rng(0)
+    first = a_filter(random, "none")
+    line = a_line(first)
+    line.start(line.plan(Q3, PAPER))
+    # The second one begins to fade in; the others come while it does, ten ticks apart.
+    changes = {450 + 10 * k: a_filter(random, name) for k, name in enumerate(("zvd", "zv", "ei3", "ei"))}
+    drive(line, first, changes, PAPER)
+    assert line.at_rest
+    assert line.tvist.shaper.name == "ei"
+    assert line.tvist is changes[480]
+
+
+def test_a_change_that_has_not_begun_to_count_gives_way_to_the_next():
+    line = a_line(TvistFilter(shaper("zvd"), Fixed([6.7], [0.1]), joints=6))
+    line.start(line.plan(Q3, PAPER))
+    for _ in range(500):
+        line.step()
+    line.use(TvistFilter(shaper("none"), Fixed([6.7], [0.1]), joints=6))
+    line.use(newest := TvistFilter(shaper("ei3"), Fixed([6.7], [0.1]), joints=6))
+    assert line._fade.new is newest
+
+
+def test_a_stream_at_its_limit_keeps_it_through_a_change():
+    first, then = (TvistFilter(shaper(name), Fixed([7.0], [0.1]), joints=6) for name in ("zv", "ei"))
+    line = a_line(first)
+    stream = line.stream(H, PAPER)
+    w, alone, shaped = 1.6, Alone(first), []
+    way = np.array([1.0, -0.5, 0.3, 0.0, 0.0, 0.0])
+    amplitude = PAPER.acceleration / w**2
+    for k in range(2800):
+        t = k * H
+        q = Q1 + 0.99 * amplitude * min(1.0, t / 2.0) ** 3 * np.sin(w * t) * way * 0.75
+        stream.offer(k, q)
+        if k == 1500:
+            alone.add(then)
+            line.use(then)
+        line.step()
+        alone.feed(line.reference)
+        shaped.append(line.position)
+    shaped = np.array(shaped)
+    own = np.abs(np.diff(shaped, 2, axis=0)) / H**2
+    assert (own / alone.bound(2, PAPER.acceleration, len(shaped))).max() < 1.0 + TOLERANCE
+    assert line._fade is None
+    line.end_stream(stream)
+    while not line.at_rest:
+        line.step()
+    assert np.abs(line.position - line.reference).max() <= STILL
+
+
+def test_paused_a_change_is_made_where_nothing_moves():
+    robot = Robot(calibration=calibration())
+    robot.send(c.MoveJ, q=tuple(Q2))
+    robot.tick(300)
+    robot.send(c.Pause)
+    robot.tick(500)
+    assert robot.send(c.SetShaper, name="ei3") == Done()
+    robot.tick(5)
+    held = robot.column("target_q")[-100:]
+    assert (held == held[0]).all()
+    assert robot.controller.cycle._fade is None
+    robot.send(c.Resume)
+    robot.until_rest()
+    assert robot.kinds()[-1] == "motion_done"
+    assert robot.controller.cycle.position == pytest.approx(Q2, abs=STILL)
+
+
+def test_a_stop_during_a_change_is_a_stop_and_the_new_filter_is_in_force_after_it():
+    line = a_line(TvistFilter(shaper("none"), Fixed([6.7], [0.1]), joints=6))
+    line.start(line.plan(Q3, PAPER))
+    new = TvistFilter(shaper("ei"), Fixed([6.7], [0.1]), joints=6)
+    for tick in range(600):
+        if tick == 500:
+            line.use(new)
+        line.step()
+    assert 0.0 < line._fade.share < 1.0
+    before = line.newest
+    line.stop(None)
+    line.step()
+    assert line.newest.q == pytest.approx(before.q + H * before.qd, abs=1e-4)
+    while not line.at_rest:
+        line.step()
+    assert line.tvist is new
+    assert line._fade is None
+    assert (line.tvist.filter(line.reference) == line.reference).all()
+
+
+def test_a_reset_during_a_change_leaves_nothing_of_it():
+    line = a_line(TvistFilter(shaper("none"), Fixed([6.7], [0.1]), joints=6))
+    line.start(line.plan(Q3, PAPER))
+    for tick in range(600):
+        if tick == 500:
+            line.use(TvistFilter(shaper("ei"), Fixed([6.7], [0.1]), joints=6))
+            line.declare(body(paper_payload(UR5E, 1.0)))
+        line.step()
+    line.reset(Q2)
+    fresh = a_line(TvistFilter(shaper("ei"), Fixed([6.7], [0.1]), joints=6))
+    fresh.declare(body(paper_payload(UR5E, 1.0)))
+    fresh.reset(Q2)
+    assert line.at_rest
+    for each in (line, fresh):
+        each.start(each.plan(Q1, PAPER))
+    for _ in range(300):
+        one, other = line.step(), fresh.step()
+        assert (one.target.q == other.target.q).all()
+        assert (one.torque == other.torque).all()
+
+
+@pytest.mark.parametrize("moving", [False, True])
+@pytest.mark.parametrize("masses", [(5.0, 0.0), (0.0, 5.0), (1.0, 4.0)])
+def test_another_payload_makes_no_step_in_torque_and_ends_as_if_it_had_always_been(moving, masses):
+    first, then = (body(paper_payload(UR5E, mass)) for mass in masses)
+    changed, never, always = (without_arm(cycle()) for _ in range(3))
+    for line, payload in ((changed, first), (never, first), (always, then)):
+        line.declare(payload)
+        line.reset(Q1)
+        if moving:
+            line.start(line.plan(Q3, PAPER))
+    torques = []
+    for tick in range(700):
+        if tick == 100:
+            changed.declare(then)
+        torques.append([line.step().torque for line in (changed, never, always)])
+    torque, old, new = np.swapaxes(np.array(torques), 0, 1)
+    assert (torque[:100] == old[:100]).all()
+    np.testing.assert_allclose(torque[100 + SLEW :], new[100 + SLEW :], atol=1e-9)
+    # No tick's change is more than that of the motion and an even share of the difference, with half on top.
+    ticks = slice(100, 100 + SLEW)
+    most = np.maximum(np.abs(np.diff(old, axis=0)), np.abs(np.diff(new, axis=0)))
+    most = most[ticks] + 1.6 * np.abs(new - old)[ticks].max(axis=0) / SLEW
+    assert (np.abs(np.diff(torque, axis=0))[ticks] <= most + 1e-9).all()
+    assert (torque >= np.minimum(old, new) - 1e-9).all()
+    assert (torque <= np.maximum(old, new) + 1e-9).all()
+
+
+@pytest.mark.parametrize("masses", [(5.0, 0.0), (0.0, 5.0)])
+def test_a_stop_while_the_payload_changes_is_safe_with_either(masses):
+    line = without_arm(cycle())
+    line.declare(body(paper_payload(UR5E, masses[0])))
+    line.reset(Q1)
+    line.start(line.plan(Q2 + np.array([0.0, 0.4, 0.0, 0.0, 0.0, 0.0]), Limits(2.5, 6.0, 500.0)))
+    for tick in range(200):
+        if tick == 150:
+            line.declare(body(paper_payload(UR5E, masses[1])))
+        line.step()
+    state, stop = line.newest, line.plan_stop(None).trajectory
+    for mass in masses:
+        dynamics = InverseDynamics(UR5E, body(paper_payload(UR5E, mass)))
+        present = line.inverse_dynamics.effort(state.q, state.qd, state.qdd)
+        limit = np.maximum(TORQUE_SHARE * np.array(UR5E.limits.torque), present)
+        for time in np.linspace(0.0, stop.duration, 49)[1:]:
+            assert (np.abs(dynamics.torque(*stop.at(time))) <= limit + 1e-9).all()
+
+
+def test_a_payload_swapped_in_place_collides_as_one_built_anew():
+    random = np.random.default_rng(0)
+    swapped = CollisionModel(UR5E, body(DISC))
+    for mass, com in (
+        (2.0, (0.0, 0.0, 0.3)),
+        (0.0, (0.0, 0.0, 0.0)),
+        (1.0, (0.1, -0.2, 0.05)),
+        (5.0, DISC.com),
+    ):
+        payload = body(msgspec.structs.replace(paper_payload(UR5E, mass), com=com))
+        swapped.carry(payload)
+        fresh = CollisionModel(UR5E, payload)
+        for q in random.uniform(-3.0, 3.0, (300, 6)):
+            assert swapped.meeting(q) == fresh.meeting(q)
+
+
+CHANGES = [
+    (c.SetShaper, {"name": "ei"}),
+    (c.SetEstimator, {"name": "fixed", "f_d": (8.0,), "zeta": (0.2,)}),
+    (c.SetPayload, {"mass": 1.0, "com": DISC.com, "inertia": DISC.inertia}),
+]
+
+
+def moving(robot):
+    robot.send(c.MoveJ, q=tuple(Q3))
+    robot.tick(600)
+
+
+def streaming(robot):
+    robot.send(c.ServoStart, period=H)
+    for k in range(300):
+        robot.setpoint(k, Q1 + 0.2 * (1.0 - np.cos(2.0 * k * H)))
+        robot.tick()
+
+
+def ending(robot):
+    streaming(robot)
+    robot.send(c.ServoStop)
+    robot.tick(5)
+
+
+def stopping(robot):
+    moving(robot)
+    robot.send(c.Stop)
+    robot.tick(5)
+
+
+@pytest.mark.parametrize("begin", [moving, streaming, ending, stopping])
+def test_changes_are_done_in_motion_and_the_same_every_time(begin):
+    robots = [Robot(calibration=calibration()) for _ in range(2)]
+    for robot in robots:
+        begin(robot)
+        for kind, fields in CHANGES:
+            assert robot.send(kind, **fields) == Done()
+            robot.tick(20)
+        if begin is streaming:
+            robot.send(c.ServoStop)
+        robot.until_rest()
+        robot.tick(50)
+        assert robot.states[-1].target_qd == pytest.approx([0.0] * 6, abs=1e-6)
+        assert robot.kinds().count("shaper_changed") == 2
+    one, other = robots
+    assert [msgspec.json.encode(state) for state in one.states] == [
+        msgspec.json.encode(state) for state in other.states
+    ]
+
+
+def test_a_change_in_motion_that_is_refused_changes_nothing():
+    robots = [Robot(calibration=calibration()) for _ in range(2)]
+    for robot in robots:
+        moving(robot)
+    assert robots[0].send(c.SetShaper, name="zvdd").code == "unknown_shaper"
+    assert robots[0].send(c.SetEstimator, name="fixed", f_d=(0.2,), zeta=(0.2,)).code == "out_of_range"
+    assert robots[0].send(c.SetPayload, mass=6.0, com=DISC.com, inertia=DISC.inertia).code == "out_of_range"
+    for robot in robots:
+        robot.tick(300)
+    for one, other in zip(*(robot.states for robot in robots), strict=True):
+        assert msgspec.json.encode(one) == msgspec.json.encode(other)

@@ -1,0 +1,128 @@
+"""Clocks that drive robots: what waits is done before a tick, and what the system does not permit is said."""
+
+import os
+import threading
+
+import pytest
+
+from tvist_server.clock import PRIORITY, Driven, Lockstep, Realtime
+
+WAIT = 30.0
+PERIOD = 0.002
+
+
+class FakeHost:
+    """Counts its ticks, and says when there were enough."""
+
+    def __init__(self, enough=5):
+        self.failure = None
+        self.ticks, self.missed_ticks = 0, 0
+        self.enough = enough
+        self.reached = threading.Event()
+        self.threads = set()
+
+    def tick(self):
+        self.ticks += 1
+        self.threads.add(threading.current_thread().name)
+        if self.ticks >= self.enough:
+            self.reached.set()
+
+    def missed(self, ticks):
+        self.missed_ticks += ticks
+
+
+def served(robots, **options):
+    """Robots driven in real time until each has ticked enough; the calls of what hands on."""
+    calls = []
+    clock = Realtime(robots, lambda: calls.append(None), PERIOD, **options)
+    clock.start()
+    for robot in robots:
+        assert robot.host.reached.wait(WAIT)
+    clock.close()
+    return clock, calls
+
+
+@pytest.mark.parametrize("number", [1, 2, 7])
+def test_one_thread_ticks_all_robots_and_says_how_late_each_was(number):
+    robots = [Driven(FakeHost()) for _ in range(number)]
+    clock, calls = served(robots)
+    assert calls
+    assert {name for robot in robots for name in robot.host.threads} == {"tvist-tick"}
+    for robot in robots:
+        assert clock.punctuality(robot).ticks == robot.host.ticks >= 5
+        assert clock.punctuality(robot).ticks == 0
+
+
+def test_jobs_are_done_in_order_before_the_next_tick_and_all_before_the_end():
+    robot, seen = Driven(FakeHost()), []
+    for number in range(100):
+        robot.post(lambda number=number: seen.append((number, robot.host.ticks)))
+    clock = Realtime([robot], lambda: None, PERIOD)
+    clock.start()
+    assert robot.host.reached.wait(WAIT)
+    robot.post(lambda: seen.append("last"))
+    clock.close()
+    assert seen == [*((number, 0) for number in range(100)), "last"]
+
+
+def test_a_job_that_posts_another_does_not_keep_the_tick_waiting():
+    robot = Driven(FakeHost())
+
+    def again():
+        robot.post(again)
+
+    again()
+    served([robot])
+
+
+def test_a_tick_that_fails_ends_all_robots_of_the_thread_and_says_so(caplog):
+    class Failing(FakeHost):
+        def tick(self):
+            raise ArithmeticError("on purpose")
+
+    robots = [Driven(FakeHost()), Driven(Failing())]
+    clock = Realtime(robots, lambda: None, PERIOD)
+    clock.start()
+    clock._thread.join(WAIT)
+    assert all("see the log" in robot.host.failure for robot in robots)
+    assert "on purpose" in caplog.text
+
+
+def test_real_time_priority_is_asked_for_by_the_tick_thread_itself(monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        os,
+        "sched_setscheduler",
+        lambda *arguments: asked.append((threading.current_thread().name, *arguments)),
+    )
+    served([Driven(FakeHost())], priority=True)
+    ((thread, which, policy, parameter),) = asked
+    assert (thread, which, policy) == ("tvist-tick", 0, os.SCHED_FIFO)
+    assert parameter.sched_priority == PRIORITY
+    served([Driven(FakeHost())])
+    assert len(asked) == 1
+
+
+def test_where_it_is_not_permitted_that_is_one_sentence_and_ticks_go_on(monkeypatch, caplog):
+    def refuse(*_):
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    robot = Driven(FakeHost())
+    served([robot], priority=True)
+    (record,) = caplog.records
+    assert record.levelname == "WARNING"
+    assert "real-time priority is not permitted (Operation not permitted)" in record.getMessage()
+    assert "\n" not in record.getMessage()
+    assert robot.host.ticks >= 5
+
+
+def test_in_lockstep_no_tick_comes_by_itself_and_jobs_are_done():
+    robot, done = Driven(FakeHost()), threading.Event()
+    clock = Lockstep(robot, lambda: None)
+    clock.start()
+    robot.post(done.set)
+    assert done.wait(WAIT)
+    clock.close()
+    assert robot.host.ticks == 0
+    assert clock.punctuality(robot) is None

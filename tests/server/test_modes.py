@@ -1,0 +1,339 @@
+"""Power, protective stops and reduced speed: what the table of transitions says is what happens."""
+
+import numpy as np
+import pytest
+
+from tvist_protocol import commands as c
+from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.transitions import TRANSITIONS, Activity, Control, after
+from tvist_protocol.values import Payload
+from tvist_server.overload import TICKS, Overload
+from tvist_server.safety import REDUCED_SHARE
+from tvist_server.session import NoControlError, Session
+from tvist_shaping.catalogue import SHAPERS
+
+from .robots import Q1, Q2, Q3, UR5E, H, Robot
+
+Q1_, Q2_, Q3_ = tuple(Q1), tuple(Q2), tuple(Q3)
+FASTEST = REDUCED_SHARE * min(UR5E.limits.velocity)
+COMMANDS = {
+    "power_on": (c.PowerOn, {}),
+    "power_off": (c.PowerOff, {}),
+    "unlock_protective_stop": (c.UnlockProtectiveStop, {}),
+    "move_j": (c.MoveJ, {"q": Q2_}),
+    "servo_start": (c.ServoStart, {}),
+    "servo_stop": (c.ServoStop, {}),
+    "pause": (c.Pause, {}),
+    "resume": (c.Resume, {}),
+    "stop": (c.Stop, {}),
+}
+
+
+def at(activity: Activity) -> Robot:
+    """A robot that does this, brought there by commands."""
+    robot = Robot()
+    if activity in {Activity.POWER_OFF, Activity.IDLE}:
+        robot.send(c.SimulationReset, mode=activity.value)
+    elif activity in {Activity.STREAMING, Activity.ENDING}:
+        robot.send(c.ServoStart)
+        for k in range(200):
+            robot.setpoint(k, Q1 + 0.1 * (1 - np.cos(3.0 * k * H)))
+            robot.tick()
+        if activity is Activity.ENDING:
+            robot.send(c.ServoStop)
+    elif activity is Activity.PROTECTIVE_STOP:
+        robot.send(c.SimulationInject, fault="protective_stop")
+    elif activity is not Activity.REST:
+        robot.send(c.MoveJ, q=Q3_)
+        robot.tick(300)
+        ends = {
+            Activity.PAUSED: (c.Pause, {}),
+            Activity.STOPPING: (c.Stop, {}),
+            Activity.POWERING_OFF: (c.PowerOff, {}),
+            Activity.PROTECTIVE_STOPPING: (c.SimulationInject, {"fault": "protective_stop"}),
+        }
+        if activity in ends:
+            robot.send(ends[activity][0], **ends[activity][1])
+    robot.tick()
+    assert robot.controller.motion.activity is activity
+    return robot
+
+
+@pytest.mark.parametrize("activity", Activity)
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_leads_where_the_table_says_or_is_refused(command, activity):
+    robot, target = at(activity), after(activity, command)
+    kind, fields = COMMANDS[command]
+    reply = robot.send(kind, **fields)
+    if target is not None:
+        assert isinstance(reply, Accepted | Done), reply
+        assert robot.controller.motion.activity is target
+    elif command == "stop":
+        assert reply == Done()
+        assert robot.controller.motion.activity is activity
+    else:
+        assert isinstance(reply, Refused)
+        assert reply.code in {"busy", "wrong_mode"}
+        assert (reply.code == "busy") <= activity.moving
+        assert robot.controller.motion.activity is activity
+
+
+@pytest.mark.parametrize("activity", [activity for activity in Activity if activity.moving])
+def test_what_comes_to_rest_ends_where_the_table_says(activity):
+    robot = at(activity)
+    target = after(activity, "at_rest")
+    if target is None:  # paused: it stands on its way, and is not at rest
+        robot.tick(1000)
+        assert robot.controller.motion.activity is activity
+        return
+    robot.send(c.ServoStop) if activity is Activity.STREAMING else None
+    robot.until_rest()
+    assert robot.controller.motion.activity is (target or Activity.REST)
+
+
+@pytest.mark.parametrize(
+    "activity", [activity for activity in Activity if activity is not Activity.STREAMING]
+)
+def test_the_state_says_the_modes_of_what_it_does(activity):
+    robot = at(activity)
+    state = robot.states[-1]
+    assert state.robot_mode == activity.robot_mode
+    assert state.safety_mode == activity.safety_mode(reduced=False)
+    resting = not activity.moving
+    assert (state.runtime_state == RuntimeState.STOPPED) == resting
+
+
+@pytest.mark.parametrize("activity", Activity)
+@pytest.mark.parametrize("mode", ["RUNNING", "IDLE", "POWER_OFF", None])
+def test_a_reset_puts_it_into_any_mode_from_everywhere(activity, mode):
+    robot = at(activity)
+    assert isinstance(robot.send(c.SimulationReset, mode=mode, q=Q2_), Done)
+    state = robot.tick(2)
+    named = {"RUNNING": RobotMode.RUNNING, "IDLE": RobotMode.IDLE, "POWER_OFF": RobotMode.POWER_OFF}
+    assert state.robot_mode == (activity.robot_mode if mode is None else named[mode])
+    protected = mode is None and activity.safety_mode(reduced=False) is SafetyMode.PROTECTIVE_STOP
+    assert state.safety_mode == (SafetyMode.PROTECTIVE_STOP if protected else SafetyMode.NORMAL)
+    assert state.target_q == list(Q2_)
+    assert np.ptp(robot.column("target_q")[-2:], axis=0).max() == 0.0
+
+
+@pytest.mark.parametrize("mode", ["IDLE", "POWER_OFF"])
+def test_it_starts_in_any_mode(mode):
+    robot = Robot(mode=mode, carried=Payload(mass=1.0, com=(0, 0, 0), inertia=(0.0,) * 6))
+    assert robot.tick().robot_mode == RobotMode[mode]
+    assert robot.controller.cycle.arm.payload.mass == 1.0
+    assert robot.controller.declared.mass == 5.0
+    assert robot.send(c.MoveJ, q=Q2_).code == "wrong_mode"
+    assert robot.send(c.PowerOn) == Done()
+    assert robot.tick().robot_mode == RobotMode.RUNNING
+    assert isinstance(robot.send(c.MoveJ, q=Q2_), Accepted)
+
+
+def test_the_table_has_one_answer_to_a_trigger():
+    pairs = [(row.trigger, source) for row in TRANSITIONS for source in row.sources]
+    assert len(pairs) == len(set(pairs))
+
+
+def test_nothing_is_without_a_way_in_and_a_way_out():
+    for states in (Activity, Control):
+        for state in states:
+            rows = [row for row in TRANSITIONS if type(row.target) is states]
+            if state is not Activity.IDLE:  # only a reset, or the power button of another interface
+                assert any(row.target is state and {*row.sources} - {state} for row in rows), state
+            assert any(state in row.sources and row.target is not state for row in rows), state
+
+
+@pytest.mark.parametrize("state", Control)
+@pytest.mark.parametrize("trigger", ["take_control", "hand_over", "release_control", "lease_end"])
+def test_control_goes_by_the_table_too(state, trigger):
+    session = Session(timeouts=True)
+    if state is Control.HELD:
+        session.take("a", 1.0, 0.0)
+    rows = [row for row in TRANSITIONS if row.trigger == trigger and state in row.sources]
+    try:
+        match trigger:
+            case "take_control":
+                session.take("a", 1.0, 0.0)
+            case "hand_over":
+                session.hand_over("b", 0.0)
+            case _:
+                session.renew("a#1", 0.0)
+                session.release()
+    except NoControlError:
+        assert not rows
+    held = session.lease is not None
+    assert held == ((rows[0].target if rows else state) is Control.HELD)
+
+
+# ---------------------------------------------------------------- power
+
+
+def test_power_off_stops_what_moves_before_the_power_goes():
+    robot = at(Activity.MOVING)
+    assert robot.send(c.PowerOff) == Done()
+    assert robot.tick().robot_mode == RobotMode.RUNNING
+    robot.until_rest()
+    assert robot.tick().robot_mode == RobotMode.POWER_OFF
+    assert robot.kinds() == ["motion_started", "motion_stopped"]
+    peak = np.abs(np.diff(robot.column("target_q"), 2, axis=0) / H**2).max()
+    assert peak <= UR5E.limits.acceleration[0] * (1 + 1e-6)
+    stood = robot.states[-1].actual_q
+    robot.tick(500)
+    assert robot.states[-1].actual_q == pytest.approx(stood, abs=5e-3)  # it still rang
+
+
+# ---------------------------------------------------------------- protective stop
+
+
+def test_a_protective_stop_is_controlled_and_holds_until_it_is_unlocked():
+    robot = at(Activity.MOVING)
+    assert robot.send(c.SimulationInject, fault="protective_stop") == Done()
+    assert robot.tick().safety_mode == SafetyMode.PROTECTIVE_STOP
+    assert robot.kinds() == ["motion_started", "protective_stop", "motion_stopped"]
+    assert robot.send(c.UnlockProtectiveStop).code == "wrong_mode"
+    robot.until_rest()
+    assert "unlock_protective_stop" in robot.send(c.MoveJ, q=Q2_).why
+    assert robot.send(c.UnlockProtectiveStop) == Done()
+    assert robot.tick().safety_mode == SafetyMode.NORMAL
+    assert robot.send(c.MoveJ, q=tuple(Q1 + 0.1)) == Accepted(id=2)
+
+
+def longest_run(true) -> int:
+    """Of consecutive ticks."""
+    longest = run = 0
+    for each in true:
+        run = run + 1 if each else 0
+        longest = max(longest, run)
+    return longest
+
+
+@pytest.mark.parametrize(("push", "stops"), [(-200.0, False), (-300.0, None), (-1000.0, True)])
+def test_a_push_is_a_protective_stop_only_when_a_drive_is_beyond_its_limit_for_long(push, stops):
+    robot = Robot()
+    robot.tick(10)
+    robot.send(c.SimulationInject, fault="torque", joint=1, value=push, seconds=0.004)
+    robot.tick(100)
+    beyond = np.abs(robot.column("actual_moment")) > np.array(UR5E.limits.torque)
+    assert beyond.any()
+    stopped = [event for event in robot.events if event.kind == "protective_stop"]
+    too_long = any(longest_run(joint) > TICKS for joint in beyond.T)
+    assert bool(stopped) == too_long
+    assert stops in {None, too_long}
+    if stopped:
+        assert stopped[0].code == "limit_torque"
+        assert "beyond its" in stopped[0].why
+        past = [
+            robot.states[k].tick for k in range(100) if beyond[k - TICKS : k + 1].all(0).any() and k >= TICKS
+        ]
+        assert stopped[0].tick == past[0]
+
+
+def test_a_load_that_the_drives_cannot_hold_stops_it_again_after_every_unlock():
+    heavy = Payload(mass=30.0, com=(0.0, 0.0, 0.04), inertia=(0.01, 0.0, 0.0, 0.01, 0.0, 0.01))
+    robot = Robot(carried=heavy)
+    for number in (1, 2):
+        robot.tick(TICKS + 3)
+        assert robot.kinds().count("protective_stop") == number
+        assert robot.send(c.UnlockProtectiveStop) == Done()
+
+
+def test_no_move_of_the_arm_s_own_is_beyond_a_drive_s_limit_for_long():
+    robot = Robot()
+    for target in (Q3_, Q1_, Q2_):
+        robot.send(c.MoveJ, q=target)
+        robot.until_rest()
+    assert "protective_stop" not in robot.kinds()
+
+
+def test_overload_counts_each_joint_and_only_without_a_gap():
+    watch = Overload([10.0, 5.0])
+    for _ in range(TICKS):
+        assert watch.joint(np.array([11.0, 0.0])) is None
+    assert watch.joint(np.array([0.0, -6.0])) is None
+    for _ in range(TICKS - 1):
+        assert watch.joint(np.array([0.0, -6.0])) is None
+    assert watch.joint(np.array([0.0, -6.0])) == 1
+    watch.forget()
+    assert watch.joint(np.array([0.0, -6.0])) is None
+
+
+# ---------------------------------------------------------------- a plant that fails
+
+
+@pytest.mark.parametrize("activity", Activity)
+def test_an_arm_that_is_no_longer_finite_is_put_at_rest_and_the_robot_goes_on(activity):
+    robot = at(activity)
+    assert robot.send(c.SimulationInject, fault="nan") == Done()
+    state = robot.tick()
+    assert [(e.kind, e.code) for e in robot.events if e.code == "plant_failure"][-1][0] == "protective_stop"
+    driven = activity not in {Activity.POWER_OFF, Activity.IDLE}
+    assert state.safety_mode == (SafetyMode.PROTECTIVE_STOP if driven else SafetyMode.NORMAL)
+    assert np.isfinite(state.actual_q).all()
+    ended = [event for event in robot.events if event.kind in {"motion_done", "motion_stopped"}]
+    assert len(ended) == robot.kinds().count("motion_started")
+    robot.tick(100)
+    assert np.isfinite(robot.column("actual_q")).all()
+    if driven:
+        assert robot.send(c.UnlockProtectiveStop) == Done()
+        back = tuple(0.9 * np.array(robot.states[-1].target_q) + 0.1 * Q1)
+        assert isinstance(robot.send(c.MoveJ, q=back), Accepted)
+        robot.until_rest()
+        assert robot.events[-1].kind == "motion_done"
+
+
+def test_a_push_as_strong_as_a_collapse_is_survived():
+    robot = at(Activity.MOVING)
+    robot.send(c.SimulationInject, fault="torque", joint=3, value=1e6, seconds=10.0)
+    robot.tick(500)
+    assert np.isfinite(robot.column("actual_q")).all()
+    assert robot.states[-1].safety_mode == SafetyMode.PROTECTIVE_STOP
+
+
+# ---------------------------------------------------------------- reduced speed
+
+
+def speeds(robot, since=0):
+    return np.abs(np.diff(robot.column("target_q")[since:], axis=0) / H).max(axis=1)
+
+
+@pytest.mark.parametrize("shaper", ["none", "zv"])
+@pytest.mark.parametrize("ticks", [20, 300, 900])
+def test_a_motion_is_slowed_on_its_way_and_hurried_again(shaper, ticks):
+    assert shaper in SHAPERS
+    robot = Robot(shaper=shaper)
+    robot.send(c.MoveJ, q=Q3_)
+    robot.tick(ticks)
+    robot.send(c.SimulationInject, fault="reduced", seconds=2.0)
+    assert robot.tick().safety_mode == SafetyMode.REDUCED
+    robot.tick(400)
+    assert speeds(robot, ticks + 300).max() <= FASTEST * (1 + 1e-3)
+    robot.tick(600)
+    assert robot.states[-1].safety_mode == SafetyMode.NORMAL
+    robot.until_rest()
+    assert "motion_done" in robot.kinds()
+    assert robot.states[-1].target_q == pytest.approx(Q3_, abs=1e-6)
+    peak = np.abs(np.diff(robot.column("target_q"), 2, axis=0) / H**2).max()
+    # Where its time is paced, a tick is not infinitely short: 0.1 %. The time-varying shaper adds up to 2 %.
+    assert peak <= 2.0 * (1.02 if shaper == "zv" else 1.001)
+
+
+def test_a_new_motion_keeps_to_the_reduced_speed():
+    robot = Robot()
+    robot.send(c.SimulationInject, fault="reduced")
+    robot.send(c.MoveJ, q=Q3_)
+    robot.until_rest(20000)
+    assert 0.9 * FASTEST < speeds(robot).max() <= FASTEST * (1 + 1e-3)
+    assert robot.send(c.SimulationInject, fault="normal") == Done()
+    assert robot.tick().safety_mode == SafetyMode.NORMAL
+
+
+def test_a_stream_that_may_be_faster_is_stopped_and_not_started():
+    robot = at(Activity.STREAMING)
+    robot.send(c.SimulationInject, fault="reduced")
+    robot.until_rest()
+    stopped = [event for event in robot.events if event.kind == "stream_stopped"]
+    assert [event.code for event in stopped] == ["limit_velocity"]
+    reply = robot.send(c.ServoStart)
+    assert (reply.code, reply.where, reply.limit) == ("limit_velocity", "velocity", pytest.approx(FASTEST))
+    assert robot.send(c.ServoStart, velocity=0.5) == Done()

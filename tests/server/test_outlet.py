@@ -1,0 +1,113 @@
+"""What a robot says waits in order, is dropped and counted or waited for, and is handed on when somebody comes."""
+
+import threading
+
+from tvist_protocol.codec import decode_event, decode_state
+from tvist_protocol.stream import Event
+from tvist_server.courier import Courier
+from tvist_server.outlet import MAX_WAITING, Outlet
+
+from .robots import Robot
+
+WAIT = 30.0
+STATE = Robot().tick()
+
+
+class NotingGateway:
+    """Keeps what is published; may hold up whoever publishes."""
+
+    def __init__(self):
+        self.published = []
+        self.free = threading.Event()
+        self.free.set()
+        self.news = threading.Event()
+
+    def publish(self, topic, data):
+        assert self.free.wait(WAIT)
+        self.published.append((topic, data))
+        self.news.set()
+
+
+def outlet(*, lossless=False, recorder=None):
+    gateway, made = NotingGateway(), Outlet(recorder, lossless=lossless)
+    made.open([gateway])
+    return gateway, made
+
+
+def test_messages_and_answers_go_out_in_their_order():
+    gateway, made = outlet()
+    made.event(Event(tick=1, kind="warning"))
+    made.state(STATE)
+    made.reply(lambda data: gateway.published.append(("reply", data)), b"answer")
+    assert gateway.published == []
+    made.hand_on()
+    assert [topic for topic, _ in gateway.published] == ["event", "state", "reply"]
+    assert decode_event(gateway.published[0][1]).tick == 1
+    assert decode_state(gateway.published[1][1]) == STATE
+
+
+def test_in_real_time_states_without_room_are_dropped_and_counted_and_events_are_not():
+    gateway, made = outlet()
+    for _ in range(MAX_WAITING + 10):
+        made.state(STATE)
+    made.event(Event(tick=1, kind="warning"))
+    made.hand_on()
+    assert made.dropped == 10
+    assert [topic for topic, _ in gateway.published] == ["state"] * MAX_WAITING + ["event"]
+
+
+def test_in_lockstep_the_robot_waits_for_room_and_nothing_is_lost():
+    gateway, made = outlet(lossless=True)
+    courier = Courier([made])
+    made.open([gateway], courier.wake)
+    gateway.free.clear()
+    courier.start()
+    states = MAX_WAITING + 500
+    robot = threading.Thread(target=lambda: [made.state(STATE) for _ in range(states)])
+    robot.start()
+    gateway.free.set()
+    robot.join(WAIT)
+    courier.close()
+    made.hand_on()
+    assert len(gateway.published) == states
+    assert made.dropped == 0
+
+
+def test_whoever_waits_for_room_goes_on_when_the_robot_is_about_to_end():
+    _, made = outlet(lossless=True)
+    robot = threading.Thread(target=lambda: [made.state(STATE) for _ in range(MAX_WAITING + 1)])
+    robot.start()
+    made.hurry()
+    robot.join(WAIT)
+    assert not robot.is_alive()
+    assert made.dropped <= 1
+
+
+def test_one_courier_empties_the_outlets_of_several_robots():
+    pairs = [outlet() for _ in range(3)]
+    courier = Courier([made for _, made in pairs])
+    courier.start()
+    for _, made in pairs:
+        made.state(STATE)
+    courier.wake()
+    for gateway, _ in pairs:
+        assert gateway.news.wait(WAIT)
+    courier.close()
+
+
+def test_a_gateway_that_fails_is_logged_and_the_next_message_goes_out(caplog):
+    gateway, made = outlet()
+    made.reply(lambda _: 1 / 0, b"")
+    made.state(STATE)
+    made.hand_on()
+    assert "ZeroDivisionError" in caplog.text
+    assert [topic for topic, _ in gateway.published] == ["state"]
+
+
+def test_the_last_state_is_told_again_to_those_who_come_late():
+    gateway, made = outlet()
+    made.repeat()
+    made.state(STATE)
+    made.repeat()
+    made.hand_on()
+    assert [topic for topic, _ in gateway.published] == ["state", "state"]

@@ -1,0 +1,95 @@
+"""Deadlines of several robots in one thread, on a clock that is a number."""
+
+from collections import Counter
+from fractions import Fraction
+from itertools import pairwise
+
+import pytest
+
+from tvist_server.schedule import CATCH_UP, MOMENTS, Schedule
+
+PERIOD = 0.002
+
+
+def played(robots, ticks, start=1000.0, delay=lambda _: 0.0):
+    """Ticks that begin when they are due, or a delay later: robot, beginning, lateness, missed; by their order."""
+    schedule, now, begun = Schedule(robots, PERIOD, start), start, []
+    for number in range(ticks):
+        now = max(now, schedule.due) + delay(number)
+        begun.append((*schedule.begin(now), now))
+    return [(robot, now, late, missed) for robot, late, missed, now in begun]
+
+
+@pytest.mark.parametrize("robots", range(1, MOMENTS + 1))
+def test_a_few_robots_take_turns_a_part_of_a_period_apart(robots):
+    begun = played(robots, 20 * robots)
+    assert [robot for robot, *_ in begun] == list(range(robots)) * 20
+    times = [now for _, now, *_ in begun]
+    apart = [after - before for before, after in pairwise(times)]
+    assert apart == pytest.approx([PERIOD / robots] * len(apart), abs=1e-9)
+    assert all(late == 0.0 and missed == 0 for _, _, late, missed in begun)
+
+
+@pytest.mark.parametrize("robots", [5, 16, 64])
+def test_of_many_as_many_are_due_at_each_of_a_period_s_moments(robots):
+    begun = played(robots, 20 * robots)
+    assert sorted(robot for robot, *_ in begun) == sorted(list(range(robots)) * 20)
+    moments = Counter(round((now - 1000.0) / PERIOD * MOMENTS) for _, now, *_ in begun)
+    assert len(moments) == 20 * MOMENTS
+    assert max(moments.values()) - min(moments.values()) <= 1
+    assert all(late == 0.0 and missed == 0 for _, _, late, missed in begun)
+
+
+def test_each_robot_s_ticks_are_a_period_apart_and_the_first_is_due_a_period_after_the_start():
+    begun = played(4, 40)
+    for robot in range(4):
+        own = [now for number, now, *_ in begun if number == robot]
+        assert own[0] == pytest.approx(1000.0 + PERIOD * (1.0 + robot / 4))
+        assert own == pytest.approx([own[0] + PERIOD * tick for tick in range(10)])
+
+
+def test_what_is_late_is_caught_up_and_the_deadlines_stay_where_they_were():
+    delayed = played(3, 300, delay=lambda number: 0.011 if number == 30 else 0.0)
+    punctual = played(3, 300)
+    assert delayed[-60:] == punctual[-60:]
+    late = [late for _, _, late, _ in delayed[30:33]]
+    assert late == pytest.approx([0.011, 0.011 - PERIOD / 3, 0.011 - 2 * PERIOD / 3])
+
+
+def test_each_robot_s_missed_ticks_are_its_own():
+    """5.5 periods of nothing: each robot's ticks that begin a period late or more are missed, and no others."""
+    robots, delay = 4, 5.5 * PERIOD
+    begun = played(robots, 40 * robots, delay=lambda number: delay if number == 10 * robots else 0.0)
+    for robot in range(robots):
+        own = [(late, missed) for number, _, late, missed in begun if number == robot]
+        assert all(missed == (late >= PERIOD) for late, missed in own)
+        # The first is late by the delay less its part of the period, each next one by a period less.
+        expected = int(Fraction(11, 2) - Fraction(robot, robots))
+        assert sum(missed for _, missed in own) == expected
+
+
+def test_a_tick_just_less_than_a_period_late_is_not_missed():
+    assert played(1, 2, delay=lambda _: 0.0019)[0][3] == 0
+    assert played(1, 2, delay=lambda _: 0.0021)[0][3] == 1
+
+
+@pytest.mark.parametrize("robots", [1, 5])
+def test_a_long_delay_is_made_up_for_by_fifty_ticks_of_each_robot_and_the_rest_is_left_out(robots):
+    periods = 200
+    ticks = robots * 300
+    begun = played(robots, ticks, delay=lambda number: periods * PERIOD if number == robots else 0.0)
+    for robot in range(robots):
+        own = [(now, late, missed) for number, now, late, missed in begun if number == robot]
+        burst = [late for _, late, _ in own if late >= PERIOD]
+        assert len(burst) <= CATCH_UP + 1
+        # Every period between two ticks is accounted for: it was ticked, or it was left out and counted.
+        assert sum(missed for *_, missed in own) == pytest.approx(periods, abs=1)
+        assert own[-1][1] == 0.0
+
+
+def test_after_minutes_the_deadlines_have_not_drifted():
+    robots, start = 3, 1e6
+    schedule, ticks = Schedule(robots, PERIOD, start), 300_000
+    for _ in range(ticks):
+        schedule.begin(schedule.due)
+    assert schedule.due == pytest.approx(start + PERIOD * (1 + ticks / robots), abs=1e-5)

@@ -1,0 +1,227 @@
+"""From one filter to another in motion: no step, nothing beyond the limits, and it comes to an end."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import tvist_shaping.fade as module
+from tvist_shaping import SHAPERS, Fade, FilterError, Fixed, Polynomial, ShapingError, TvistFilter, shaper
+
+H = 0.002
+VELOCITY, ACCELERATION, JERK = 1.5, 2.0, 100.0
+TOLERANCE = 5e-3
+"""Share of the acceleration limit: 0.3 % was the most in 500 random motions."""
+names = st.sampled_from(list(SHAPERS))
+seeds = st.integers(0, 2**32 - 1)
+VARYING = Polynomial(
+    joints=[0],
+    basis="angles",
+    degree=1,
+    f_d_coefficients=[6.7, 3.32],
+    zeta_coefficients=[0.34, -0.08],
+    f_d_range=(5.0, 17.0),
+    zeta_range=(0.05, 0.5),
+)
+
+
+def double_s(way, share=1.0):
+    """A motion at a share of the limits, as a convolution of three boxes, and half a second of rest after it."""
+    way = np.asarray(way, dtype=float)
+    velocity, acceleration, jerk = share * VELOCITY, share**2 * ACCELERATION, share**3 * JERK
+    longest = np.abs(way).max()
+    velocity = min(velocity, np.sqrt(longest * acceleration))
+    times = (longest / velocity, velocity / acceleration, acceleration / jerk)
+    profile = np.ones(1)
+    for time in times:
+        ticks = int(np.ceil(time / H))
+        profile = np.convolve(profile, np.full(ticks, 1.0 / ticks))
+    return np.concatenate([np.cumsum(profile), np.ones(250)])[:, None] * way
+
+
+def a_filter(random, name, joints=3):
+    estimator = (
+        VARYING if random.random() < 0.3 else Fixed([random.uniform(5, 15)], [random.uniform(0.02, 0.4)])
+    )
+    return TvistFilter(shaper(name), estimator, joints=joints)
+
+
+def fade(old, new, velocity=VELOCITY, acceleration=ACCELERATION, jerk=JERK):
+    return Fade(old, new, velocity=velocity, acceleration=acceleration, jerk=jerk)
+
+
+def run(reference, old, new, switch):
+    """Output; share of the new filter; what each filter alone gave, the new one from the switch on."""
+    output, shares, alone = [], [], []
+    fading = None
+    for tick, x in enumerate(reference):
+        if tick == switch:
+            fading = fade(old, new)
+        shaped = old.filter(x) if fading is None else fading.filter(x)
+        output.append(shaped)
+        shares.append(0.0 if fading is None else fading.share)
+        both = (shaped, shaped) if fading is None or fading.finished else fading._history[:2, 2]
+        alone.append(np.array(both))
+    return np.array(output), np.array(shares), np.array(alone)
+
+
+def excess(output, alone, order, limit):
+    """Largest derivative over the larger of the limit and what the filters alone give, as a ratio."""
+    own, each = (np.abs(np.diff(x, order, axis=0)) / H**order for x in (output, alone))
+    return (own / np.maximum(limit, each.max(axis=1))).max()
+
+
+@settings(max_examples=30)
+@given(names, names, seeds, st.floats(0.0, 1.0), st.sampled_from([1.0, 1.0, 0.8, 0.5]))
+def test_a_change_anywhere_in_a_motion_keeps_its_limits_and_ends_at_its_target(
+    first, then, seed, when, share
+):
+    random = np.random.default_rng(seed)
+    reference = double_s(random.uniform(-1, 1, 3) * random.uniform(0.05, 3.0), share)
+    switch = int(when * (len(reference) - 250))
+    old, new = a_filter(random, first), a_filter(random, then)
+    output, shares, alone = run(reference, old, new, switch)
+    assert excess(output, alone, 2, ACCELERATION) < 1.0 + TOLERANCE
+    assert excess(output, alone, 1, VELOCITY) < 1.0 + 1e-6
+    np.testing.assert_array_equal(output[-1], reference[-1])
+    assert shares[-1] == 1.0
+    assert (np.diff(shares) >= 0.0).all()
+    # A straight line stays one.
+    way = reference[-1]
+    along = output @ way / (way @ way)
+    np.testing.assert_allclose(output, along[:, None] * way, atol=1e-9)
+
+
+@settings(max_examples=30)
+@given(names, names, seeds)
+def test_whatever_the_reference_does_the_output_is_between_the_two(first, then, seed):
+    random = np.random.default_rng(seed)
+    reference = np.cumsum(random.normal(size=(300, 3)), axis=0) * random.choice([1e-4, 1e-2, 1.0])
+    output, shares, alone = run(reference, a_filter(random, first), a_filter(random, then), 100)
+    assert np.isfinite(output).all()
+    assert (output >= alone.min(axis=1) - 1e-9).all()
+    assert (output <= alone.max(axis=1) + 1e-9).all()
+    assert ((shares >= 0.0) & (shares <= 1.0)).all()
+
+
+@pytest.mark.parametrize(("first", "then"), [("zv", "zvd"), ("zvd", "zv"), ("none", "ei"), ("zv", "none")])
+def test_with_room_to_spare_a_fade_is_over_within_three_seconds(first, then):
+    reference = double_s([2.0, -1.0, 0.5], 0.5)
+    old, new = (TvistFilter(shaper(name), Fixed([7.0], [0.1]), joints=3) for name in (first, then))
+    switch = len(reference) // 4
+    _, shares, _ = run(reference, old, new, switch)
+    assert 0.3 < (np.argmax(shares == 1.0) - switch) * H < 3.0
+
+
+def test_longer_delays_come_in_a_cruise_at_the_limit_and_shorter_ones_wait_until_there_is_room():
+    reference = double_s([3.0])
+    cruise = slice(500, 1000)
+    names = [("none", "zv"), ("zv", "none")]
+    shares = []
+    for pair in names:
+        old, new = (TvistFilter(shaper(name), Fixed([7.0], [0.1]), joints=1) for name in pair)
+        output, share, alone = run(reference, old, new, cruise.start)
+        assert excess(output, alone, 2, ACCELERATION) < 1.0 + TOLERANCE
+        shares.append(share[cruise.stop])
+    assert shares[0] > 0.9
+    assert shares[1] < 1e-3
+
+
+def test_a_joint_does_not_turn_back_for_a_fade():
+    reference = double_s([1.0])
+    old, new = (TvistFilter(shaper(name), Fixed([7.0], [0.1]), joints=1) for name in ("none", "ei3"))
+    for switch in range(0, len(reference) - 250, 40):
+        output, _, _ = run(reference, old, new, switch)
+        assert np.diff(output, axis=0).min() > -1e-8
+        old.reset([0.0])
+
+
+def test_it_begins_as_the_old_filter_and_ends_as_the_new_bit_for_bit():
+    random = np.random.default_rng(0)
+    reference = double_s([0.5, -0.8, 0.3], 0.5)
+    old, new = a_filter(random, "zv"), a_filter(random, "ei")
+    old_alone, new_alone = old.replace(), None
+    output, shares, _ = run(reference, old, new, 200)
+    begun, over = np.argmax(shares > 0.0), np.argmax(shares == 1.0)
+    assert 200 < begun < over < len(reference) - 250
+    for tick, (x, shaped) in enumerate(zip(reference, output, strict=True)):
+        own = old_alone.filter(x)
+        if tick == 199:
+            new_alone = a_filter(random, "ei").replace(estimator=new.estimator)
+            new_alone.take_over(old_alone)
+        elif tick > 199:
+            other = new_alone.filter(x)
+        if tick < begun:
+            np.testing.assert_array_equal(shaped, own)
+        if tick >= over:
+            np.testing.assert_array_equal(shaped, other)
+
+
+def test_at_rest_a_fade_is_over_at_once_and_nothing_moves():
+    old = TvistFilter(shaper("ei3"), Fixed([7.0], [0.1]), joints=2)
+    old.reset([1.0, 2.0])
+    fading = fade(old, TvistFilter(shaper("zv"), VARYING, joints=2))
+    for _ in range(3):
+        assert not fading.finished
+        np.testing.assert_array_equal(fading.filter([1.0, 2.0]), [1.0, 2.0])
+    assert fading.finished
+
+
+def test_a_filter_that_takes_over_goes_on_as_if_it_had_been_there_all_along():
+    reference = double_s([1.0, -0.5], 0.7)[:400]
+    for capacity in (1.0, 0.5, 2.0):
+        there, other = (
+            TvistFilter(shaper(name), Fixed([7.0], [0.1]), joints=2, max_delay=max_delay)
+            for name, max_delay in (("ei2", capacity), ("zv", 1.0))
+        )
+        for x in reference:
+            there.filter(x)
+            other.filter(x)
+        late = TvistFilter(shaper("ei2"), Fixed([7.0], [0.1]), joints=2, max_delay=capacity)
+        late.take_over(other)
+        for x in reference[::-1]:
+            np.testing.assert_array_equal(late.filter(x), there.filter(x))
+
+
+def test_without_numba_the_same_comes_out(monkeypatch):
+    outputs = []
+    for function in (module.blend, module.blend.py_func):
+        monkeypatch.setattr(module, "blend", function)
+        random = np.random.default_rng(1)
+        outputs.append(
+            run(double_s([1.0, 0.5, -0.7]), a_filter(random, "zv"), a_filter(random, "ei"), 300)[0]
+        )
+    np.testing.assert_allclose(*outputs, atol=1e-9)
+
+
+def test_the_same_comes_out_the_same():
+    outputs = []
+    for _ in range(2):
+        random = np.random.default_rng(1)
+        outputs.append(
+            run(double_s([1.0, 0.5, -0.7]), a_filter(random, "zv"), a_filter(random, "ei"), 300)[0]
+        )
+    np.testing.assert_array_equal(*outputs)
+
+
+@pytest.mark.parametrize(
+    "limits", [{"velocity": 0.0}, {"acceleration": float("nan")}, {"jerk": float("inf")}]
+)
+def test_limits_out_of_range_are_refused_by_name(limits):
+    old, new = (TvistFilter(shaper("zv"), Fixed([7.0], [0.1]), joints=1) for _ in range(2))
+    with pytest.raises(FilterError, match=next(iter(limits))):
+        fade(old, new, **limits)
+
+
+def test_filters_that_do_not_go_together_are_refused():
+    one, two = (TvistFilter(shaper("zv"), Fixed([7.0], [0.1]), joints=joints) for joints in (1, 2))
+    with pytest.raises(ShapingError, match="shape"):
+        fade(one, two)
+    slow = TvistFilter(shaper("zv"), Fixed([7.0], [0.1]), joints=1, period=0.004)
+    with pytest.raises(FilterError, match="period"):
+        fade(one, slow)
+
+
+def test_a_fade_prints_where_it_is():
+    one = TvistFilter(shaper("zv"), Fixed([7.0], [0.1]), joints=1)
+    assert repr(fade(one, one.replace())).endswith("share=0.000)")

@@ -1,0 +1,255 @@
+"""Links that break, stand still, are slow, or carry what is no Zenoh."""
+
+import random
+import socket
+import subprocess
+import sys
+from contextlib import contextmanager
+from itertools import pairwise
+
+import pytest
+from tests.conformance.served import PATIENCE, free_endpoint
+from tests.conformance.wire import Q1, STOPPED, TICK, Wire
+
+from tvist_client import NotConnectedError
+from tvist_client.blocking import Robot
+
+from .bystander import Bystander
+from .proxy import Proxy
+
+FAR = [2.0, *Q1[1:]]
+DOWN = 1500
+"""Ticks for which a link is down: 3 s."""
+
+
+@pytest.fixture
+def bystander(realtime):
+    """Somebody else, and the arm at Q1."""
+    with Wire(realtime.endpoint) as home, home.control("home"):
+        pass
+    with Bystander(realtime.endpoint) as bystander:
+        yield bystander
+
+
+@pytest.fixture
+def proxy(realtime):
+    with Proxy(realtime.endpoint) as proxy:
+        yield proxy
+
+
+@pytest.mark.slow
+def test_a_link_cut_for_3_s_ends_control_and_motion_at_once_and_the_client_is_back_by_itself(
+    proxy, bystander, measured
+):
+    with Wire(proxy.endpoint) as wire:
+        wire.listen("state", "event")
+        wire.announce("far")
+        token = wire.command("take_control", client="far")["token"]
+        motion = wire.command("move_j", token=token, q=FAR)["id"]
+        cut = bystander.next("state", lambda state: state["target_qd"][0] > 0.2)["tick"]
+        proxy.cut()
+        lost = bystander.event("lease_lost")
+        measured("from the cut to lease_lost [s of tick time]", round((lost["tick"] - cut) * TICK, 3))
+        stopped = bystander.event("motion_stopped")
+        assert (stopped["id"], stopped["tick"]) == (motion, lost["tick"])
+        assert (lost["tick"] - cut) * TICK < 0.3
+        assert "far" in lost["why"]
+        bystander.until(cut + DOWN)
+        proxy.restore()
+        restored = bystander.until_later()["tick"]
+        back = wire.wait("state", lambda state: state["tick"] >= restored)
+        measured(
+            "from the link's return to the first state [s of tick time]", (back["tick"] - restored) * TICK
+        )
+        refused = wire.command("keep_alive", token=token)
+        assert (refused["type"], refused["code"]) == ("refused", "no_control")
+        with wire.control("far") as token:
+            assert wire.command("keep_alive", token=token) == {"type": "done"}
+    assert proxy.connections == 2
+    bystander.assert_undisturbed()
+
+
+@pytest.mark.slow
+def test_the_python_client_says_that_the_link_is_gone_and_is_back_by_itself(proxy, bystander):
+    with Robot.connect(proxy.endpoint) as robot:
+        states = robot.states()
+        next(states)
+        with robot.control("far") as arm:
+            arm.move_j(FAR, wait=False)
+            bystander.next("state", lambda state: state["target_qd"][0] > 0.2)
+            proxy.cut()
+            with pytest.raises(NotConnectedError, match="this client finds it again when it is back"):
+                for _ in states:
+                    pass
+            with pytest.raises(NotConnectedError):
+                arm.stop()
+            bystander.event("motion_stopped")
+        proxy.restore()
+        restored = bystander.until_later()["tick"]
+        bystander.until(restored + 10)
+        assert next(state for state in robot.states() if state.tick > restored)
+        with robot.control("far") as arm:
+            arm.stop()
+    bystander.assert_undisturbed()
+
+
+@pytest.mark.slow
+def test_a_link_that_stands_still_for_3_s_ends_the_stream_and_loses_states_but_no_event(
+    proxy, bystander, measured
+):
+    """A cable that is pulled and put back: both ends keep the connection."""
+    with Wire(proxy.endpoint) as wire:
+        wire.listen("state", "event")
+        token = wire.command("take_control", client="far", lease_s=10.0)["token"]
+        assert wire.command("servo_start", token=token, period=0.008) == {"type": "done"}
+        tick = wire.state()["tick"]
+        for sequence in range(50):
+            tick = wire.until(tick + 4)["tick"]
+            wire.setpoint(token=token, sequence=sequence, q=Q1)
+        bystander.wait("state", lambda state: (state["setpoint_sequence"] or 0) >= 49)
+        proxy.hold()
+        held = bystander.until_later()["tick"]
+        for sequence in range(50, 100):  # on their way when it stood still
+            wire.setpoint(token=token, sequence=sequence, q=FAR)
+        stopped = bystander.event("stream_stopped")
+        assert stopped["tick"] - held <= 130
+        at = bystander.next("state", lambda state: state["runtime_state"] == STOPPED)["target_q"]
+        before = bystander.until(held + DOWN) and bystander.next("telemetry")
+        proxy.flow()
+        # The same session and the same lease; events that waited are told late, and set-points move nothing.
+        assert wire.command("keep_alive", token=token) == {"type": "done"}
+        wire.wait(
+            "event", lambda event: event["kind"] == "stream_stopped" and event["tick"] == stopped["tick"]
+        )
+        refused = bystander.next(
+            "telemetry", lambda told: told["setpoints_refused"] >= before["setpoints_refused"] + 50
+        )
+        assert bystander.until_later()["target_q"] == at
+        wire.until(refused["tick"])
+        ticks = [state["tick"] for state in wire.received["state"]]
+        assert all(later > earlier for earlier, later in pairwise(ticks))
+        measured("states missing after 3 s", ticks[-1] - ticks[0] + 1 - len(ticks))
+        assert wire.command("release_control", token=token) == {"type": "done"}
+    assert proxy.connections == 1
+    bystander.assert_undisturbed()
+
+
+ROUTER = """
+import json, sys, threading, zenoh
+config = zenoh.Config()
+for path, value in {
+    "mode": "router",
+    "connect/endpoints": [sys.argv[1]],
+    "listen/endpoints": [sys.argv[2]],
+    "scouting/delay": 0,
+    "scouting/multicast/enabled": False,
+}.items():
+    config.insert_json5(path, json.dumps(value))
+session = zenoh.open(config)
+print("routes", flush=True)
+threading.Event().wait()
+"""
+
+
+@contextmanager
+def router(robot, endpoint):
+    """A Zenoh router of its own between clients and a robot; it is killed at the end."""
+    process = subprocess.Popen([sys.executable, "-c", ROUTER, robot, endpoint], stdout=subprocess.PIPE)
+    try:
+        assert process.stdout.readline() == b"routes\n"
+        yield process
+    finally:
+        process.kill()
+        process.wait(PATIENCE)
+        process.stdout.close()
+
+
+@pytest.mark.slow
+def test_a_router_in_the_middle_that_is_killed_ends_control_and_the_next_one_brings_the_client_back(
+    realtime, bystander, measured
+):
+    middle = free_endpoint()
+    with router(realtime.endpoint, middle):
+        wire = Wire(middle)
+        wire.listen("event").state()
+        wire.announce("far")
+        token = wire.command("take_control", client="far")["token"]
+        motion = wire.command("move_j", token=token, q=FAR)["id"]
+        killed = bystander.next("state", lambda state: state["target_qd"][0] > 0.2)["tick"]
+    with wire:
+        lost = bystander.event("lease_lost")
+        assert bystander.event("motion_stopped")["id"] == motion
+        measured("from the router's end to lease_lost [s of tick time]", (lost["tick"] - killed) * TICK)
+        with router(realtime.endpoint, middle):
+            began = bystander.until_later()["tick"]
+            wire.wait("state", lambda state: state["tick"] >= began)
+            assert wire.command("keep_alive", token=token)["code"] == "no_control"
+            with wire.control("far"):
+                pass
+            bystander.assert_undisturbed()
+
+
+def test_a_link_of_50_ms_each_way_brings_everything_50_ms_late(proxy, bystander):
+    proxy.delay = 0.05
+    with Wire(proxy.endpoint) as wire:
+        wire.listen("state", "event")
+        with wire.control("far") as token:
+            motion = wire.command("move_j", token=token, q=[0.1, *Q1[1:]])["id"]
+            done = wire.wait("event", lambda event: event["kind"] == "motion_done")
+            assert done["id"] == motion
+            wire.until(done["tick"] + 50)
+        ticks = [state["tick"] for state in wire.received["state"]]
+        assert ticks == list(range(ticks[0], ticks[-1] + 1))
+    bystander.assert_undisturbed()
+
+
+@pytest.mark.slow
+def test_on_a_link_for_two_fifths_of_the_states_the_others_are_dropped_and_answers_go_first(
+    proxy, bystander, measured
+):
+    with Wire(proxy.endpoint) as wire:
+        wire.listen("state", "event")
+        with wire.control("far", lease_s=10.0) as token:
+            proxy.rate = 200_000  # bytes a second; the states need half a million
+            began = bystander.until_later(1500)["tick"]
+            motion = wire.command("move_j", token=token, q=[0.1, *Q1[1:]])["id"]
+            assert wire.wait("event", lambda event: event["kind"] == "motion_done")["id"] == motion
+            bystander.until(began + 1500)
+            asked = bystander.until_later()["tick"]
+            assert wire.command("keep_alive", token=token) == {"type": "done"}
+            late = bystander.received["state"][-1]["tick"] - wire.received["state"][-1]["tick"]
+            measured(
+                "from a command to its answer [s of tick time]",
+                (bystander.until_later()["tick"] - asked) * TICK,
+            )
+            measured("how late states are [s of tick time]", late * TICK)
+            assert late < 1250  # were nothing dropped, they would be 1800 late, and more from tick to tick
+            proxy.rate = None
+            wire.until(bystander.until_later()["tick"])
+        ticks = [state["tick"] for state in wire.received["state"]]
+        assert all(later > earlier for earlier, later in pairwise(ticks))
+        measured("states dropped for this client", ticks[-1] - ticks[0] + 1 - len(ticks))
+    bystander.assert_undisturbed()
+
+
+def test_garbage_on_the_port_is_ignored_and_those_who_send_it_are_dropped(realtime, bystander):
+    rng = random.Random(0)
+    host, port = realtime.endpoint.partition("/")[2].split(":")
+    connections = [socket.create_connection((host, int(port))) for _ in range(100)]
+    for number, connection in enumerate(connections):
+        garbage = rng.randbytes(rng.randrange(1, 5000))
+        if number % 2:  # Zenoh begins each batch by its length
+            garbage = len(garbage).to_bytes(2, "little") + garbage
+        connection.sendall((b"GET / HTTP/1.1\r\n\r\n", garbage)[number % 5 > 0])
+    with Wire(realtime.endpoint) as wire:
+        assert wire.info()["type"] == "info"
+    for connection in connections:
+        connection.settimeout(PATIENCE)
+        try:
+            while connection.recv(4096):
+                pass
+        except ConnectionResetError:
+            pass
+        connection.close()
+    bystander.assert_undisturbed()
+    realtime.assert_quiet()

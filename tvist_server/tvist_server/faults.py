@@ -1,0 +1,88 @@
+"""Faults caused on purpose: what `simulation.inject` asks for, done to the arm or the safety system."""
+
+import heapq
+from collections.abc import Callable
+from itertools import count
+
+import numpy as np
+
+from tvist_plant.plant import PERIOD
+from tvist_protocol.commands import SimulationInject
+from tvist_protocol.faults import FAULTS
+from tvist_server.motion import MotionControl
+from tvist_server.refusal import RefusalError
+
+
+class Faults:
+    """Begins faults, and ends those that last.
+
+    Args:
+        motion: What they happen to.
+    """
+
+    def __init__(self, motion: MotionControl) -> None:
+        self._motion = motion
+        self._push = np.zeros(motion.cycle.description.joints)
+        self._ends: list[tuple[int, int, Callable[[], None]]] = []
+        self._number = count()
+
+    def inject(self, command: SimulationInject, tick: int) -> None:
+        """Begin a fault.
+
+        Args:
+            command: Which one.
+            tick: The next one.
+
+        Raises:
+            RefusalError: There is none of that name, a field it needs is missing, or one it has not is there.
+        """
+        _check(command, self._motion.cycle.description.joints)
+        motion, ticks = self._motion, None if command.seconds is None else round(command.seconds / PERIOD)
+        match command.fault:
+            case "protective_stop":
+                motion.protect("a protective stop was injected")
+            case "reduced" | "normal":
+                motion.reduce(reduced=command.fault == "reduced")
+                if ticks is not None:
+                    self._at(tick + ticks, lambda: motion.reduce(reduced=False))
+            case "nan":
+                motion.cycle.arm.spoil()
+            case "torque":
+                joint, value = command.joint or 0, command.value or 0.0
+                self._add(joint, value)
+                self._at(tick + (ticks or 0), lambda: self._add(joint, -value))
+
+    def end(self, tick: int) -> None:
+        """End those that are over before a tick."""
+        while self._ends and self._ends[0][0] <= tick:
+            heapq.heappop(self._ends)[-1]()
+
+    def clear(self) -> None:
+        """Let go of the arm."""
+        self._ends.clear()
+        self._push[:] = 0.0
+        self._motion.cycle.arm.push(self._push)
+
+    def _at(self, tick: int, end: Callable[[], None]) -> None:
+        heapq.heappush(self._ends, (tick, next(self._number), end))
+
+    def _add(self, joint: int, torque: float) -> None:
+        self._push[joint] += torque
+        self._motion.cycle.arm.push(self._push)
+
+
+def _check(command: SimulationInject, joints: int) -> None:
+    fault = FAULTS.get(command.fault)
+    if fault is None:
+        why = f"fault is {command.fault!r}: there is {', '.join(FAULTS)}"
+        raise RefusalError("unknown_fault", "fault", why)
+    for field in ("joint", "value", "seconds"):
+        given = getattr(command, field) is not None
+        if field in fault.needs and not given:
+            raise RefusalError("missing_field", field, f"{field} is missing: fault {command.fault} needs it")
+        if given and field not in (*fault.needs, *fault.may):
+            why = f"{field} does not belong to fault {command.fault}"
+            raise RefusalError("out_of_range", field, why)
+    if command.joint is not None and command.joint >= joints:
+        why = f"joint is {command.joint}; the arm's joints are 0 to {joints - 1}"
+        raise RefusalError("out_of_range", "joint", why, joints - 1)

@@ -1,0 +1,57 @@
+"""The state a robot starts in, from a file: the fields of `simulation.reset`."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from tvist_protocol.values import Joints, Name, Payload, ResetMode, Seed
+from tvist_server.setup import Setup
+
+
+class InitialState(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is None is as without the file."""
+
+    q: Joints | None = None
+    """Where the arm rests, one angle a joint [rad]."""
+    seed: Seed | None = None
+    """Of sensor noise and gear errors."""
+    payload: Payload | None = None
+    """What the arm carries, whatever is declared."""
+    mode: ResetMode | None = None
+    """Robot mode."""
+    shaper: Name | None = None
+    """Shaper."""
+
+    def on(self, setup: Setup) -> Setup:
+        """A start with this state instead of its own, where there is something."""
+        given: dict[str, Any] = {
+            "q": self.q,
+            "seed": self.seed,
+            "carried": self.payload,
+            "mode": self.mode,
+            "shaper": self.shaper,
+        }
+        return replace(setup, **{name: value for name, value in given.items() if value is not None})
+
+
+class InitialStateError(ValueError):
+    """A file holds no state to start in; the sentence says why."""
+
+
+def read_state(path: str) -> InitialState:
+    """Read a TOML file, or a JSON file where its name ends so.
+
+    Raises:
+        InitialStateError: It cannot be read, or a field is unknown or out of range.
+    """
+    decoder = msgspec.json if Path(path).suffix == ".json" else msgspec.toml
+    try:
+        state: InitialState = decoder.decode(Path(path).read_bytes(), type=InitialState)
+        return state  # noqa: TRY300  it is one step
+    except OSError as error:
+        raise InitialStateError(f"state {path}: {error.strerror}") from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise InitialStateError(f"state {path}: {error}") from error

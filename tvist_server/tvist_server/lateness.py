@@ -1,0 +1,45 @@
+"""How late a robot's ticks began."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+KEPT = 4096
+"""Ticks that are looked back on at most: eight seconds, where a look is due every second."""
+
+
+@dataclass(frozen=True)
+class Punctuality:
+    """Lateness of the ticks since the last look."""
+
+    ticks: int
+    seconds: float
+    p50_us: float
+    p99_us: float
+    max_us: float
+
+
+class Lateness:
+    """Noted by one thread, looked at by another."""
+
+    def __init__(self) -> None:
+        self._late = np.zeros(KEPT)
+        self._count = 0
+        self._looked, self._looked_at = 0, time.monotonic()
+
+    def note(self, late: float) -> None:
+        """A tick began so late [s]."""
+        self._late[self._count % KEPT] = late
+        self._count += 1
+
+    def look(self) -> Punctuality:
+        """Lateness since the last look."""
+        count, now = self._count, time.monotonic()
+        late = self._late[np.arange(max(self._looked, count - KEPT), count) % KEPT] * 1e6
+        seconds, ticks = now - self._looked_at, count - self._looked
+        self._looked, self._looked_at = count, now
+        if not len(late):
+            return Punctuality(0, seconds, 0.0, 0.0, 0.0)
+        p50, p99 = np.percentile(late, (50, 99))
+        return Punctuality(ticks, seconds, float(p50), float(p99), float(late.max()))

@@ -1,0 +1,122 @@
+"""The last second before a failure: kept in memory, written to a file when the arm's simulation has failed."""
+
+import logging
+import os
+from collections import deque
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from threading import Thread
+from typing import Any, Protocol
+
+from tvist_protocol.info import Info
+from tvist_protocol.journal import Entry
+from tvist_protocol.recorded import Recorded
+from tvist_protocol.stream import Event, State, Truth
+from tvist_server.recording.recorder import Recorder, RecordingError
+
+log = logging.getLogger(__name__)
+
+KEPT = 500
+"""Ticks before the failure, one second."""
+MOST_FILES = 10
+"""Files of one robot: one that fails again and again does not fill the disk."""
+
+
+class Recording(Protocol):
+    """What takes the messages, too."""
+
+    def state(self, state: State) -> None:
+        """Record a state."""
+
+    def event(self, event: Event) -> None:
+        """Record an event."""
+
+    def truth(self, truth: Truth) -> None:
+        """Record what no robot can know."""
+
+    def journal(self, entry: Entry) -> None:
+        """Record what reached the controller."""
+
+
+class BlackBox:
+    """Stands before a recorder, where there is one; nothing here waits or raises.
+
+    Args:
+        folder: For the files.
+        info: The robot as it says of itself; asked when a file is written.
+        start: How the server was started, as in every recording.
+        recorder: Gets every message, too.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        info: Callable[[], Info],
+        start: Mapping[str, Any],
+        recorder: Recording | None,
+    ) -> None:
+        self._folder, self._info, self._start = folder, info, start
+        self._recorder = recorder
+        self._kept: deque[Recorded] = deque()
+        self._failed = False
+        self._written = 0
+
+    def state(self, state: State) -> None:
+        """Keep a state; the first one after a failure is the last of its file."""
+        kept = self._kept
+        kept.append(state)
+        while kept[0].tick < state.tick - KEPT:
+            kept.popleft()
+        if self._recorder is not None:
+            self._recorder.state(state)
+        if self._failed:
+            self._failed = False
+            self._write(state.tick)
+
+    def event(self, event: Event) -> None:
+        """Keep an event."""
+        self._kept.append(event)
+        if self._recorder is not None:
+            self._recorder.event(event)
+        self._failed |= event.code == "plant_failure"
+
+    def truth(self, truth: Truth) -> None:
+        """Keep what no robot can know."""
+        self._kept.append(truth)
+        if self._recorder is not None:
+            self._recorder.truth(truth)
+
+    def journal(self, entry: Entry) -> None:
+        """Keep what reached the controller."""
+        self._kept.append(entry)
+        if self._recorder is not None:
+            self._recorder.journal(entry)
+
+    def _write(self, tick: int) -> None:
+        if self._written < MOST_FILES:
+            self._written += 1
+            info = self._info()
+            path = self._folder / f"tvist-{info.name}-{os.getpid()}-{tick}.mcap"
+            messages = list(self._kept)
+            Thread(
+                target=self._write_file, args=(path, info, messages), name="black-box", daemon=True
+            ).start()
+
+    def _write_file(self, path: Path, info: Info, messages: list[Recorded]) -> None:
+        try:
+            with Recorder(path, info, self._start, wait=True) as recorder:
+                for message in messages:
+                    match message:
+                        case State():
+                            recorder.state(message)
+                        case Event():
+                            recorder.event(message)
+                        case Truth():
+                            recorder.truth(message)
+                        case Entry():
+                            recorder.journal(message)
+        except RecordingError as error:
+            log.error("the last second before the failure is lost: %s", error)  # noqa: TRY400  the sentence says it
+        else:
+            why = recorder.error or f"the last second before it is in {path}: look with tvist analyze {path}"
+            log.error("robot %s: the simulated arm failed; %s", info.name, why)
