@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tvist_plant.description import Payload, RobotDescription, Tensor
 from tvist_plant.drives import DriveCommand
+from tvist_plant.model import FLANGE
 
 Floats = NDArray[np.float64]
 
@@ -60,6 +61,7 @@ class SecondOpinion:
         self._joints = dofs([_joint(number) for number in range(description.joints)])
         self._motors = dofs([_motor(number) for number in range(description.joints)])
         self._flexes = dofs([_flex(number, axis) for number in links for axis in "yz"])
+        self._flange = self._model.body(FLANGE).id
         self._flex_stiffness = np.repeat(description.link_flexibility.stiffness, 2)
         self._s = np.zeros(description.joints)
         self._command = np.zeros((3, description.joints))
@@ -98,6 +100,15 @@ class SecondOpinion:
             mujoco.mj_step(self._model, data)
         self._command = end
         return self._q()
+
+    def flange(self) -> tuple[Floats, Floats]:
+        """Specific force in the flange frame [m/s^2], shape (3,), and its orientation, shape (3, 3)."""
+        model, data = self._model, self._data
+        mujoco.mj_forward(model, data)
+        mujoco.mj_rnePostConstraint(model, data)  # accelerations in MuJoCo include gravity's
+        felt = np.zeros(6)
+        mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_XBODY, self._flange, felt, 1)
+        return felt[3:], np.array(data.xmat[self._flange]).reshape(3, 3)
 
     def _q(self) -> Floats:
         return np.array(self._data.qpos[self._joints])
@@ -166,6 +177,7 @@ def _build(description: RobotDescription, payload: Payload, timestep: float) -> 
         )
         gear.wrap_joint(_joint(number), 1.0)
         gear.wrap_joint(_motor(number), -1.0)
+    frame.name = FLANGE
     if payload.mass > 0.0:
         _add_mass(frame.add_body(), payload.mass, payload.com, payload.inertia)
     return spec.compile()

@@ -22,6 +22,8 @@ class Filter(ABC):
         period: h [s].
         f_d: Damped frequencies it works with [Hz], shape (modes,).
         zeta: Damping ratios it works with [-], shape (modes,).
+        excess: By what share the shaped acceleration may exceed the reference's, as far as it is known and kept
+            small: who makes the reference can stay that much below a limit [-].
         clipped: Whether it could not do what it should at the last tick: a delay was beyond what it holds.
     """
 
@@ -31,6 +33,7 @@ class Filter(ABC):
     period: float
     f_d: Floats
     zeta: Floats
+    excess: float
     clipped: bool
 
     def __init__(self, name: str, estimator: Estimator, joints: int, period: float, capacity: int) -> None:
@@ -52,7 +55,7 @@ class Filter(ABC):
             raise FilterError("period", period, "a finite number of seconds above 0")
         self.name, self.estimator = name, estimator
         self.joints, self.period = joints, period
-        self.clipped = False
+        self.excess, self.clipped = 0.0, False
         self._line = DelayLine(joints, capacity)
         self._q_star: Floats = np.zeros(joints)
 
@@ -60,6 +63,11 @@ class Filter(ABC):
     @abstractmethod
     def delay(self) -> float:
         """Time of the last weight of the last tick [s]: how much later the shaped reference ends."""
+
+    @property
+    @abstractmethod
+    def mean_delay(self) -> float:
+        """Of the weights of the last tick [s]: how far the shaped reference trails one of constant velocity."""
 
     @abstractmethod
     def _start(self) -> None:

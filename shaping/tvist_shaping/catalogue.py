@@ -1,45 +1,67 @@
 """The shapers by name."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from difflib import get_close_matches
 from types import MappingProxyType
 
-from tvist_shaping import impulses
+from tvist_shaping import exact, impulses, unity
 from tvist_shaping.errors import UnknownShaperError
-from tvist_shaping.impulses import Impulses
-
-
-@dataclass(frozen=True, slots=True)
-class Shaper:
-    """A shaper as the filter takes it; one of your own is made the same way.
-
-    Attributes:
-        name: What it is called on the wire and in tables.
-        description: What it does, in one line.
-        function: (f_d [Hz], ζ [-]) -> impulses of one mode.
-        duration_periods: Time of the last impulse in damped periods, whatever f_d and ζ [-].
-        zeta_max: Damping ratios must stay below this [-].
-    """
-
-    name: str
-    description: str
-    function: Callable[[float, float], Impulses]
-    duration_periods: float
-    zeta_max: float = 1.0
-
+from tvist_shaping.makers import si_of
+from tvist_shaping.shaper import Shaper
 
 SHAPERS: Mapping[str, Shaper] = MappingProxyType(
     {
         entry.name: entry
         for entry in (
             Shaper("none", "no shaping", impulses.none, 0.0),
-            Shaper("zv", "zero vibration: the shortest, the paper's", impulses.zv, 0.5),
+            Shaper(
+                "um_zv",
+                "unity magnitude: shorter than zv, up to 3 times the acceleration",
+                unity.um_zv,
+                unity.UM_ZV.duration_periods,
+                unity.UM_ZV.zeta_max,
+                peak=3.0,
+            ),
+            Shaper("zv", "zero vibration: the shortest that keeps the limits, the paper's", impulses.zv, 0.5),
             Shaper("mzv", "modified zero vibration: a little longer, a little wider", impulses.mzv, 0.75),
+            Shaper(
+                "um_zvd",
+                "unity magnitude: shorter than zvd, up to 5 times the acceleration",
+                unity.um_zvd,
+                unity.UM_ZVD.duration_periods,
+                unity.UM_ZVD.zeta_max,
+                peak=5.0,
+            ),
             Shaper("zvd", "zero vibration and derivative: forgives 14 % of frequency", impulses.zvd, 1.0),
             Shaper("ei", "extra-insensitive: as long as zvd, forgives 20 %", impulses.ei, 1.0),
+            Shaper(
+                "ei_exact",
+                "ei with 5 % at f_d whatever the damping: forgives more there",
+                exact.ei_exact,
+                exact.EI.duration_periods,
+                exact.EI.zeta_max,
+            ),
+            si_of(
+                0.75, 1.25, name="si", description="specified insensitivity: the shortest that forgives 25 %"
+            ),
+            Shaper("zvdd", "zero vibration and two derivatives: forgives 24 %", impulses.zvdd, 1.5),
             Shaper("ei2", "two-hump extra-insensitive: forgives 36 %", impulses.ei2, 1.5),
+            Shaper(
+                "ei2_exact",
+                "ei2 with humps of 5 % whatever the damping",
+                exact.ei2_exact,
+                exact.EI2.duration_periods,
+                exact.EI2.zeta_max,
+            ),
+            Shaper("zvddd", "zero vibration and three derivatives: forgives 31 %", impulses.zvddd, 2.0),
             Shaper("ei3", "three-hump extra-insensitive: forgives 48 %", impulses.ei3, 2.0),
+            Shaper(
+                "ei3_exact",
+                "ei3 with humps of 5 % whatever the damping",
+                exact.ei3_exact,
+                exact.EI3.duration_periods,
+                exact.EI3.zeta_max,
+            ),
         )
     }
 )

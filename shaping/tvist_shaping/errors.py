@@ -4,6 +4,8 @@ ShapingError
 ├── ImpulseError          A and τ are no impulse train
 ├── ShaperRangeError      f_d or ζ no shaper is defined for
 ├── UnknownShaperError    a name that is not in the catalogue
+├── DesignError           a parameter of a shaper's design is wrong
+├── ConvergenceError      a design has no solution
 ├── DelayError            a delay the line does not hold
 ├── EstimatorError        an estimator's parameter is wrong
 └── FilterError           shaper, estimator and delay line do not fit each other
@@ -51,6 +53,26 @@ class UnknownShaperError(ShapingError):
         self.name = name
         self.known = tuple(known)
         self.nearest = nearest
+
+
+class DesignError(ShapingError):
+    """A parameter of a shaper's design is wrong.
+
+    Attributes:
+        field: The parameter's name.
+        value: What was given.
+        limit: What is allowed, in words.
+    """
+
+    def __init__(self, field: str, value: float, limit: str) -> None:
+        super().__init__(f"{field} is {value!r}, but must be {limit}")
+        self.field = field
+        self.value = value
+        self.limit = limit
+
+
+class ConvergenceError(ShapingError):
+    """Equations that define a shaper and have no solution that was found."""
 
 
 class DelayError(ShapingError):

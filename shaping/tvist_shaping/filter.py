@@ -4,10 +4,10 @@ import math
 
 from tvist_shaping._types import Floats
 from tvist_shaping.base import Filter
-from tvist_shaping.catalogue import Shaper
 from tvist_shaping.errors import FilterError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.impulses import Impulses, product
+from tvist_shaping.shaper import Shaper
 
 
 class TvistFilter(Filter):
@@ -101,6 +101,11 @@ class TvistFilter(Filter):
     def delay(self) -> float:
         """Time of the last impulse of the last tick [s]: how much later the shaped reference ends."""
         return self.impulses.duration
+
+    @property
+    def mean_delay(self) -> float:
+        """Of the impulses of the last tick [s]."""
+        return self.impulses.mean_delay
 
     def replace(self, *, shaper: Shaper | None = None, estimator: Estimator | None = None) -> "TvistFilter":
         """A filter with another shaper or estimator that goes on where this one is.

@@ -21,6 +21,7 @@ import numpy as np
 
 from tvist_shaping._compiled import compiled
 from tvist_shaping._types import Floats
+from tvist_shaping.errors import FilterError
 
 EDGE = 0.012
 """Over which the weights fade out at the end [s]."""
@@ -40,7 +41,11 @@ GAIN = 0.3
 
 @dataclass(frozen=True)
 class FirDesign:
-    """What the filter is to reach; one entry a mode."""
+    """What the filter is to reach; one entry a mode.
+
+    Raises:
+        FilterError: The tuples differ in length or are empty, or a number is out of range.
+    """
 
     spread: tuple[float, ...] = (0.015, 0.02, 0.03, 0.0)
     """How far a mode may be off, either way; 0: it stands in the programme once [-]."""
@@ -52,6 +57,20 @@ class FirDesign:
     """Bounds of the length [s]."""
     longest: float = 0.15
     """[s]"""
+
+    def __post_init__(self) -> None:
+        """Check what the compiled programme takes for granted."""
+        for name, least in (("spread", 0.0), ("residual", 1e-6), ("weight", 1e-6)):
+            values = getattr(self, name)
+            if not len(values) == len(self.spread) >= 1:
+                raise FilterError(name, len(values), f"one number a mode, {max(len(self.spread), 1)} in all")
+            for value in values:
+                if not least <= value < math.inf:
+                    raise FilterError(name, value, f"finite and at least {least:g}")
+        if not EDGE < self.shortest <= self.longest < math.inf:
+            raise FilterError(
+                "shortest", self.shortest, f"above {EDGE:g} s and at most longest, {self.longest:g} s"
+            )
 
     @property
     def modes(self) -> int:
@@ -127,7 +146,7 @@ def solve(  # noqa: C901, PLR0912 - one kernel: its branches are loops over rows
             dual[0] = ENERGY
         value = _ascend(dual, rows, room, price, taps)
         for _ in range(STEPS):
-            if not _gradient(dual, rows, price, taps, hessian) > SOLVED:
+            if _gradient(dual, rows, price, taps, hessian) <= SOLVED:  # not so where it is no number
                 solved = True
                 break
             if not _newton(rows, room, price, taps, hessian):

@@ -6,7 +6,7 @@ Every shaper here has impulses at equal distances, amplitudes a_j without dampin
 
 K being the factor by which the mode decays in the distance s T_d between two impulses. A zero of the residual
 vibration at f_d stays one under any damping. The shapers that want V instead of zero at f_d (ei, ei3) get
-less than V when ζ > 0: safe, if not the widest band their length could give.
+less than V when ζ > 0: safe, if not the widest band their length could give. Those of `tvist_shaping.exact` get V.
 """
 
 import math
@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tvist_shaping._types import Floats
+from tvist_shaping.amplitudes import modified, ripple
 from tvist_shaping.errors import ImpulseError, ShaperRangeError
 
 V = 0.05
@@ -77,18 +78,50 @@ class Impulses:
         return float(self.A @ self.tau)
 
 
-def _train(a: Sequence[float], distance: float, f_d: float, zeta: float) -> Impulses:
-    """Impulses a_j K^j, normalised, `distance` damped periods apart: the formula at the top."""
+def check_mode(f_d: float, zeta: float, zeta_max: float = 1.0, instead: str = "") -> None:
+    """Refuse a mode that a shaper is not made for.
+
+    Args:
+        f_d: Damped frequency [Hz].
+        zeta: Damping ratio [-].
+        zeta_max: It must be below this [-].
+        instead: What to take for a higher one, in words.
+
+    Raises:
+        ShaperRangeError: f_d is not 1e-6 to 1e6 Hz, or ζ not 0 <= ζ < zeta_max.
+    """
     if not F_D_RANGE[0] <= f_d <= F_D_RANGE[1]:
         raise ShaperRangeError("f_d", f_d, f"{F_D_RANGE[0]:g} to {F_D_RANGE[1]:g} Hz")
-    if not 0.0 <= zeta < 1.0:
-        raise ShaperRangeError("zeta", zeta, "at least 0 and less than 1")
+    if not 0.0 <= zeta < zeta_max:
+        limit = f"at least 0 and less than {zeta_max:g}"
+        raise ShaperRangeError("zeta", zeta, f"{limit}: beyond it {instead}" if instead else limit)
+
+
+def damped(a: Floats, periods: Floats, f_d: float, zeta: float) -> Impulses:
+    """Amplitudes of an undamped shaper, damping taken in: each decays as the mode does until then.
+
+    Args:
+        a: Amplitudes without damping [-], shape (N,), sum positive.
+        periods: Times in damped periods [-], shape (N,), ascending from 0.
+        f_d: Damped frequency of the mode [Hz], checked.
+        zeta: Damping ratio of the mode [-], checked.
+
+    Returns:
+        A_j = a_j exp(-2π ζ/√(1-ζ²) τ_j f_d), normalised, and τ_j.
+    """
+    A = a * np.exp(-2.0 * math.pi * zeta / math.sqrt(1.0 - zeta * zeta) * periods)
+    return Impulses._by_construction(A / A.sum(), periods / f_d)  # noqa: SLF001  both come from this package
+
+
+def _train(a: Sequence[float], distance: float, f_d: float, zeta: float) -> Impulses:
+    """Impulses a_j K^j, normalised, `distance` damped periods apart: the formula at the top."""
+    check_mode(f_d, zeta)
     K = math.exp(-2.0 * math.pi * distance * zeta / math.sqrt(1.0 - zeta * zeta))
-    damped = [a_j * K**j for j, a_j in enumerate(a)]
-    total = sum(damped)
+    decayed = [a_j * K**j for j, a_j in enumerate(a)]
+    total = sum(decayed)
     return Impulses._by_construction(  # noqa: SLF001  this module makes the trains, checked above
-        np.array([A_j / total for A_j in damped]),
-        np.array([j * distance / f_d for j in range(len(damped))]),
+        np.array([A_j / total for A_j in decayed]),
+        np.array([j * distance / f_d for j in range(len(decayed))]),
     )
 
 
@@ -145,6 +178,62 @@ def zvd(f_d: float, zeta: float) -> Impulses:
     return _train((1.0, 2.0, 1.0), 0.5, f_d, zeta)
 
 
+def zvdd(f_d: float, zeta: float) -> Impulses:
+    """Zero vibration and its first two derivatives by frequency (Singer and Seering, 1990): zv three times over.
+
+    Args:
+        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
+        zeta: Damping ratio of the mode [-], 0 <= ζ < 1.
+
+    Returns:
+        A = (1, 3K, 3K², K³)/(1+K)³ [-] and τ = (0, 1/2, 1, 3/2)/f_d [s], each of shape (4,); K as for `zv`.
+
+    Raises:
+        ShaperRangeError: f_d or ζ is outside the range above.
+    """
+    return _train((1.0, 3.0, 3.0, 1.0), 0.5, f_d, zeta)
+
+
+def zvddd(f_d: float, zeta: float) -> Impulses:
+    """Zero vibration and its first three derivatives by frequency (Singer and Seering, 1990): zv four times over.
+
+    Args:
+        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
+        zeta: Damping ratio of the mode [-], 0 <= ζ < 1.
+
+    Returns:
+        A = (1, 4K, 6K², 4K³, K⁴)/(1+K)⁴ [-] and τ = (0, 1/2, 1, 3/2, 2)/f_d [s], each of shape (5,); K as for
+        `zv`.
+
+    Raises:
+        ShaperRangeError: f_d or ζ is outside the range above.
+    """
+    return _train((1.0, 4.0, 6.0, 4.0, 1.0), 0.5, f_d, zeta)
+
+
+def mzv(f_d: float, zeta: float) -> Impulses:
+    """Modified zero-vibration shaper MZV(3, 3/4): three impulses in three quarters of a period (known from Klipper).
+
+    Shorter than zvd, and wider than zv, above f_d more than below it. `mzv_of` makes the others.
+
+    Args:
+        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
+        zeta: Damping ratio of the mode [-], 0 <= ζ < 1.
+
+    Returns:
+        A ∝ (1 - 1/√2, (√2 - 1) k, (1 - 1/√2) k²) [-] with k = exp(-3/4 ζπ/√(1-ζ²)), and
+        τ = (0, 3/8, 3/4)/f_d [s], each of shape (3,).
+
+    Raises:
+        ShaperRangeError: f_d or ζ is outside the range above.
+    """
+    return _train(_MZV, 0.375, f_d, zeta)
+
+
+_MZV = tuple(modified(3, 0.75).tolist())
+_EI, _EI2, _EI3 = (tuple(ripple(humps, V).tolist()) for humps in (1, 2, 3))
+
+
 def ei(f_d: float, zeta: float) -> Impulses:
     """Extra-insensitive shaper with V = 5 % (Singhose, Seering, Singer, J. Mech. Design 116, 1994).
 
@@ -162,42 +251,7 @@ def ei(f_d: float, zeta: float) -> Impulses:
     Raises:
         ShaperRangeError: f_d or ζ is outside the range above.
     """
-    return _train(((1.0 + V) / 4.0, (1.0 - V) / 2.0, (1.0 + V) / 4.0), 0.5, f_d, zeta)
-
-
-def mzv(f_d: float, zeta: float) -> Impulses:
-    """Modified zero-vibration shaper: three impulses in three quarters of a period (known from Klipper).
-
-    Shorter than zvd, and wider than zv, above f_d more than below it.
-
-    Args:
-        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
-        zeta: Damping ratio of the mode [-], 0 <= ζ < 1.
-
-    Returns:
-        A ∝ (1 - 1/√2, (√2 - 1) k, (1 - 1/√2) k²) [-] with k = exp(-3/4 ζπ/√(1-ζ²)), and
-        τ = (0, 3/8, 3/4)/f_d [s], each of shape (3,).
-
-    Raises:
-        ShaperRangeError: f_d or ζ is outside the range above.
-    """
-    return _train((1.0 - math.sqrt(0.5), math.sqrt(2.0) - 1.0, 1.0 - math.sqrt(0.5)), 0.375, f_d, zeta)
-
-
-def _ei2_amplitudes() -> tuple[float, ...]:
-    X = math.cbrt(V * V * (math.sqrt(1.0 - V * V) + 1.0))
-    a = (3.0 * X * X + 2.0 * X + 3.0 * V * V) / (16.0 * X)
-    return a, 0.5 - a, 0.5 - a, a
-
-
-def _ei3_amplitudes() -> tuple[float, ...]:
-    a = (1.0 + 3.0 * V + 2.0 * math.sqrt(2.0 * (V + V * V))) / 16.0
-    b = (1.0 - V) / 4.0
-    return a, b, 1.0 - 2.0 * (a + b), b, a
-
-
-_EI2 = _ei2_amplitudes()
-_EI3 = _ei3_amplitudes()
+    return _train(_EI, 0.5, f_d, zeta)
 
 
 def ei2(f_d: float, zeta: float) -> Impulses:

@@ -18,13 +18,15 @@ from tvist_shaping._types import Floats
 from tvist_shaping.base import Filter
 from tvist_shaping.errors import FilterError
 from tvist_shaping.estimators.base import Estimator
-from tvist_shaping.fir import GAIN, QUICKEST, FirDesign, solve
+from tvist_shaping.fir import EDGE, GAIN, QUICKEST, FirDesign, solve
 from tvist_shaping.taps import average, length, product_taps
 
 EVERY = 4
 """Ticks between two designs."""
-SMOOTH = 32
-"""Ticks of each running mean."""
+SMOOTH = 64
+"""Ticks of each running mean: fewer let the spread of the delays change too fast, more let it lag behind the arm."""
+EXCESS = 0.005
+"""By what share the acceleration may exceed the reference's [-]: the most on random motions at their limits."""
 
 
 class Design(ABC):
@@ -108,21 +110,27 @@ class ShortDesign(Design):
     """Positive taps from a quadratic programme, as short as what may remain allows: `tvist_shaping.fir`."""
 
     def __init__(
-        self, mean_delay: float = 0.027, *, wanted: FirDesign | None = None, period: float = 0.002
+        self,
+        mean_delay: float = 0.028,
+        *,
+        wanted: FirDesign | None = None,
+        period: float = 0.002,
+        name: str = "short",
     ) -> None:
         """A design.
 
         Args:
-            mean_delay: Of the taps at every configuration [s], > 0 and less than half the shortest length.
+            mean_delay: Of the taps at every configuration [s], > 0 and within the shortest length less its edge.
             wanted: What it is to reach.
             period: Tick [s], > 0.
+            name: What it is called.
 
         Raises:
             FilterError: A number is out of range.
         """
         wanted = wanted or FirDesign()
-        _check_times(mean_delay, wanted.longest, period)
-        self.name, self.modes, self.mean_delay = "short", wanted.modes, mean_delay
+        _check_times(mean_delay, wanted.shortest - EDGE, period)
+        self.name, self.modes, self.mean_delay = name, wanted.modes, mean_delay
         self.wanted, self.period = wanted, period
         self.taps = N = math.ceil(wanted.longest / period) + 1
         self._spread, self._weight, self._residual = (
@@ -132,46 +140,51 @@ class ShortDesign(Design):
         self._dual = np.zeros(wanted.rows)
         self._rows, self._hessian = np.zeros((wanted.rows, N)), np.zeros((wanted.rows, wanted.rows + 2))
         self._remains = np.zeros(wanted.modes)
+        self._found, self._solved = np.zeros(N), False
 
     def __repr__(self) -> str:
         return f"ShortDesign(mean_delay={self.mean_delay:g}, wanted={self.wanted!r})"
 
     def copy(self) -> "ShortDesign":
         """The same, from cold."""
-        return ShortDesign(self.mean_delay, wanted=self.wanted, period=self.period)
+        return ShortDesign(self.mean_delay, wanted=self.wanted, period=self.period, name=self.name)
 
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
-        """Taps of the length at which as much remains as may; as `go_on`."""
+        """Taps of the shortest length at which no more remains than may; as `go_on`."""
         shortest, longest = self.wanted.shortest, self.wanted.longest
-        for _ in range(12):  # what remains falls with the length: halve the interval
+        self._dual[:] = 0.0
+        for _ in range(11):  # what remains falls with the length: halve the interval
             self._length = 0.5 * (shortest + longest)
-            self._dual[:] = 0.0
             self._solve(f_d, zeta, taps)
             if self._excess() > 0.0:
                 shortest = self._length
             else:
                 longest = self._length
-        return self._fits()
+        self._length = longest
+        self._solve(f_d, zeta, taps)
+        if not self._solved:
+            taps[:] = self._found
+        return self._solved and self._excess() <= 0.0
 
     def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:
         """Taps of a length that has followed what remains; see `Design.go_on`."""
         self._solve(f_d, zeta, taps)
         change = seconds * min(max(GAIN * self._excess(), -QUICKEST), QUICKEST)
         self._length = min(max(self._length + change, self.wanted.shortest), self.wanted.longest)
-        return self._fits()
+        return self._solved and (self._length < self.wanted.longest or self._excess() <= 0.0)
 
     def _solve(self, f_d: Floats, zeta: Floats, taps: Floats) -> None:
-        solve(
+        """New taps; where none are found the old ones stand, whose mean delay is the right one."""
+        self._solved = solve(
             f_d, zeta, self._length, self.mean_delay, self.period, self._spread, self._weight,
-            self._dual, self._rows, self._hessian, taps, self._remains,
+            self._dual, self._rows, self._hessian, self._found, self._remains,
         )  # fmt: skip
+        if self._solved:
+            taps[:] = self._found
 
     def _excess(self) -> float:
         """What remains against what may: logarithm, so that it is 0 where they are equal."""
         return 0.5 * math.log(float(((self._remains / self._residual) ** 2).sum()) + 1e-12)
-
-    def _fits(self) -> bool:
-        return self._length < self.wanted.longest or self._excess() <= 0.0
 
 
 class SteadyFilter(Filter):
@@ -203,7 +216,7 @@ class SteadyFilter(Filter):
                 "take an estimator of that many modes, or another design",
             )  # fmt: skip
         super().__init__(design.name, estimator, joints, design.period, design.taps + 4)
-        self.design = design
+        self.design, self.excess = design, EXCESS
         self._smooth = smooth
         self._delays = np.arange(design.taps, dtype=float)
         self._designed, self._taps = np.zeros((2, design.taps))
@@ -218,6 +231,11 @@ class SteadyFilter(Filter):
     def delay(self) -> float:
         """Time of the last tap [s]: how much later the shaped reference ends."""
         return length(self._taps) * self.period
+
+    @property
+    def mean_delay(self) -> float:
+        """Of the taps of the last tick [s]."""
+        return float(self._taps @ self._delays) * self.period
 
     def with_estimator(self, estimator: Estimator) -> "SteadyFilter":
         """The same design for other modes; see `Filter.with_estimator`."""

@@ -99,7 +99,7 @@ class Plant:
     def _load(self, payload: Payload) -> None:
         """Models of the arm with this payload, and room for its state."""
         self.payload = payload
-        self._flexible: FlexibleModel = flexible_model(self.description, payload)
+        self._flexible: FlexibleModel = self._build(payload)
         self._data: pin.Data = self._flexible.model.createData()
         self._gravity: Floats = np.array(self._flexible.model.gravity.linear)
         self._linear = LinearPart.of(self._flexible, self.description.drives)
@@ -114,6 +114,10 @@ class Plant:
         self._last_M, self._last_bias = self._data.M.copy(), self._bias
         self._moment = np.zeros(self.description.joints)
         self._work_matrix, self._work = np.zeros((size, size)), np.zeros(size)
+
+    def _build(self, payload: Payload) -> FlexibleModel:
+        """The arm with a payload; another arm is another one of these."""
+        return flexible_model(self.description, payload)
 
     def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
         """Put the arm at rest in static equilibrium under a command, integrators preloaded, noise restarted.

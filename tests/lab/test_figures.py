@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from tvist_lab.figures import figure_4, figure_7, figure_16, motion_figure, save
+from tvist_lab.figures import catalogue_figure, figure_4, figure_7, figure_16, motion_figure, save
 from tvist_lab.metrics import motions
+from tvist_shaping import SHAPERS, custom, residual
 
 TICKS = 1500
 
@@ -80,3 +81,25 @@ def test_a_saved_figure_is_an_equal_file_each_time_and_makes_its_folder(tmp_path
     first, second = (file.read_bytes() for file in files)
     assert first == second
     assert first.startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.34])
+def test_the_figure_of_the_catalogue_shows_every_shaper_that_is_for_the_damping(zeta):
+    mine = custom("mine", [0.5, 0.5], [0.0, 0.5])
+    figure = catalogue_figure([*SHAPERS.values(), mine], zeta)
+    *families, price = figure.axes
+    shown = [
+        line.get_label() for panel in families for line in panel.get_lines() if line.get_label()[0] != "_"
+    ]
+    assert sorted(shown) == sorted(
+        [
+            "mine",
+            *(name for name, shaper in SHAPERS.items() if shaper.duration_periods and zeta < shaper.zeta_max),
+        ]
+    )
+    named = {name for words in texts(price) for name in words.split(", ")}
+    assert named == set(shown)
+    (ei,) = (line for panel in families for line in panel.get_lines() if line.get_label() == "ei")
+    assert np.interp(1.0, *ei.get_xydata().T) == pytest.approx(
+        100.0 * residual(1.0, zeta, SHAPERS["ei"].function(1.0, zeta))
+    )

@@ -11,7 +11,7 @@ from tvist_server.controller import Controller
 from tvist_server.cycle import ControlCycle
 from tvist_server.setup import Setup, body, paper_payload
 from tvist_server.trajectory import Limits
-from tvist_shaping.catalogue import shaper
+from tvist_shaping.catalogue import SHAPERS, shaper
 from tvist_shaping.estimators.polynomial import Polynomial
 from tvist_shaping.filter import TvistFilter
 
@@ -56,6 +56,12 @@ POLYNOMIAL = {
     "f_d_range": (5.0, 16.0),
     "zeta_range": (0.05, 0.45),
 }
+FITTING = [
+    name
+    for name, entry in SHAPERS.items()
+    if entry.zeta_max > POLYNOMIAL["zeta_range"][1] and entry.peak == 1.0
+]
+"""Shapers for its damping that keep the limits of what they shape."""
 
 
 def calibration(mass: float = 5.0, robot: str = "UR5e", name: str = "test", **polynomial) -> Calibration:

@@ -12,12 +12,12 @@ from tvist_server.cycle import STILL
 from tvist_server.safety import TORQUE_SHARE
 from tvist_server.setup import body, paper_payload
 from tvist_server.trajectory import Limits
-from tvist_shaping.catalogue import SHAPERS, shaper
+from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.estimators.polynomial import Polynomial
 from tvist_shaping.filter import TvistFilter
 
-from .robots import PAPER, POLYNOMIAL, Q1, Q2, Q3, UR5E, H, Robot, calibration, cycle, without_arm
+from .robots import FITTING, PAPER, POLYNOMIAL, Q1, Q2, Q3, UR5E, H, Robot, calibration, cycle, without_arm
 
 DISC = paper_payload(UR5E)
 TOLERANCE = 5e-3
@@ -28,7 +28,7 @@ def a_filter(random, name=None):
     estimator = Polynomial(**POLYNOMIAL)
     if random.random() < 0.5:
         estimator = Fixed([random.uniform(5.0, 15.0)], [random.uniform(0.02, 0.4)])
-    return TvistFilter(shaper(name or random.choice(list(SHAPERS))), estimator, joints=6)
+    return TvistFilter(shaper(name or random.choice(FITTING)), estimator, joints=6)
 
 
 def a_line(tvist):
@@ -326,7 +326,7 @@ def test_a_change_in_motion_that_is_refused_changes_nothing():
     robots = [Robot(calibration=calibration()) for _ in range(2)]
     for robot in robots:
         moving(robot)
-    assert robots[0].send(c.SetShaper, name="zvdd").code == "unknown_shaper"
+    assert robots[0].send(c.SetShaper, name="zvdddd").code == "unknown_shaper"
     assert robots[0].send(c.SetEstimator, name="fixed", f_d=(0.2,), zeta=(0.2,)).code == "out_of_range"
     assert robots[0].send(c.SetPayload, mass=6.0, com=DISC.com, inertia=DISC.inertia).code == "out_of_range"
     for robot in robots:

@@ -52,7 +52,7 @@ def test_a_key_or_value_that_cannot_be(values, named):
 @pytest.mark.parametrize(
     ("values", "named"),
     [
-        ({"shaper": "zvdd"}, "did you mean 'zvd'"),
+        ({"shaper": "zvdddd"}, "did you mean 'zvddd'"),
         ({"robot": "ur55"}, "robot 'ur55'"),
         ({"start": "Q9"}, "start is 'Q9': must be one of Q1, Q2, Q3"),
         ({"start": "1,2,three"}, "start"),
@@ -193,7 +193,7 @@ def test_a_state_to_start_in_goes_before_the_rest(tmp_path, name):
         ('mode = "BOOTING"', "mode"),
         ("speed = 1", "speed"),
         ("q = ", "state"),
-        ('shaper = "zvdd"', "did you mean 'zvd'"),
+        ('shaper = "zvdddd"', "did you mean 'zvddd'"),
         ("[payload]\nmass = 1\ncom = [0, 0, 0]\ninertia = [1, 0, 0, 1, 0, 9]", "payload.inertia"),
         ("[payload]\nmass = -1\ncom = [0, 0, 0]\ninertia = [1, 0, 0, 1, 0, 1]", "payload.mass"),
     ],

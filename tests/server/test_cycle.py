@@ -7,10 +7,9 @@ from tvist_server.control.inverse_dynamics import SLEW
 from tvist_server.cycle import STILL
 from tvist_server.setup import body, paper_payload
 from tvist_server.trajectory import Limits
-from tvist_shaping.catalogue import SHAPERS
 from tvist_shaping.estimators.fixed import Fixed
 
-from .robots import PAPER, Q1, Q2, Q3, UR5E, H, cycle, without_arm
+from .robots import FITTING, PAPER, Q1, Q2, Q3, UR5E, H, cycle, without_arm
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 
@@ -54,7 +53,7 @@ def test_shaping_takes_most_of_the_residual_vibration():
     assert residual("zv") < 0.3 * unshaped
 
 
-@pytest.mark.parametrize("name", SHAPERS)
+@pytest.mark.parametrize("name", FITTING)
 @pytest.mark.parametrize("target", [Q2, Q3, Q1 + 0.3, Q1 + 1e-3])
 def test_at_rest_is_one_tick_after_the_last_that_moved(name, target):
     """A target is the shaped reference of a tick before, so that tick is two after the last that moved.

@@ -7,13 +7,15 @@ import pytest
 
 from tvist_protocol.commands import SetEstimator
 from tvist_protocol.values import Payload
-from tvist_server.choices import choose_estimator, choose_filter, shapers
+from tvist_server.choices import choose_filter, choose_source, make_estimator, shapers, wanted_modes
 from tvist_server.refusal import RefusalError, check_body, check_joints, check_motion
+from tvist_server.setup import paper_payload
 from tvist_shaping.estimators.fixed import Fixed
 
 from .robots import POLYNOMIAL, UR5E, calibration, setup
 
 LIMITS = UR5E.limits
+DISC = paper_payload(UR5E)
 SIX = (0.0,) * 6
 
 
@@ -102,14 +104,16 @@ def test_more_than_the_rated_mass():
 
 
 def test_an_unknown_shaper_is_answered_with_the_nearest():
-    reply = refused(choose_filter, "zvdd", Fixed([10.0], [0.2]), 6, where="name")
+    reply = refused(choose_filter, "zvdddd", Fixed([10.0], [0.2]), 6, where="name")
     assert (reply.code, reply.where) == ("unknown_shaper", "name")
-    assert "did you mean 'zvd'?" in reply.why
+    assert "did you mean 'zvddd'?" in reply.why
 
 
 @pytest.mark.parametrize("name", shapers())
 def test_every_shaper_that_is_named_can_be_chosen(name):
-    assert choose_filter(name, Fixed([10.0], [0.2]), 6).shaper.name == name
+    modes = wanted_modes(name, 1, "name")
+    f_d, zeta = [10.0, 20.0, 40.0, 80.0], [0.1, 0.1, 0.08, 0.08]
+    assert choose_filter(name, Fixed(f_d[:modes], zeta[:modes]), 6).name == name
 
 
 def test_a_shaper_that_lasts_longer_than_the_delay_line_is_refused():
@@ -117,17 +121,18 @@ def test_a_shaper_that_lasts_longer_than_the_delay_line_is_refused():
 
 
 def estimator(own=None, **fields):
-    return choose_estimator(SetEstimator(token="", **fields), setup(calibration=own))
+    return choose_source(SetEstimator(token="", **fields), setup(calibration=own))
 
 
 @pytest.mark.parametrize(
     ("fields", "code", "where"),
     [
-        ({"name": "modal"}, "unknown_estimator", "name"),
+        ({"name": "modal"}, "missing_field", "calibration"),
+        ({"name": "modal", "f_d": (8.0,)}, "out_of_range", "f_d"),
+        ({"name": "modal", "calibration": "ur5e_5kg"}, "out_of_range", "calibration"),
         ({"name": "polinomial"}, "unknown_estimator", "name"),
         ({"name": "fixed"}, "missing_field", "f_d"),
         ({"name": "fixed", "f_d": (10.0,)}, "missing_field", "zeta"),
-        ({"name": "fixed", "f_d": (8.0, 15.0), "zeta": (0.2, 0.2)}, "out_of_range", "f_d"),
         ({"name": "fixed", "f_d": (8.0,), "zeta": (0.2, 0.2)}, "out_of_range", "zeta"),
         ({"name": "fixed", "f_d": (8.0,), "zeta": (0.2,), "calibration": "x"}, "out_of_range", "calibration"),
         ({"name": "polynomial"}, "missing_field", "calibration"),
@@ -149,9 +154,9 @@ def content(**changes):
 
 
 def test_a_calibration_may_come_as_a_map():
-    chosen, made_of = estimator(name="polynomial", calibration=content(name="mine"))
-    assert made_of.name == "mine"
-    assert chosen.f_d_min == 5.0
+    source = estimator(name="polynomial", calibration=content(name="mine"))
+    assert source.calibration.name == "mine"
+    assert source.estimator(1, DISC).f_d_min == 5.0
 
 
 def test_a_calibration_of_another_robot_is_refused():
@@ -171,7 +176,27 @@ def test_a_calibration_whose_parts_do_not_go_together_is_refused():
 def test_the_server_s_own_calibration_goes_by_its_name_or_without():
     own = calibration(name="own")
     for named in (None, "own"):
-        assert estimator(own, name="polynomial", calibration=named)[1] is own
+        assert estimator(own, name="polynomial", calibration=named).calibration is own
+
+
+def test_modal_takes_the_calibration_that_comes_with_the_package():
+    source = estimator(calibration(name="own"), name="modal")
+    assert (source.name, source.calibration.name) == ("modal", "ur5e_modal")
+    assert source.estimator(3, DISC).modes == 3
+    assert estimator(name="modal", calibration="ur5e_modal") == source
+
+
+def test_no_estimator_gives_more_modes_than_it_has():
+    source = estimator(name="fixed", f_d=(8.0, 15.0), zeta=(0.2, 0.1))
+    assert source.estimator(2, DISC).modes == 2
+    reply = refused(make_estimator, source, 3, DISC, "modes")
+    assert (reply.code, reply.where, reply.limit) == ("out_of_range", "modes", 2)
+
+
+def test_a_filter_with_modes_of_its_own_takes_no_other_number():
+    assert wanted_modes("zv", 3, "name") == 3
+    assert wanted_modes("auto", 1, "name") == wanted_modes("auto", 4, "name") == 4
+    assert refused(wanted_modes, "auto", 2, "name").where == "modes"
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 
 from tvist_plant.description import Payload
+from tvist_protocol import commands as c
 from tvist_server.control.differentiator import Target
 from tvist_server.control.inverse_dynamics import InverseDynamics
-from tvist_server.safety import GENTLEST_STOP, TORQUE_SHARE, plan_stop
+from tvist_server.safety import GENTLEST_STOP, REBOUND, STEP, TORQUE_SHARE, plan_stop
 
-from .robots import Q1, Q3, UR5E, H
+from .robots import Q1, Q3, UR5E, H, Robot
 
 DISC = UR5E.payload
 LIMITS = UR5E.limits
@@ -43,16 +44,42 @@ def test_the_torque_stays_within_its_share_unless_the_motion_already_takes_more(
 
 @pytest.mark.parametrize("seed", range(25))
 def test_it_is_no_gentler_than_it_must_be(seed):
-    """One step harder would pass the share: the plan's own search, the other way round."""
-    stop = plan(*moving(seed))
+    """One step harder would pass the share, or the limit with what swings: the plan's search, the other way round."""
+    q, qd, qdd = moving(seed)
+    stop = plan(q, qd, qdd)
     if stop.acceleration < min(LIMITS.acceleration):
         dynamics = InverseDynamics(UR5E, DISC)
         harder = type(stop.trajectory)(
-            *moving(seed), acceleration=stop.acceleration / 0.8, jerk=2000.0, period=H
+            q, qd, qdd, acceleration=stop.acceleration / STEP, jerk=2000.0, period=H
         )
-        times = np.linspace(0.0, harder.duration, 400)
-        taken = np.array([np.abs(dynamics.torque(*harder.at(time))) for time in times])
-        assert (taken.max(axis=0) > TORQUE_SHARE * np.array(LIMITS.torque)).any()
+        states = [harder.at(time) for time in np.linspace(0.0, harder.duration, 400)]
+        taken = np.array([dynamics.torque(*state) for state in states])
+        gravity = np.array([dynamics.gravity(state[0]) for state in states])
+        before = dynamics.torque(q, qd, qdd) - dynamics.gravity(np.array(q))
+        swung = taken + REBOUND * (taken - gravity - before)
+        back = gravity - REBOUND * (taken - gravity)
+        limit = np.array(LIMITS.torque)
+        beyond = np.array([np.abs(taken) > TORQUE_SHARE * limit, np.abs(swung) > limit, np.abs(back) > limit])
+        assert beyond.any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_a_stop_is_no_protective_stop(seed):
+    """The flexible arm swings beyond what is asked of it, but never for more than 10 ms beyond its drives' limits."""
+    random = np.random.default_rng(seed)
+    robot = Robot(seed=seed)
+    if seed % 2:
+        robot.send(c.SimulationReset, q=tuple(Q3))
+    start = np.array(robot.tick().target_q)
+    robot.send(c.ServoStart)
+    swing, pace = random.uniform(-0.3, 0.3, 6), random.uniform(1.5, 3.0)
+    for k in range(int(random.integers(200, 600))):
+        robot.setpoint(k, start + swing * (1.0 - np.cos(pace * k * H)))
+        robot.tick()
+    robot.send(c.Stop)
+    robot.tick(300)
+    assert "protective_stop" not in robot.kinds()
 
 
 def test_a_light_arm_stops_harder_than_a_loaded_one():

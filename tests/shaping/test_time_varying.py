@@ -73,7 +73,7 @@ def test_rounded_delays_kick_the_arm(double_s, modes):
     assert peak_acceleration(shape_with_rounded_delays(double_s[::-1].copy(), modes)) > 50.0
 
 
-@pytest.mark.parametrize("name", ["zvd", "ei", "mzv", "ei2", "ei3"])
+@pytest.mark.parametrize("name", ["zvd", "ei", "ei_exact", "mzv", "si", "zvdd", "ei2", "zvddd", "ei3"])
 def test_no_shaper_of_the_catalogue_kicks_the_arm(name, double_s, modes):
     assert peak_acceleration(shape(double_s, name, modes)) < 2.2
 
@@ -86,7 +86,7 @@ def test_the_shaped_move_ends_where_the_reference_does_half_a_period_of_the_end_
 
 
 def test_the_shaped_reference_stays_between_start_and_end(double_s, modes):
-    for name in ("zv", "zvd", "ei", "mzv", "ei2", "ei3"):
+    for name in ("zv", "zvd", "ei", "ei_exact", "mzv", "si", "zvdd", "ei2", "zvddd", "ei3"):
         shaped = shape(double_s, name, modes)
         assert shaped.min() >= -1e-6
         assert shaped.max() <= STROKE + 1e-6

@@ -40,10 +40,10 @@ async def use(endpoint, told):
         with collect(robot) as collected:
             told.append(collected)
             await robot.advance(50)
-            await arm.move_j(NEAR, acceleration=4.0)
+            await arm.move_j(NEAR, acceleration=2.5)
             await robot.advance(700)
             q = (await robot.state()).target_q
-            async with arm.servo(period=PERIOD, acceleration=4.0) as servo:
+            async with arm.servo(period=PERIOD, acceleration=2.5) as servo:
                 async for state in robot.states():
                     if state.tick % STRIDE == 0:
                         t = servo.sequence * PERIOD

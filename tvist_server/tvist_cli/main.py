@@ -14,7 +14,10 @@ COMMANDS = {
     "analyze": "Measure the motions of a recording.",
     "replay": "Run a recording's commands again and compare bit by bit.",
     "paper": "Run the paper's experiment and print its tables beside ours.",
+    "shapers": "List the shapers: how long they are and what they forgive.",
     "identify": "Calibrate a robot from its own accelerometer.",
+    "evaluate": "Shape any moves and say what it does to their vibration.",
+    "shaperbench": "Judge shapers, yours too, on eight arms.",
     "bench": "Measure how fast it is on this machine.",
     "keys": "Make certificates for a robot that others may reach.",
 }

@@ -3,77 +3,108 @@
 from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_protocol.commands import SetEstimator
 from tvist_protocol.errors import ProtocolError
-from tvist_server.calibrations import available, estimator_of, load
+from tvist_protocol.values import Payload
+from tvist_server.calibrations import available, load
+from tvist_server.mode_source import ModeSource, modal_source
 from tvist_server.refusal import RefusalError
 from tvist_server.setup import Setup
-from tvist_shaping.catalogue import SHAPERS, shaper
-from tvist_shaping.errors import ShapingError, UnknownShaperError
+from tvist_shaping.base import Filter
+from tvist_shaping.errors import EstimatorError, ShapingError, UnknownShaperError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.fixed import Fixed
-from tvist_shaping.filter import TvistFilter
+from tvist_shaping.named import make_filter, modes_of, names
 
-ESTIMATORS = ("fixed", "polynomial")
+ESTIMATORS = ("fixed", "polynomial", "modal")
 
 
 def shapers() -> list[str]:
-    """Names of the shapers."""
-    return list(SHAPERS)
+    """Names of the shapers, and of the filters that go by a name as they do."""
+    return list(names())
 
 
-def choose_filter(name: str, estimator: Estimator, joints: int, *, where: str = "shaper") -> TvistFilter:
+def wanted_modes(name: str, modes: int, where: str) -> int:
+    """How many modes a filter wants to know.
+
+    Raises:
+        RefusalError: There is no such filter, or it has a number of its own.
+    """
+    try:
+        own = modes_of(name, modes)
+    except UnknownShaperError as error:
+        raise RefusalError("unknown_shaper", where, str(error)) from error
+    if modes not in {1, own}:
+        why = f"modes is {modes}; {name} has {own}, its own number"
+        raise RefusalError("out_of_range", "modes", why, own)
+    return own
+
+
+def make_estimator(source: ModeSource, modes: int, payload: Payload, where: str) -> Estimator:
+    """The estimator that was chosen, for so many modes.
+
+    Raises:
+        RefusalError: It does not have them.
+    """
+    try:
+        return source.estimator(modes, payload)
+    except EstimatorError as error:
+        raise RefusalError("out_of_range", where, str(error), source.most) from error
+
+
+def choose_filter(name: str, estimator: Estimator, joints: int, *, where: str = "shaper") -> Filter:
     """A filter with a shaper.
 
     Raises:
         RefusalError: There is no such shaper, or it does not go with the estimator.
     """
     try:
-        return TvistFilter(shaper(name), estimator, joints=joints)
+        return make_filter(name, estimator, joints=joints)
     except UnknownShaperError as error:
         raise RefusalError("unknown_shaper", where, str(error)) from error
     except ShapingError as error:
         raise RefusalError("out_of_range", where, str(error)) from error
 
 
-def choose_estimator(command: SetEstimator, setup: Setup) -> tuple[Estimator, Calibration | None]:
-    """The estimator that a command asks for, and its calibration where it has one.
+def choose_source(command: SetEstimator, setup: Setup) -> ModeSource:
+    """The estimator that a command asks for.
 
     Raises:
         RefusalError: There is none of that name, or its parameters are wrong.
     """
     if command.name == "fixed":
-        return _fixed(command), None
-    if command.name != "polynomial":
+        return _fixed(command, setup)
+    if command.name not in ESTIMATORS:
         known = ", ".join(ESTIMATORS)
         raise RefusalError("unknown_estimator", "name", f"name is {command.name!r}: this server has {known}")
     for field in ("f_d", "zeta"):
         if getattr(command, field) is not None:
-            why = f"{field} belongs to the estimator fixed, not to polynomial"
+            why = f"{field} belongs to the estimator fixed, not to {command.name}"
             raise RefusalError("out_of_range", field, why)
     calibration = _calibration(command, setup)
     if calibration.robot != setup.description.robot.model:
         why = f"calibration.robot is {calibration.robot!r}; this arm is a {setup.description.robot.model}"
         raise RefusalError("out_of_range", "calibration.robot", why)
+    source = ModeSource("modal" if command.name == "modal" else "polynomial", setup.description, calibration)
     try:
-        return estimator_of(calibration), calibration
+        source.estimator(1, setup.payload)
     except ShapingError as error:
         raise RefusalError("out_of_range", "calibration", f"calibration: {error}") from error
+    return source
 
 
-def _fixed(command: SetEstimator) -> Fixed:
+def _fixed(command: SetEstimator, setup: Setup) -> ModeSource:
     for field in ("f_d", "zeta"):
         if getattr(command, field) is None:
             why = f"{field} is missing: the estimator fixed needs f_d and zeta"
             raise RefusalError("missing_field", field, why)
     if command.calibration is not None:
-        why = "calibration belongs to the estimator polynomial, not to fixed"
+        why = "calibration belongs to the estimators polynomial and modal, not to fixed"
         raise RefusalError("out_of_range", "calibration", why)
     f_d, zeta = command.f_d or (), command.zeta or ()
-    if len(f_d) != 1:
-        raise RefusalError("out_of_range", "f_d", f"f_d has {len(f_d)} modes; this version shapes 1", 1)
     try:
-        return Fixed(f_d, zeta)
+        Fixed(f_d, zeta)
     except ShapingError as error:
         raise RefusalError("out_of_range", "zeta", str(error)) from error
+    return ModeSource("fixed", setup.description, f_d=f_d, zeta=zeta)
 
 
 def _calibration(command: SetEstimator, setup: Setup) -> Calibration:
@@ -83,6 +114,10 @@ def _calibration(command: SetEstimator, setup: Setup) -> Calibration:
         except ProtocolError as error:
             raise RefusalError(error.code, error.where, error.why, error.limit) from error
     own = setup.calibration
+    if command.calibration is None and command.name == "modal":
+        found = modal_source(setup.description, own)
+        if found is not None and found.calibration is not None:
+            return found.calibration
     if command.calibration is None or (own is not None and own.name == command.calibration):
         if own is None:
             why = "calibration is missing: this server was started without"

@@ -11,15 +11,15 @@ import numpy as np
 
 from tvist_plant.plant import PERIOD, PlantError
 from tvist_protocol import commands as c
-from tvist_protocol.calibration import Calibration
 from tvist_protocol.replies import Accepted, Code, Done, Refused, Reply
 from tvist_protocol.stream import Event, EventKind, State, Truth
 from tvist_protocol.values import PROTOCOL_VERSION, Payload
 from tvist_server.calibrations import fits
-from tvist_server.choices import choose_estimator, choose_filter
+from tvist_server.choices import choose_filter, choose_source, make_estimator, wanted_modes
 from tvist_server.collision import CollisionModel
 from tvist_server.cycle import ControlCycle
 from tvist_server.faults import Faults
+from tvist_server.mode_source import ModeSource, modal_source
 from tvist_server.motion import MotionControl
 from tvist_server.refusal import RefusalError, check_body, check_joints, check_motion
 from tvist_server.reporting import Reporter
@@ -56,11 +56,12 @@ class Controller:
         self.tick_number = 0
         self.counters = Counters()
         self.declared = setup.payload
-        self.calibration: Calibration | None = setup.calibration
-        self.estimator_name = "fixed" if setup.calibration is None else "polynomial"
+        self.source = setup.source()
+        """Where the filter's modes come from."""
+        self._modal = modal_source(setup.description, setup.calibration)
         self.session = Session(timeouts=setup.clock == "realtime")
         try:
-            tvist = choose_filter(setup.shaper, setup.estimator(), setup.description.joints)
+            self.source, tvist = self._choose(setup.shaper, self.source)
         except RefusalError as error:
             raise ValueError(str(error)) from error
         self.cycle = ControlCycle(
@@ -71,6 +72,8 @@ class Controller:
             carried=body(setup.carried or setup.payload),
             seed=setup.seed,
         )
+        if self._modal is not None:  # what it takes is compiled code, which lasts many ticks to load: now
+            self._choose("auto", self._modal)[1].filter(np.zeros(setup.description.joints))
         self._reporter = Reporter(setup.description)
         self._events: list[Event] = []
         self._seed = setup.seed
@@ -281,21 +284,18 @@ class Controller:
     def set_shaper(self, command: c.SetShaper) -> Reply:
         """Choose the shaper."""
         self._authorize(command.token)
-        if command.modes > 1:
-            raise RefusalError("out_of_range", "modes", f"modes is {command.modes}; the estimators give 1", 1)
-        estimator, joints = self.cycle.tvist.estimator, self.setup.description.joints
-        tvist = choose_filter(command.name, estimator, joints, where="name")
+        self.source, tvist = self._choose(command.name, self.source, command.modes, where="name")
         self._use(tvist)
         return Done()
 
     def set_estimator(self, command: c.SetEstimator) -> Reply:
         """Choose the estimator."""
         self._authorize(command.token)
-        estimator, calibration = choose_estimator(command, self.setup)
-        where = "f_d" if calibration is None else "calibration"
-        shaper, joints = self.cycle.tvist.name, self.setup.description.joints
-        tvist = choose_filter(shaper, estimator, joints, where=where)
-        self.calibration, self.estimator_name = calibration, command.name
+        source, present = choose_source(command, self.setup), self.cycle.tvist
+        where = "f_d" if source.calibration is None else "calibration"
+        estimator = make_estimator(source, present.estimator.modes, self.declared, where)
+        tvist = choose_filter(present.name, estimator, self.setup.description.joints, where=where)
+        self.source = source
         self._use(tvist)
         self._warn_of_payload()
         return Done()
@@ -307,6 +307,9 @@ class Controller:
         check_body(payload, rated=self.setup.description.limits.payload)
         self.declared = payload
         self.cycle.declare(body(payload))
+        if self.source.knows_payload:
+            present = self.cycle.tvist
+            self.cycle.use(present.with_estimator(self.source.estimator(present.estimator.modes, payload)))
         self.motion.collisions.carry(body(payload))
         self._warn_of_payload()
         return Done()
@@ -319,14 +322,15 @@ class Controller:
             check_joints(command.q, description)
         if command.payload is not None:
             check_body(command.payload, "payload")
-        tvist = None
+        tvist, source = None, self.source
         if command.shaper is not None:
-            tvist = choose_filter(command.shaper, self.cycle.tvist.estimator, description.joints)
+            source, tvist = self._choose(command.shaper, source)
         self.motion.abandon("simulation.reset")
         self._faults.clear()
         q = self.cycle.position if command.q is None else np.array(command.q, dtype=float)
         carried = None if command.payload is None else body(command.payload)
         if tvist is not None:
+            self.source = source
             self._use(tvist)
         if command.seed is not None:
             self._seed = command.seed
@@ -360,17 +364,28 @@ class Controller:
     def _authorize(self, token: str) -> None:
         self.session.renew(token, self.now)
 
+    def _choose(
+        self, name: str, source: ModeSource, modes: int = 1, *, where: str = "shaper"
+    ) -> tuple[ModeSource, Filter]:
+        """A filter by its name, with the estimator that was chosen, or the arm's own modal one where it takes that."""
+        wanted = wanted_modes(name, modes, where)
+        if wanted > source.most and self._modal is not None:
+            source = self._modal
+        estimator = make_estimator(source, wanted, self.declared, "modes" if modes > 1 else where)
+        return source, choose_filter(name, estimator, self.setup.description.joints, where=where)
+
     def _use(self, tvist: Filter) -> None:
         self.cycle.use(tvist)
-        self._emit("shaper_changed", why=f"{tvist.name} with estimator {self.estimator_name}")
+        self._emit("shaper_changed", why=f"{tvist.name} with estimator {self.source.name}")
 
     def _warn_of_payload(self) -> None:
-        if self.calibration is not None and not fits(self.calibration, self.declared):
+        calibration = self.source.calibration
+        if calibration is not None and not fits(calibration, self.declared, self.source.name):
             self._emit(
                 "warning",
                 code="payload_mismatch",
-                why=f"calibration {self.calibration.name!r} was made with "
-                f"{self.calibration.payload.mass:g} kg; {self.declared.mass:g} kg is declared: "
+                why=f"calibration {calibration.name!r} was made with "
+                f"{calibration.payload.mass:g} kg; {self.declared.mass:g} kg is declared: "
                 "frequencies will be off",
             )
 

@@ -3,6 +3,7 @@
 `tvist_protocol.transitions` says what leads where; here it is done.
 """
 
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -115,7 +116,8 @@ class MotionControl:
         self._check("move_j")
         start = self.cycle.reference
         try:
-            trajectory = self.cycle.plan(target, limits, self._rate(limits.velocity))
+            spared = replace(limits, acceleration=limits.acceleration * (1.0 - self.cycle.tvist.excess))
+            trajectory = self.cycle.plan(target, spared, self._rate(limits.velocity))
         except ValueError as error:
             raise RefusalError("out_of_range", "velocity", str(error)) from error
         way = target - start

@@ -11,10 +11,9 @@ from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Clock
 from tvist_protocol.values import Payload, ResetMode
-from tvist_server.calibrations import estimator_of
-from tvist_shaping.catalogue import shaper
+from tvist_server.mode_source import ModeSource, first_source
 from tvist_shaping.estimators.base import Estimator
-from tvist_shaping.estimators.fixed import Fixed
+from tvist_shaping.named import check_name
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,7 @@ class Setup:
     payload: Payload
     """Declared."""
     calibration: Calibration | None
-    """Of the polynomial estimator; None: it is `fixed` at 10 Hz and 0.2, for a robot to be identified."""
+    """Of the estimator; None: it is `fixed` at 10 Hz and 0.2, for a robot to be identified."""
     name: str = "ur5e"
     """Name of the robot on the network."""
     shaper: str = "zv"
@@ -60,11 +59,15 @@ class Setup:
         if self.carried is not None and not is_real_body(self.carried.inertia):
             inertia = list(self.carried.inertia)
             raise ValueError(f"payload.inertia is {inertia}: no body has these moments of inertia")
-        shaper(self.shaper)
+        check_name(self.shaper)
+
+    def source(self) -> ModeSource:
+        """Where modes come from to begin with."""
+        return first_source(self.description, self.calibration)
 
     def estimator(self) -> Estimator:
-        """The estimator to start with."""
-        return Fixed([10.0], [0.2]) if self.calibration is None else estimator_of(self.calibration)
+        """The lowest mode, to begin with."""
+        return self.source().estimator(1, self.payload)
 
     def to_builtins(self) -> dict[str, Any]:
         """As maps and lists, for a recording."""

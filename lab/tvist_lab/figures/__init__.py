@@ -1,7 +1,11 @@
 """The paper's figures, drawn from recordings and from the shaping library."""
 
+from tvist_lab.figures.catalogue import catalogue_figure
 from tvist_lab.figures.discretisation import figure_7
+from tvist_lab.figures.evaluated import residual_by_move_figure, vibration_figure
 from tvist_lab.figures.identified import identified_figure
+from tvist_lab.figures.mean_delay import mean_delay_figure
+from tvist_lab.figures.pareto import pareto_figure
 from tvist_lab.figures.recorded import Recorded, motion_figure, observed_figure
 from tvist_lab.figures.residual import figure_16
 from tvist_lab.figures.sensitivity import figure_4
@@ -9,11 +13,16 @@ from tvist_lab.figures.style import save
 
 __all__ = [
     "Recorded",
+    "catalogue_figure",
     "figure_4",
     "figure_7",
     "figure_16",
     "identified_figure",
+    "mean_delay_figure",
     "motion_figure",
     "observed_figure",
+    "pareto_figure",
+    "residual_by_move_figure",
     "save",
+    "vibration_figure",
 ]

@@ -1,13 +1,12 @@
 """How well a calibration says what was measured."""
 
-import msgspec
 import numpy as np
 from matplotlib.figure import Figure
 
 from tvist_lab.figures.style import SHAPED, THIRD, UNSHAPED, legend, panels, title
 from tvist_lab.recordings import Floats
 from tvist_protocol.calibration import Calibration
-from tvist_shaping import Polynomial
+from tvist_server.calibrations import estimator_of
 
 
 def identified_figure(
@@ -28,7 +27,7 @@ def identified_figure(
         true_f_d: Of the lowest true mode, shape (N,) [Hz].
         true_zeta: Of the lowest true mode, shape (N,) [-].
     """
-    estimator = Polynomial(**msgspec.structs.asdict(calibration.polynomial))
+    estimator = estimator_of(calibration)
     estimated = np.array([np.concatenate(estimator.estimate(row)) for row in q]).T
     figure, axes = panels(2, 7.6, share_x=False)
     for panel, estimate, measured, true, name in (

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib.metadata import version
 
-import msgspec
 import numpy as np
 
 from tvist_client.arm import Arm
@@ -19,7 +18,7 @@ from tvist_lab.workspace import IDENTIFIED
 from tvist_protocol.calibration import Calibration, Provenance, Spread
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.info import Info
-from tvist_shaping import Polynomial
+from tvist_server.calibrations import estimator_of
 
 CONFIGURATIONS = 160
 REPEATS = 3
@@ -80,7 +79,7 @@ class Identification:
 
     def poses(self) -> list[dict[str, float]]:
         """Measured and estimated mode at each named pose."""
-        estimator = Polynomial(**msgspec.structs.asdict(self.calibration.polynomial))
+        estimator = estimator_of(self.calibration)
         rows = []
         for number in range(self.anchors):
             estimated_f_d, estimated_zeta = estimator.estimate(self.q[number])

@@ -8,7 +8,7 @@ from tvist_client.arm import Arm
 from tvist_client.robot import Robot
 from tvist_lab.collect import collect
 from tvist_lab.metrics import RingDown, fit_ring_down, motions, tool_acceleration
-from tvist_lab.recordings import Floats
+from tvist_lab.recordings import Floats, RecordingError
 from tvist_protocol.errors import RefusedError
 
 LISTEN = 0.6
@@ -17,6 +17,14 @@ PAUSE = 0.3
 """Time it rests before the next [s]."""
 MODES = 2
 """Modes that are fitted together."""
+SKIPPED = 7
+"""Ticks after the stop that a `Ringing` leaves out: the end of the deceleration ramp is no ring-down."""
+SAMPLES = 200
+"""Ticks that it has."""
+QUIET = 75
+"""Last ticks before a jog, in which nothing but noise is felt."""
+LEAST_NOISE = 0.01
+"""Noise that is counted on at least [m/s^2]: no model is better than that."""
 SHARE = 0.25
 """The lowest mode that rings at least this loud beside the loudest is the first one [-]."""
 
@@ -36,6 +44,25 @@ class Jog:
         used = min(joints, len(self.shares))
         jog[:used] = self.length * np.array(self.shares[:used])
         return jog
+
+
+@dataclass(frozen=True)
+class Ringing:
+    """What the tool felt at a configuration after a jog."""
+
+    q: Floats
+    """Configuration, shape (n,) [rad]."""
+    payload: int
+    """Number of the payload carried."""
+    force: Floats
+    """Specific force from shortly after the stop on, shape (T, 3) [m/s^2]."""
+    noise: float
+    """Its noise at rest, rms an axis [m/s^2]."""
+
+    @property
+    def rms(self) -> float:
+        """Of what is not constant, an axis [m/s^2]."""
+        return float(np.sqrt(np.mean((self.force - self.force.mean(axis=0)) ** 2)))
 
 
 async def reach(arm: Arm, q: Floats) -> None:
@@ -86,3 +113,35 @@ async def measure(robot: Robot, arm: Arm, q: Floats, jog: Jog, repeats: int) -> 
         rings.append(tool_acceleration(recording)[stop : stop + round(LISTEN / period)])
     length = min(map(len, rings))
     return fit_ring_down(np.mean([ring[:length] for ring in rings], axis=0), period, modes=MODES, share=SHARE)
+
+
+async def listen(robot: Robot, arm: Arm, q: Floats, payload: int, jog: Jog) -> Ringing:
+    """Jog to a configuration once and listen.
+
+    Args:
+        robot: The robot.
+        arm: Control of it; its shaper must be `none`.
+        q: Configuration, shape (n,) [rad].
+        payload: Number of the payload carried, to be noted.
+        jog: The move that makes it ring.
+
+    Raises:
+        RefusedError: The configuration cannot be reached; code `collision`.
+        RecordingError: States were lost on the way.
+    """
+    start = q - jog.of(len(q))
+    await reach(arm, start)
+    period = 1.0 / (await robot.info()).rate_hz
+    with collect(robot) as collected:
+        await robot.advance(round(PAUSE / period))
+        await arm.move_j(q)
+        await robot.advance(SKIPPED + SAMPLES + 50)
+    recording = collected.recording()
+    if recording.missing_ticks:
+        raise RecordingError(f"{recording.missing_ticks} states were lost: the way to the robot is too slow")
+    force = recording["actual_tool_accelerometer"]
+    moved = motions(recording)[-1]
+    first = moved.shaped_stop + SKIPPED
+    before = force[max(moved.start - QUIET, 0) : moved.start]
+    noise = float(np.sqrt(np.mean((before - before.mean(axis=0)) ** 2)))
+    return Ringing(q, payload, force[first : first + SAMPLES], max(noise, LEAST_NOISE))

@@ -33,6 +33,8 @@ APART = 1e-7
 """Distance against their size below which two poles followed are suspected of being one [-]."""
 LOWEST = 0.5
 """Frequency below which a pole is no vibration [Hz]."""
+DAMPED = 0.9
+"""Damping ratio above which a pole is no vibration [-]."""
 JUMP = 0.1
 """Change of a joint from one estimate to the next that no motion makes [rad]."""
 RESTING, MOVING, JUMPED = range(3)
@@ -117,7 +119,8 @@ class Drivetrain:
         system[:N, N:] = np.eye(N)
         system[N:, :N], system[N:, N:] = (-np.linalg.solve(inertia, part) for part in (stiffness, damping))
         values, vectors = np.linalg.eig(system)
-        chosen = np.flatnonzero(values.imag > 2.0 * np.pi * LOWEST)
+        vibrates = (values.imag > 2.0 * np.pi * LOWEST) & (-values.real < DAMPED * np.abs(values))
+        chosen = np.flatnonzero(vibrates)
         chosen = chosen[np.argsort(values[chosen].imag)]
         shapes = vectors[:L, chosen].T
         largest = np.abs(shapes).argmax(axis=1)
@@ -192,7 +195,7 @@ def follow(  # noqa: C901, PLR0912 - one kernel: its branches are loops over coo
             if abs(step) <= CONVERGED * abs(s):
                 found = True
                 break
-        if not found or s.imag <= 2.0 * np.pi * LOWEST:
+        if not found or s.imag <= 2.0 * np.pi * LOWEST or -s.real >= DAMPED * abs(s):
             return False
         poles[k] = s
     for k in range(poles.shape[0]):

@@ -1,18 +1,28 @@
-"""`tvist identify`: calibrate a robot from its own accelerometer."""
+"""`tvist identify`: learn from a robot's own sensors what shaping has to know of it."""
 
 import asyncio
-from contextlib import AsyncExitStack
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import err, out, print_json, progress, table
+from tvist_cli.identified import report_modal, report_payload, report_polynomial
+from tvist_cli.output import err, progress
 
 if TYPE_CHECKING:
-    from tvist_lab.identification.identify import Identification
+    from tvist_client.arm import Arm
+    from tvist_client.robot import Robot
+    from tvist_lab.identification.modal import ModalIdentification
+    from tvist_lab.identification.payload import PayloadFound
+    from tvist_plant.description import RobotDescription
 
-PAPER_MASS = 5.0
-"""What a served robot carries unless told otherwise [kg]."""
+MASSES = "0,5"
+"""Payloads that a modal model is made with, unless told otherwise [kg]."""
+
+Doing = Callable[["Robot", "Arm"], Awaitable[Any]]
 
 
 def identify(
@@ -21,83 +31,143 @@ def identify(
     output: Path = Path("calibration.json"),
     name: str | None = None,
     robot: str = "ur5e",
+    description: str | None = None,
     security: Path | None = None,
-    payload: float | None = None,
+    model: Literal["polynomial", "modal"] = "polynomial",
+    payload: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     configurations: int = 160,
     repeats: int = 3,
+    ring_downs: int = 12,
+    payloads: str | None = None,
+    poses: int = 6,
+    declare: bool = False,
     seed: int = 0,
     at: list[str] | None = None,
     figures: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Jog the arm all over its workspace, fit what rings, and write a calibration.
+    """Jog the arm, fit what rings, and write a calibration; or find what the arm carries.
 
-    Without an endpoint a robot is made in this process and runs as fast as it computes (about a minute); with one it
-    is done over the network, in the robot's own time (about half an hour).
+    The model polynomial says the lowest mode with one payload, from many configurations: about a minute in process,
+    half an hour over a network. The model modal says any mode with any payload, from a dozen ring-downs: seconds in
+    process, a minute over a network. With --payload and no mass nothing is calibrated: mass and centre of mass of
+    what the arm carries are found by its torques.
+
+    Without an endpoint a robot is made in this process and runs as fast as it computes.
 
     Args:
         endpoint: Zenoh endpoint of a served robot.
         output: File to write.
         name: Of the calibration; default: the file's.
         robot: Name of the served robot; in process, the robot file.
+        description: Robot file with the masses of a served robot; default: the UR5e's.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
-        payload: Mass of the paper's disc in kg, in process.
-        configurations: How many, spread over the workspace.
-        repeats: Jogs averaged at each.
-        seed: Of the spread, and of noise and gear errors in process.
-        at: Poses to measure with more weight: names of the robot file or angles with commas [Q1 Q2 Q3].
-        figures: Folder for a figure of the fit.
+        model: What to fit.
+        payload: Mass of the paper's disc in kg, in process. Without a mass: find what the arm carries.
+        configurations: How many, spread over the workspace, for polynomial.
+        repeats: Jogs averaged at each, for polynomial.
+        ring_downs: How many in all, for modal.
+        payloads: Masses in kg with commas that a simulated arm carries in turn, for modal; default: 0,5 in process,
+            what is declared over a network.
+        poses: In how many the arm rests, for --payload.
+        declare: Declare the payload that was found.
+        seed: Of the choice of configurations, and of noise and gear errors in process.
+        at: Poses to measure with more weight, for polynomial: names of the robot file or angles with commas [Q1 Q2 Q3].
+        figures: Folder for a figure of the fit, for polynomial.
         json: Print one JSON object.
     """
-    if configurations < 1 or repeats < 1:
-        raise Failure("configurations and repeats must be at least 1", code=2)
-    from tvist_client.robot import Robot
-    from tvist_lab.identification.fit import FitError
-    from tvist_lab.identification.identify import Plan
-    from tvist_lab.identification.identify import identify as run
-    from tvist_lab.in_process import free_setup, robot_in_process
+    if min(configurations, repeats, ring_downs, poses) < 1:
+        raise Failure("configurations, repeats, ring-downs and poses must be at least 1", code=2)
+    endpoint, mass = _endpoint_and_mass(endpoint, payload)
     from tvist_plant.description import DescriptionError, load
-    from tvist_protocol.calibration import calibration_to_json
-    from tvist_server.config import ConfigError, from_mapping
 
-    with told(DescriptionError, ConfigError, code=2):
-        description = load(robot if endpoint is None else "ur5e")
-        anchors = [
-            _pose(text, description.poses, description.joints) for text in at or list(description.poses)
-        ]
-        setup = None
+    with told(DescriptionError, code=2):
+        arm = load(description or (robot if endpoint is None else "ur5e"))
+    place = _Place(endpoint, robot, security, mass, seed)
+    called = name or output.stem
+    if payload is not None and mass is None:
+        _payload(place, arm, poses, declare=declare, json=json)
+    elif model == "modal":
+        masses = MASSES if payloads is None and mass is None and endpoint is None else payloads
+        _modal(place, arm, ring_downs, masses, output, called, json=json)
+    else:
+        anchors = [_pose(text, arm.poses, arm.joints) for text in at or list(arm.poses)]
+        _polynomial(place, anchors, configurations, repeats, output, called, figures, json=json)
+
+
+class _Place:
+    """Which robot."""
+
+    def __init__(
+        self, endpoint: str | None, robot: str, security: Path | None, mass: float | None, seed: int
+    ) -> None:
+        from tvist_lab.in_process import free_setup
+        from tvist_server.config import ConfigError, from_mapping
+
+        self.endpoint, self.robot, self.security, self.mass, self.seed = endpoint, robot, security, mass, seed
+        self._setup = None
         if endpoint is None:
             content = {
                 "robot": robot,
-                "payload": payload,
+                "payload": mass,
                 "calibration": "none",
                 "clock": "free",
                 "seed": seed,
                 "truth": True,
             }
-            setup = free_setup(from_mapping(content, "options"))
-    plan = Plan(configurations=configurations, anchors=tuple(anchors), repeats=repeats, seed=seed)
-    command = f"tvist identify --configurations {configurations} --repeats {repeats} --seed {seed}"
-    if payload is not None:
-        command += f" --payload {payload:g}"
+            with told(ConfigError, code=2):
+                self._setup = free_setup(from_mapping(content, "options"))
 
-    async def measure() -> "Identification":
+    def run(self, doing: Doing) -> Any:
+        """Do something as a client with control."""
+
+        async def whole() -> Any:
+            async with self._controlled() as (client, arm):
+                return await doing(client, arm)
+
+        return asyncio.run(whole())
+
+    @asynccontextmanager
+    async def _controlled(self) -> "AsyncIterator[tuple[Robot, Arm]]":
+        from tvist_client.robot import Robot
+        from tvist_lab.in_process import robot_in_process
+
         async with AsyncExitStack() as stack:
-            if endpoint is not None:
-                client = await stack.enter_async_context(
-                    await Robot.connect(endpoint, robot, security=security)
-                )
-            elif setup is not None:
-                client = await stack.enter_async_context(robot_in_process(setup))
-            arm = await stack.enter_async_context(client.control("identify"))
-            with progress(configurations + len(anchors), "ring-downs") as bar:
-                return await run(
-                    client, arm, plan, name=name or output.stem, command=command,
-                    progress=lambda: bar(1, None),
-                )  # fmt: skip
+            if self._setup is not None:
+                client = await stack.enter_async_context(robot_in_process(self._setup))
+            else:
+                connected = await Robot.connect(str(self.endpoint), self.robot, security=self.security)
+                client = await stack.enter_async_context(connected)
+            yield client, await stack.enter_async_context(client.control("identify"))
 
+
+def _polynomial(
+    place: _Place,
+    anchors: list[tuple[float, ...]],
+    configurations: int,
+    repeats: int,
+    output: Path,
+    name: str,
+    figures: Path | None,
+    *,
+    json: bool,
+) -> None:
+    from tvist_lab.identification.fit import FitError
+    from tvist_lab.identification.identify import Plan
+    from tvist_lab.identification.identify import identify as run
+    from tvist_protocol.calibration import calibration_to_json
+
+    plan = Plan(configurations=configurations, anchors=tuple(anchors), repeats=repeats, seed=place.seed)
+    command = f"tvist identify --configurations {configurations} --repeats {repeats} --seed {place.seed}"
+    if place.mass is not None:
+        command += f" --payload {place.mass:g}"
     with told(FitError, OSError):
-        done = asyncio.run(measure())
+        with progress(configurations + len(anchors), "ring-downs") as bar:
+            done = place.run(
+                lambda client, arm: run(
+                    client, arm, plan, name=name, command=command, progress=lambda: bar(1, None)
+                )
+            )
         output.write_bytes(calibration_to_json(done.calibration))
     if figures is not None:
         from tvist_lab.figures import identified_figure, save
@@ -107,7 +177,83 @@ def identify(
             done.calibration, done.q, done.f_d, done.zeta, done.true_f_d, done.true_zeta
         )
         err.print(str(save(drawn, figures / "identification.png")))
-    _report(done, output, json=json)
+    report_polynomial(done, output, json=json)
+
+
+def _modal(
+    place: _Place,
+    arm: "RobotDescription",
+    ring_downs: int,
+    masses: str | None,
+    output: Path,
+    name: str,
+    *,
+    json: bool,
+) -> None:
+    from tvist_lab.identification.modal import ModalPlan, identify_modal
+    from tvist_protocol.calibration import calibration_to_json
+    from tvist_server.setup import paper_payload
+
+    carried = () if masses is None else tuple(paper_payload(arm, mass) for mass in _masses(masses))
+    plan = ModalPlan(ring_downs=ring_downs, payloads=carried, seed=place.seed)
+    command = f"tvist identify --model modal --ring-downs {ring_downs} --seed {place.seed}"
+    if masses is not None:
+        command += f" --payloads {masses}"
+    elif place.mass is not None:
+        command += f" --payload {place.mass:g}"
+
+    with told(OSError):
+        with progress(ring_downs, "ring-downs") as bar:
+
+            async def run(client: "Robot", control: "Arm") -> "ModalIdentification":
+                return await identify_modal(
+                    client, control, arm, plan, name=name, command=command, progress=lambda: bar(1, None)
+                )
+
+            done = place.run(run)
+        output.write_bytes(calibration_to_json(done.calibration))
+    report_modal(done, output, json=json)
+
+
+def _payload(place: _Place, arm: "RobotDescription", poses: int, *, declare: bool, json: bool) -> None:
+    from tvist_lab.identification.payload import identify_payload
+
+    with told(OSError), progress(poses + 1, "poses") as bar:
+
+        async def run(client: "Robot", control: "Arm") -> "PayloadFound":
+            found = await identify_payload(
+                client, control, arm, poses=poses, seed=place.seed, progress=lambda: bar(1, None)
+            )
+            if declare:
+                new = found.payload
+                await control.set_payload(new.mass, new.com, new.inertia)
+            return found
+
+        found = place.run(run)
+    report_payload(found, declared=declare, json=json)
+
+
+def _endpoint_and_mass(endpoint: str | None, payload: list[str] | None) -> tuple[str | None, float | None]:
+    """Tell a mass from an endpoint: an option that may stand without a value takes what follows it."""
+    mass = None
+    for word in payload or []:
+        try:
+            mass = float(word)
+        except ValueError:
+            if endpoint is not None or "/" not in word:
+                raise Failure(f"payload is {word!r}: must be a mass in kg, or nothing", code=2) from None
+            endpoint = word
+    return endpoint, mass
+
+
+def _masses(text: str) -> tuple[float, ...]:
+    try:
+        masses = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        masses = ()
+    if not masses or not all(0.0 <= mass <= 100.0 for mass in masses) or len(set(masses)) < len(masses):
+        raise Failure(f"payloads is {text!r}: must be different masses in kg with commas", code=2)
+    return masses
 
 
 def _pose(text: str, poses: dict[str, tuple[float, ...]], joints: int) -> tuple[float, ...]:
@@ -122,53 +268,3 @@ def _pose(text: str, poses: dict[str, tuple[float, ...]], joints: int) -> tuple[
             f"at is {text!r}: must be one of {', '.join(poses)}, or {joints} angles with commas", code=2
         )
     return angles
-
-
-def _report(done: "Identification", output: Path, *, json: bool) -> None:
-    how = done.calibration.provenance
-    if json:
-        print_json(
-            {
-                "file": str(output),
-                "configurations": how.configurations,
-                "ring_downs": how.ring_downs,
-                "rejected": how.rejected,
-                "f_d_range_hz": how.measured_f_d_range,
-                "zeta_range": how.measured_zeta_range,
-                "error_f_d_percent": done.error_f_d.median,
-                "error_zeta_percent": done.error_zeta.median,
-                "error_f_d_p90_percent": done.error_f_d.p90,
-                "error_zeta_p90_percent": done.error_zeta.p90,
-                "against": done.against,
-                "cross_validated_f_d_percent": how.cross_validated_f_d_percent.median,
-                "cross_validated_zeta_percent": how.cross_validated_zeta_percent.median,
-                "poses": done.poses(),
-            }
-        )
-        return
-    low, high = how.measured_f_d_range
-    out.print(
-        f"{how.configurations} configurations, {how.ring_downs} ring-downs, {how.rejected} configurations rejected; "
-        f"f_d spans {low:.1f} to {high:.1f} Hz over the workspace (paper: 6 to 15 Hz)"
-    )
-    table(
-        "deviation of the calibration",
-        ("against", "f_d median %", "p90 %", "ζ median %", "p90 %"),
-        [
-            _row("its own measurements", how.residual_f_d_percent, how.residual_zeta_percent),
-            _row(
-                "measurements it did not see",
-                how.cross_validated_f_d_percent,
-                how.cross_validated_zeta_percent,
-            ),
-            *([_row(done.against, done.error_f_d, done.error_zeta)] if done.true_f_d is not None else []),
-        ],
-    )
-    mass = (
-        f" --payload {done.calibration.payload.mass:g}" if done.calibration.payload.mass != PAPER_MASS else ""
-    )
-    out.print(f"written to {output}; use it with: tvist serve --calibration {output}{mass}")
-
-
-def _row(against: str, f_d: object, zeta: object) -> tuple[str, ...]:
-    return (against, *(f"{getattr(s, k):.1f}" for s in (f_d, zeta) for k in ("median", "p90")))

@@ -47,7 +47,7 @@ def serve(
         security: Folder made by tvist keys; the endpoint is then tls/ADDRESS:PORT, and who has no role sees nothing.
         insecure: Listen beyond this machine without: anybody there may move the robot.
         payload: Mass of the paper's disc on the flange in kg [5].
-        shaper: none, zv, mzv, zvd, ei, ei2 or ei3 [zv].
+        shaper: Any that tvist shapers lists, such as none, zv or ei3 [zv].
         calibration: Calibration that comes with the package, or path of one; none for a robot to be identified.
         clock: realtime, or lockstep: a client lets time pass [realtime].
         speed: Of the robot's time against the clock's [1].

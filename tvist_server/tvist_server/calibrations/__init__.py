@@ -7,6 +7,7 @@ import msgspec
 
 from tvist_protocol.calibration import Calibration, CalibrationError, calibration_from_json
 from tvist_protocol.values import Payload
+from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.polynomial import Polynomial
 
 DEFAULT = "ur5e_5kg"
@@ -46,13 +47,21 @@ def estimator_of(calibration: Calibration) -> Polynomial:
     """The paper's estimator with a calibration's polynomials.
 
     Raises:
-        EstimatorError: The polynomials' parts do not go together.
+        EstimatorError: There are none, or the polynomials' parts do not go together.
     """
+    if calibration.polynomial is None:
+        raise EstimatorError("polynomial", None, "there; this calibration is for the estimator modal alone")
     return Polynomial(**msgspec.structs.asdict(calibration.polynomial))
 
 
-def fits(calibration: Calibration, payload: Payload) -> bool:
-    """Whether a calibration was made with this payload: within 2 % of mass and 10 mm of its centre."""
+def fits(calibration: Calibration, payload: Payload, estimator: str = "polynomial") -> bool:
+    """Whether a calibration holds for this payload.
+
+    Its modal model holds for any. Polynomials hold for the one they were made with: within 2 % of mass and
+    10 mm of its centre.
+    """
+    if estimator == "modal" or calibration.polynomial is None:
+        return True
     made_with = calibration.payload
     if abs(payload.mass - made_with.mass) > 0.02 * max(made_with.mass, 1.0):
         return False

@@ -52,6 +52,11 @@ class InverseDynamics:
         share = (1.0 - left) ** 2 * (1.0 + 2.0 * left)
         self._load(self._before + share * (self._after - self._before) if left > 0.0 else self._after)
 
+    @property
+    def changing(self) -> bool:
+        """Whether one payload is giving way to another."""
+        return self._ticks_left > 0
+
     def settle(self) -> None:
         """Put the payload declared last into force at once."""
         self._ticks_left = 0

@@ -1,0 +1,86 @@
+"""The eight arms of the bench."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from msgspec.structs import replace
+
+from tvist_lab.evaluation.plants import MujocoArm, Variant, VariantPlant, Yields
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.plant import Plant
+
+SCATTER = 0.15
+"""By which stiffness and gains may differ from the description's, either way [-]."""
+
+
+@dataclass(frozen=True)
+class Arm:
+    """One of them; the controller goes by the description all the same."""
+
+    name: str
+    """In JSON."""
+    label: str
+    """What it has."""
+    make: Callable[[RobotDescription, Payload, int], Any]
+    """Description, payload carried and seed to something with the plant's `reset`, `step` and `truth`."""
+
+
+def _calibrated(description: RobotDescription, carried: Payload, seed: int) -> Plant:  # noqa: ARG001
+    return Plant(description, carried)
+
+
+def _coulomb(description: RobotDescription, carried: Payload, seed: int) -> Plant:  # noqa: ARG001
+    drives = replace(description.drives, friction_width=0.2 * description.drives.friction_width)
+    return VariantPlant(replace(description, drives=drives), carried, Variant())
+
+
+def _stribeck(description: RobotDescription, carried: Payload, seed: int) -> Plant:  # noqa: ARG001
+    drives = replace(description.drives, friction_width=0.3 * description.drives.friction_width)
+    return VariantPlant(replace(description, drives=drives), carried, Variant(breakaway=1.5))
+
+
+def _hysteretic(description: RobotDescription, carried: Payload, seed: int) -> Plant:  # noqa: ARG001
+    return VariantPlant(description, carried, Variant(hysteresis=0.3))
+
+
+def _piecewise(description: RobotDescription, carried: Payload, seed: int) -> Plant:  # noqa: ARG001
+    return VariantPlant(description, carried, Variant(soft=0.75))
+
+
+def _scattered(description: RobotDescription, carried: Payload, seed: int) -> Plant:
+    random = np.random.default_rng([seed, 15])
+
+    def scattered(values: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple((np.array(values) * random.uniform(1.0 - SCATTER, 1.0 + SCATTER, len(values))).tolist())
+
+    drives, links = description.drives, description.link_flexibility
+    names = ("gear_stiffness", "velocity_gain", "position_gain")
+    other = replace(drives, **{name: scattered(getattr(drives, name)) for name in names})
+    bending = replace(links, stiffness=scattered(links.stiffness))
+    return Plant(replace(description, drives=other, link_flexibility=bending), carried)
+
+
+def _on_base(description: RobotDescription, carried: Payload, seed: int) -> Plant:  # noqa: ARG001
+    return VariantPlant(description, carried, Variant(base=Yields()))
+
+
+def _mujoco(description: RobotDescription, carried: Payload, seed: int) -> MujocoArm:  # noqa: ARG001
+    return MujocoArm(description, carried)
+
+
+ARMS = (
+    Arm("calibrated", "as described", _calibrated),
+    Arm("coulomb", "friction that changes sign within a fifth of the speed", _coulomb),
+    Arm("stribeck", "friction half as high again at breakaway", _stribeck),
+    Arm(
+        "hysteresis",
+        "gears with hysteresis: 30 % stiffer when turning back, 2 % of the torque lost",
+        _hysteretic,
+    ),
+    Arm("piecewise", "gears 25 % softer below a tenth of the torque", _piecewise),
+    Arm("scattered", "stiffness and gains of every joint and link off by up to 15 %", _scattered),
+    Arm("base", "a base that yields, 150 kN m/rad about two axes", _on_base),
+    Arm("mujoco", "built in MuJoCo alone, no gear error", _mujoco),
+)

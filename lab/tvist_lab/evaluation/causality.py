@@ -1,0 +1,56 @@
+"""Does a shaper know what is to come? Two references that differ only after a tick must give equal outputs up to it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tvist_lab.evaluation.candidates import Candidate, ShaperFaultError, Stepper, Task
+from tvist_lab.recordings import Floats
+from tvist_plant.plant import PERIOD
+
+PLACES = (0.15, 0.5, 0.8)
+"""Of the tick after which the references differ, as shares of the motion [-]."""
+ELSEWHERE = 1.0
+"""Acceleration with which the other reference goes its own way [rad/s²]."""
+TWICE = "gives another output when the same reference is run again: it keeps something, or draws by chance"
+
+
+def check_causal(candidate: Candidate, task: Task) -> None:
+    """Run a shaper on a reference, on others with the same beginning, and on the first again.
+
+    A shaper that remembers a reference, or looks where it is kept, gives other outputs for another future.
+
+    Raises:
+        ShaperFaultError: It does, or the same reference gives another output the second time.
+    """
+    first = _outputs(candidate, task)
+    if first is None:
+        return
+    for place in PLACES:
+        tick = int(place * len(task.reference))
+        for sign in (1.0, -1.0):
+            other = _outputs(candidate, _elsewhere(task, tick, sign))
+            assert other is not None
+            apart = np.flatnonzero((first[: tick + 1] != other[: tick + 1]).any(axis=1))
+            if apart.size:
+                raise ShaperFaultError(
+                    f"peeks at the future: references that are equal up to tick {tick} give other outputs from tick "
+                    f"{apart[0]} on"
+                )
+    again = _outputs(candidate, task)
+    assert again is not None
+    if not np.array_equal(first, again):
+        raise ShaperFaultError(TWICE)
+
+
+def _outputs(candidate: Candidate, task: Task) -> Floats | None:
+    stepper: Stepper | None = candidate.stepper(task)
+    return None if stepper is None else np.array([stepper.step(sample) for sample in task.reference])
+
+
+def _elsewhere(task: Task, tick: int, sign: float) -> Task:
+    """The same up to a tick, then off on a parabola; nothing else tells of the first target either."""
+    reference = task.reference.copy()
+    late = PERIOD * np.arange(1, len(reference) - tick)
+    reference[tick + 1 :] += sign * 0.5 * ELSEWHERE * late[:, None] ** 2
+    return replace(task, reference=reference, move=replace(task.move, target=tuple(reference[-1].tolist())))

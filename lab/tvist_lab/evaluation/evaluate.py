@@ -1,0 +1,233 @@
+"""Moves, each unshaped and shaped, and what that comes to."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tvist_lab.evaluation.baselines import Baseline
+from tvist_lab.evaluation.line import PAPER, control_line, point_to_point, shape, simulate
+from tvist_lab.evaluation.moves import Move
+from tvist_lab.evaluation.recipes import Recipe, spared
+from tvist_lab.evaluation.workers import spread
+from tvist_lab.metrics import (
+    NotMeasurableError,
+    motions,
+    peak_acceleration,
+    peak_after_stop,
+    peak_velocity,
+    still_after,
+)
+from tvist_lab.recordings import Floats, Recording
+from tvist_plant.description import RobotDescription
+from tvist_plant.plant import PERIOD
+from tvist_server.setup import body, paper_payload
+
+WORTH = 0.2
+"""An unshaped peak below this is no vibration to reduce: the move is listed, but not in the percentages [m/s²]."""
+RESAMPLED = 2000
+"""Bootstrap samples of an interval."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One move and how it is to be made."""
+
+    description: RobotDescription
+    """The arm, and what the controller believes of it."""
+    move: Move
+    recipe: Recipe
+    baselines: tuple[Baseline, ...] = ()
+    """To be run beside it."""
+    seed: int = 0
+    """Of gear errors."""
+
+
+@dataclass(frozen=True)
+class Made:
+    """One move made in one way."""
+
+    peak: float
+    """Largest true |α| later than 10 ms after the reference stops [m/s²]."""
+    duration: float
+    """Of the shaped reference [s]."""
+    still_after: float | None
+    """From the start of the unshaped reference; None: not still when the rest ended [s]."""
+    acceleration: float
+    """Largest |q̈*| over the limit of the unshaped reference [-]."""
+    velocity: float
+    """Largest |q̇*| over its limit [-]."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One move made in every way."""
+
+    unshaped: Made
+    shaped: Made
+    baselines: dict[str, Made] = field(default_factory=dict)
+    """By their names."""
+
+    @property
+    def counts(self) -> bool:
+        """Whether there is vibration worth a percentage."""
+        return self.unshaped.peak >= WORTH
+
+    def reduction(self, made: Made) -> float:
+        """By which a way lowers the peak [%]."""
+        return 100.0 * (1.0 - made.peak / self.unshaped.peak)
+
+    def delay(self, made: Made) -> float:
+        """By which a way's reference lasts longer [ms]."""
+        return round(1e3 * (made.duration - self.unshaped.duration), 6)
+
+
+def record(job: Job) -> tuple[Recording, Recording]:
+    """A move unshaped and shaped, on the same arm with the same seed."""
+    unshaped, shaped, _ = _record(job)
+    return unshaped, shaped
+
+
+def judge(job: Job) -> Judged:
+    """Make a move in every way and measure it."""
+    unshaped, shaped, others = _record(job)
+    return Judged(
+        measured(unshaped), measured(shaped), {name: measured(other) for name, other in others.items()}
+    )
+
+
+def evaluate(jobs: Sequence[Job]) -> Iterator[Judged]:
+    """All jobs in order, each as soon as it is done, on all cores."""
+    return spread(judge, jobs)
+
+
+def measured(recording: Recording) -> Made:
+    """Measure the one motion of a recording."""
+    motion = motions(recording)[0]
+    try:
+        still: float | None = still_after(recording, motion)
+    except NotMeasurableError:
+        still = None
+    return Made(
+        peak=peak_after_stop(recording, motion),
+        duration=motion.shaped_duration(recording),
+        still_after=still,
+        acceleration=peak_acceleration(recording, motion) / PAPER.acceleration,
+        velocity=peak_velocity(recording, motion) / PAPER.velocity,
+    )
+
+
+def _record(job: Job) -> tuple[Recording, Recording, dict[str, Recording]]:
+    description, move, recipe = job.description, job.move, job.recipe
+    start, target = np.array(move.start), np.array(move.target)
+    carried = body(paper_payload(description, move.mass))
+    cycle = control_line(description, start, carried, carried)
+    reference = point_to_point(start, target)
+
+    def follow(shaped: Floats) -> Recording:
+        return simulate(cycle, start, reference, shaped, job.seed)
+
+    tvist = recipe.make(description, move.mass)
+    tvist.reset(start)
+    shaped = follow(shape(tvist.filter, point_to_point(start, target, spared(PAPER, tvist)))[0])
+    ticks = round(motions(shaped)[0].shaped_duration(shaped) / PERIOD)
+    others = {
+        baseline.name: follow(baseline.shaped(recipe, description, move, reference, ticks))
+        for baseline in job.baselines
+    }
+    return follow(reference), shaped, others
+
+
+def report(jobs: Sequence[Job], judged: Sequence[Judged]) -> dict[str, Any]:
+    """What `tvist evaluate --json` prints of the moves."""
+    counted = [one for one in judged if one.counts]
+    rows = [_row(job, one) for job, one in zip(jobs, judged, strict=True)]
+    names = judged[0].baselines if judged else {}
+    return {
+        "moves": rows,
+        "counted": len(counted),
+        "left_out": [number for number, one in enumerate(judged, 1) if not one.counts],
+        **_summary([(one, one.shaped) for one in judged]),
+        "baselines": {
+            "waiting": _summary([(one, one.unshaped) for one in judged]),
+            **{name: _summary([(one, one.baselines[name]) for one in judged]) for name in names},
+        }
+        if names
+        else {},
+    }
+
+
+def _row(job: Job, one: Judged) -> dict[str, Any]:
+    return {
+        "payload_kg": job.move.mass,
+        "unshaped_peak_m_s2": one.unshaped.peak,
+        "shaped_peak_m_s2": one.shaped.peak,
+        "reduction_percent": one.reduction(one.shaped) if one.counts else None,
+        "delay_ms": one.delay(one.shaped),
+        "still_after_ms": {"unshaped": _ms(one.unshaped.still_after), "shaped": _ms(one.shaped.still_after)},
+        "peak_acceleration_ratio": one.shaped.acceleration,
+        "peak_velocity_ratio": one.shaped.velocity,
+        **(
+            {
+                "baselines": {
+                    name: {
+                        "peak_m_s2": made.peak,
+                        "reduction_percent": one.reduction(made) if one.counts else None,
+                        "delay_ms": one.delay(made),
+                        "still_after_ms": _ms(made.still_after),
+                    }
+                    for name, made in one.baselines.items()
+                }
+            }
+            if one.baselines
+            else {}
+        ),
+    }
+
+
+def _summary(pairs: list[tuple[Judged, Made]]) -> dict[str, Any]:
+    """Of one way over all moves; reductions over those that count."""
+    reductions = np.array([one.reduction(made) for one, made in pairs if one.counts])
+    delays = np.array([one.delay(made) for one, made in pairs])
+    accelerations, velocities = np.array([[made.acceleration, made.velocity] for _, made in pairs]).T
+    quiet = [made.peak for one, made in pairs if not one.counts]
+    # How long until still after the unshaped reference would have stopped: moves differ in length, this does not.
+    late = [
+        round(1e3 * (made.still_after - one.unshaped.duration), 6)
+        for one, made in pairs
+        if made.still_after is not None
+    ]
+    return {
+        "reduction_percent": _of(reductions, median=50, p5=5, min=0),
+        "reduction_percent_interval": {
+            name: interval(reductions, share) for name, share in (("median", 50), ("p5", 5))
+        },
+        "delay_ms": _of(delays, median=50, max=100),
+        "peak_acceleration_ratio": _of(accelerations, median=50, p90=90, max=100),
+        "peak_velocity_ratio": _of(velocities, median=50, p90=90, max=100),
+        "still_after_unshaped_stop_ms": _of(np.array(late), median=50, p90=90, max=100),
+        "never_still": len(pairs) - len(late),
+        "left_out_largest_peak_m_s2": max(quiet, default=None),
+    }
+
+
+def interval(values: Floats, percentile: float) -> list[float] | None:
+    """95 % bootstrap interval of a percentile; None where there are no values."""
+    if not values.size:
+        return None
+    random = np.random.default_rng(0)
+    drawn = values[random.integers(0, values.size, (RESAMPLED, values.size))]
+    low, high = np.percentile(np.percentile(drawn, percentile, axis=1), [2.5, 97.5])
+    return [float(low), float(high)]
+
+
+def _of(values: Floats, **percentiles: float) -> dict[str, float | None]:
+    return {
+        name: float(np.percentile(values, share)) if values.size else None
+        for name, share in percentiles.items()
+    }
+
+
+def _ms(seconds: float | None) -> float | None:
+    return None if seconds is None else round(1e3 * seconds, 6)

@@ -1,0 +1,204 @@
+"""The control line without a server: a reference, what a shaper makes of it, and what an arm does with that.
+
+A shaper sees nothing but the reference, so what it makes of it can be computed first, and then be given to any number
+of arms. To the bit it is what the line does tick by tick.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from tvist_lab.recordings import Floats, Recording
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.plant import PERIOD, Plant
+from tvist_server.control.differentiator import Target
+from tvist_server.cycle import STILL, ControlCycle
+from tvist_server.trajectory import DoubleS, Limits, Trajectory
+from tvist_shaping.catalogue import shaper
+from tvist_shaping.estimators.fixed import Fixed
+from tvist_shaping.filter import TvistFilter
+
+PAPER = Limits(velocity=1.5, acceleration=2.0, jerk=100.0)
+"""The paper's limits, and a `move_j`'s where none are given."""
+LONGEST = 3.0
+"""Time after the reference's end in which a shaped reference has to end [s]."""
+REST = 0.7
+"""Time simulated after that [s]."""
+
+Step = Callable[[Floats], Floats]
+"""A shaper at work: sample of the reference to shaped sample, both of shape (n,) [rad]."""
+
+
+class Unchanged(TvistFilter):
+    """Gives what it gets: a trajectory that was shaped before is not shaped again."""
+
+    def __init__(self, joints: int) -> None:
+        super().__init__(shaper("none"), Fixed([10.0], [0.1]), joints=joints)
+
+    def filter(self, q_ref: npt.ArrayLike) -> Floats:
+        """The sample."""
+        return np.asarray(q_ref)
+
+
+class Played(Trajectory):
+    """A reference known in full.
+
+    Args:
+        q: Its samples, shape (T, n) [rad].
+    """
+
+    def __init__(self, q: Floats) -> None:
+        self._q, self._next = q, 0
+
+    def next(self) -> Floats:
+        """The next sample; after the last one, that again."""
+        q: Floats = self._q[min(self._next, len(self._q) - 1)]
+        self._next += 1
+        return q
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last sample was given."""
+        return self._next >= len(self._q)
+
+
+def point_to_point(start: Floats, target: Floats, limits: Limits = PAPER) -> Floats:
+    """Reference of a double S from the first sample that may move to the one at the target, shape (T, n) [rad]."""
+    trajectory = DoubleS(start, target, limits, PERIOD)
+    samples = []
+    while not trajectory.finished:
+        samples.append(trajectory.next())
+    return np.array(samples)
+
+
+def round_a_corner(start: Floats, corner: Floats, target: Floats, limits: Limits = PAPER) -> Floats:
+    """Two double S of which the second begins when the first has a quarter of its time left: a curved path.
+
+    Returns:
+        Shape (T, n) [rad]. Where both move, velocity and acceleration are sums.
+    """
+    first, second = point_to_point(start, corner, limits), point_to_point(corner, target, limits)
+    joined = (3 * len(first)) // 4
+    length = max(joined + len(second), len(first))
+    path = np.tile(first[-1], (length, 1))
+    path[: len(first)] = first
+    late = np.tile(second[-1], (length - joined, 1))
+    late[: len(second)] = second
+    path[joined:] += late - corner
+    return path
+
+
+def lengthened(start: Floats, target: Floats, ticks: int, limits: Limits = PAPER) -> Floats:
+    """Reference of a double S that takes as long as another motion, by a lower jerk: no shaper, no model at all.
+
+    Args:
+        start: Shape (n,) [rad].
+        target: Shape (n,) [rad].
+        ticks: How long it is to last.
+        limits: What it keeps.
+
+    Returns:
+        Shape (T, n) [rad], T at most a tick from what was wanted.
+    """
+    low, high = np.log(1e-2 * limits.jerk), np.log(limits.jerk)
+    for _ in range(30):  # the lower the jerk, the longer it takes
+        middle = 0.5 * (low + high)
+        slower = Limits(limits.velocity, limits.acceleration, float(np.exp(middle)))
+        if DoubleS(start, target, slower, PERIOD).duration > ticks * PERIOD:
+            low = middle
+        else:
+            high = middle
+    return point_to_point(start, target, Limits(limits.velocity, limits.acceleration, float(np.exp(high))))
+
+
+def shape(step: Step, reference: Floats) -> tuple[Floats, bool]:
+    """What a shaper makes of a reference that rests at its last sample.
+
+    Args:
+        step: The shaper, at rest at the first sample.
+        reference: Shape (T, n) [rad].
+
+    Returns:
+        Shaped samples up to the last that moves and for a while more, shape (T', n) [rad]; and whether it ended.
+    """
+    target, shaped = reference[-1], [step(q) for q in reference]
+    quiet = 0
+    for _ in range(round(LONGEST / PERIOD)):
+        shaped.append(step(target))
+        moved = max(np.abs(shaped[-1] - shaped[-2]).max(), np.abs(shaped[-1] - target).max())
+        quiet = quiet + 1 if moved <= STILL else 0
+        if quiet >= 10:
+            return np.array(shaped), True
+    return np.array(shaped), False
+
+
+def simulate(
+    cycle: ControlCycle, start: Floats, reference: Floats, shaped: Floats, seed: int, delay: float = 0.0
+) -> Recording:
+    """Let an arm follow a shaped reference from rest, and rest for a while.
+
+    Args:
+        cycle: The line, with `Unchanged` for a filter and any arm at its end.
+        start: Where it rests, shape (n,) [rad].
+        reference: The unshaped one that all is compared with, shape (T, n) [rad].
+        shaped: What the arm is to follow, shape (T', n) [rad].
+        seed: Of sensor noise and gear errors.
+        delay: That the shaper declares [s].
+
+    Returns:
+        Columns that the metrics on a common clock want, from a tick before the motion on.
+    """
+    arm = cycle.arm
+    cycle.reset(start, seed=seed)
+    resting = 4
+    ticks = resting + max(len(shaped), len(reference)) + round(REST / PERIOD)
+    n = len(start)
+    q, target = np.empty((2, ticks, n))
+    qd, qdd = np.empty((2, ticks, n))
+    force, rotation = np.empty((ticks, 3)), np.empty((ticks, 3, 3))
+    for tick in range(ticks):
+        if tick == resting:
+            cycle.start(Played(shaped))
+        sample = cycle.step()
+        truth = arm.truth()
+        aim: Target = sample.target
+        target[tick], qd[tick], qdd[tick] = aim.q, aim.qd, aim.qdd
+        force[tick], rotation[tick] = truth.specific_force, truth.flange_rotation
+    q[:resting], q[resting:] = start, reference[-1]
+    q[resting : resting + len(reference)] = reference
+    pose = np.zeros((ticks, 6))
+    pose[:, 3:] = Rotation.from_matrix(rotation).as_rotvec()
+    tick_of = np.arange(ticks, dtype=float)
+    return Recording(
+        {
+            "tick": tick_of, "timestamp": PERIOD * tick_of,
+            "reference_q": q, "target_q": target, "target_qd": qd, "target_qdd": qdd,
+            "truth_tool_acceleration": force, "truth_flange_pose": pose,
+            "shaper_delay": np.full(ticks, delay),
+        }
+    )  # fmt: skip
+
+
+def control_line(
+    description: RobotDescription,
+    start: Floats,
+    declared: Payload,
+    carried: Payload,
+    arm: Plant | None = None,
+) -> ControlCycle:
+    """The line from shaped reference to arm, without a shaper.
+
+    Args:
+        description: What the controller believes the arm to be.
+        start: Where it rests, shape (n,) [rad].
+        declared: The payload the controller counts on.
+        carried: The payload the arm has.
+        arm: Another arm than the description's.
+    """
+    joints = description.joints
+    cycle = ControlCycle(description, Unchanged(joints), q=start, declared=declared, carried=carried, seed=0)
+    if arm is not None:
+        cycle.arm = arm
+    return cycle

@@ -1,0 +1,112 @@
+"""The bench's results as a page of the documentation."""
+
+from collections.abc import Sequence
+from typing import Any
+
+COLUMNS = (
+    "shaper", "still ms", "p90", "ring m/s²", "less %", "p5", "delay ms", "in motion", "q̈/limit", "q̇/limit",
+    "bend mrad", "µs",
+)  # fmt: skip
+
+
+def page(result: dict[str, Any]) -> str:
+    """All tables, and what the columns mean."""
+    ranked = [row for row in result["shapers"] if row["ranked"]]
+    arms = list(result["arms"])
+    return f"""# ShaperBench
+
+Made by `{result["command"]} --output leaderboard.json --markdown shaperbench.md`; the numbers with all their
+digits are in [leaderboard.json](leaderboard.json). {result["moves"]} random moves, seed {
+        result["seed"]
+    }, with payloads
+of 0 to 5 kg, of which the controller knows 100, 110 and 90 %; eight arms; calibration `{
+        result["calibration"]
+    }`, which is
+of the first of them. How to put a shaper of yours on it: [Evaluate a shaper](../how-to/evaluate-a-shaper.md).
+
+{
+        _table(
+            COLUMNS,
+            [
+                [("**" + row["name"] + "**") if row["pareto"] else row["name"], *_figures(row)]
+                for row in ranked
+            ],
+        )
+    }
+
+Bold: no other is better in both *still* and *ring*. All are medians over moves, arms and payload errors, but the
+peaks and *bend*, which are the largest.
+
+- *still*: last time |α|, the true acceleration of the tool, exceeds 0.1 m/s², from the stop of the **unshaped** reference;
+- *ring*: envelope of α within 3 to 60 Hz after the shaped reference's own stop; *less*: than waiting leaves, where
+  that is at least 0.2 m/s²;
+- *in motion*: rms of α against the rigid arm, over that of waiting;
+- *q̈/limit*, *q̇/limit*: of the shaped reference over the limits that the reference uses to the full. A robot asks a
+  little less of the reference where that is above 1 (`move_j` with `auto` and `short`), the bench does not;
+- *bend*: largest distance in joint space of a path round a corner from where it was asked to go;
+- *µs*: of a tick with its estimates, in Python where the shaper is Python, on the machine that made this page.
+
+| name | what it is |
+|---|---|
+{chr(10).join(f"| {row['name']} | {row['label']} |" for row in result["shapers"])}
+
+## Where which loses
+
+Time until still in ms, median, on each arm and with each payload error; bold: the best of the column.
+
+{_by(ranked, "by_arm", arms, ("time_until_still_ms", "median"), 0)}
+
+{_by(ranked, "by_payload_error", list(ranked[0]["by_payload_error"]), ("time_until_still_ms", "median"), 0)}
+
+What rings in m/s², median.
+
+{_by(ranked, "by_arm", arms, ("residual_m_s2", "median"), 3)}
+
+{_by(ranked, "by_payload_error", list(ranked[0]["by_payload_error"]), ("residual_m_s2", "median"), 3)}
+
+## The arms
+
+| name | what it has |
+|---|---|
+{chr(10).join(f"| {name} | {label} |" for name, label in result["arms"].items())}
+"""
+
+
+def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [" | ".join(columns), "|".join(["---"] + ["---:"] * (len(columns) - 1))]
+    return "\n".join(f"| {line} |" for line in [*lines[:1], lines[1], *(" | ".join(row) for row in rows)])
+
+
+def _figures(row: dict[str, Any]) -> list[str]:
+    still, less = row["time_until_still_ms"], row["reduction_percent"]
+    return [
+        _said(still["median"], 0), _said(still["p90"], 0), _said(row["residual_m_s2"]["median"], 3),
+        _said(less["median"], 1), _said(less["p5"], 1), _said(row["delay_ms"]["median"], 0),
+        _said(row["in_motion_ratio"], 2), _said(row["peak_acceleration_ratio"]["max"], 3),
+        _said(row["peak_velocity_ratio"]["max"], 3), _said(row["path_error_mrad"], 1), _said(row["cost_us"], 0),
+    ]  # fmt: skip
+
+
+def _by(
+    ranked: Sequence[dict[str, Any]], key: str, names: Sequence[str], path: tuple[str, str], digits: int
+) -> str:
+    """One column a name, the best of each in bold."""
+    values = {row["name"]: [row[key][name][path[0]][path[1]] for name in names] for row in ranked}
+    best = [
+        min((column[place] for column in values.values() if column[place] is not None), default=None)
+        for place in range(len(names))
+    ]
+    rows = [
+        [name, *(_best(value, best[place], digits) for place, value in enumerate(column))]
+        for name, column in values.items()
+    ]
+    return _table(("shaper", *names), rows)
+
+
+def _best(value: float | None, best: float | None, digits: int) -> str:
+    said = _said(value, digits)
+    return f"**{said}**" if value is not None and value == best else said
+
+
+def _said(value: float | None, digits: int) -> str:
+    return "–" if value is None else f"{value:.{digits}f}"

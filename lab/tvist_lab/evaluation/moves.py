@@ -1,0 +1,212 @@
+"""Moves to evaluate: from a file, or drawn at random."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import numpy as np
+from msgspec import Meta, Struct
+
+from tvist_lab.recordings import Floats
+from tvist_lab.workspace import WORKSPACE, Region
+from tvist_plant.description import RobotDescription
+from tvist_protocol.values import Angle, Mass
+from tvist_server.collision import CollisionModel
+from tvist_server.setup import body, paper_payload
+
+LEAST = 1e-4
+"""A move whose joints turn by less than this goes nowhere [rad]."""
+STROKE = (0.3, 1.0)
+"""Share of the way to an independent configuration that a random move goes [-]."""
+TRIES = 1000
+"""Draws for one random move before none is believed to exist."""
+WITH_WRISTS = Region(low=(*WORKSPACE.low, -np.pi, -np.pi), high=(*WORKSPACE.high, np.pi, np.pi))
+"""The workspace with the wrist's two outer joints anywhere."""
+
+
+class MovesError(ValueError):
+    """Moves cannot be evaluated; the sentence names the move, the joint and the limit."""
+
+
+@dataclass(frozen=True)
+class Move:
+    """From rest to rest."""
+
+    start: tuple[float, ...]
+    """One angle a joint [rad]."""
+    target: tuple[float, ...]
+    """One angle a joint [rad]."""
+    mass: float
+    """Of what the arm carries [kg]."""
+
+
+class _Entry(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A move of a file."""
+
+    start: tuple[Angle, ...]
+    target: tuple[Angle, ...]
+    payload: Mass | None = None
+    """Of this move; else the command's [kg]."""
+
+
+Entries = Annotated[tuple[_Entry, ...], Meta(min_length=1)]
+
+
+def read_moves(path: Path, description: RobotDescription, masses: Callable[[], float]) -> list[Move]:
+    """Read and check a file of moves.
+
+    Args:
+        path: JSON: a list of maps with `start` and `target`, one angle a joint [rad], and `payload` [kg] where a
+            move has one of its own.
+        description: The robot.
+        masses: What the arm carries in the next move that does not say so [kg].
+
+    Raises:
+        MovesError: It cannot be read, or a move is beyond a limit or goes nowhere.
+    """
+    try:
+        entries = msgspec.json.decode(path.read_bytes(), type=Entries)
+    except OSError as error:
+        raise MovesError(f"moves {path}: {error.strerror}") from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise MovesError(f"moves {path}: {_in_words(str(error))}") from error
+    moves = [
+        Move(entry.start, entry.target, masses() if entry.payload is None else entry.payload)
+        for entry in entries
+    ]
+    for number, move in enumerate(moves, 1):
+        _check(number, move, description)
+    return moves
+
+
+def write_moves(path: Path, moves: Sequence[Move]) -> None:
+    """Write a file that `read_moves` reads."""
+    entries = [_Entry(start=move.start, target=move.target, payload=move.mass) for move in moves]
+    path.write_bytes(msgspec.json.format(msgspec.json.encode(entries), indent=1) + b"\n")
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Random moves, and how many draws they took."""
+
+    moves: list[Move]
+    draws: int
+
+    @property
+    def share(self) -> float:
+        """Of the draws that were free of collision [-]."""
+        return len(self.moves) / self.draws
+
+
+def draw_moves(
+    description: RobotDescription,
+    count: int,
+    seed: int,
+    masses: tuple[float, float],
+    *,
+    wrists: bool = False,
+    progress: Callable[[], None] = lambda: None,
+) -> Drawn:
+    """Random moves between configurations of the workspace, free of collision from start to target.
+
+    Args:
+        description: The robot.
+        count: How many.
+        seed: Of everything drawn.
+        masses: Least and largest mass carried, uniform between them [kg].
+        wrists: Turn the two outer joints of the wrist, too; otherwise they rest at zero.
+        progress: Told of each move found.
+
+    Raises:
+        MovesError: Hardly any draw is free of collision.
+    """
+    random = np.random.default_rng(seed)
+    collision = CollisionModel(description, body(paper_payload(description, masses[1])))
+    region = WITH_WRISTS if wrists else WORKSPACE
+    moves: list[Move] = []
+    draws = 0
+    for draws, move in enumerate(_draws(random, region, description.joints, masses), 1):
+        collision.carry(body(paper_payload(description, move.mass)))
+        if is_free(collision, move):
+            moves.append(move)
+            progress()
+        if len(moves) == count:
+            break
+        if draws >= TRIES * (len(moves) + 1):
+            raise MovesError(f"random: {draws} draws gave {len(moves)} moves without a collision")
+    return Drawn(moves, draws)
+
+
+def is_free(collision: CollisionModel, move: Move) -> bool:
+    """Whether the arm meets neither itself nor the floor on a straight way in joint space."""
+    start, target = np.array(move.start), np.array(move.target)
+    if collision.meeting(start) or collision.meeting(target):
+        return False
+    return meeting(collision, move) is None
+
+
+def meeting(collision: CollisionModel, move: Move) -> str | None:
+    """What meets what on a move, in words; None where nothing does."""
+    start, target = np.array(move.start), np.array(move.target)
+    found = collision.on_way(
+        lambda share: start + share * (target - start), float(np.abs(target - start).sum())
+    )
+    if found is None:
+        return None
+    share, pair = found
+    return f"{pair.first} meets {pair.second} at {100.0 * share:.0f} % of the way"
+
+
+def collisions(description: RobotDescription, moves: Sequence[Move]) -> list[str | None]:
+    """What meets what on each move."""
+    collision = CollisionModel(description, body(paper_payload(description, 0.0)))
+    found = []
+    for move in moves:
+        collision.carry(body(paper_payload(description, move.mass)))
+        nearest = collision.meeting(np.array(move.start))
+        words = None if nearest is None else f"{nearest.first} meets {nearest.second} at the start"
+        found.append(words or meeting(collision, move))
+    return found
+
+
+def _draws(
+    random: np.random.Generator, region: Region, joints: int, masses: tuple[float, float]
+) -> Iterator[Move]:
+    """Candidates without end."""
+    used = min(len(region.low), joints)
+    low, high = (np.array(side)[:used] for side in (region.low, region.high))
+    while True:
+        start, far = np.zeros((2, joints))
+        start[:used], far[:used] = random.uniform(low, high), random.uniform(low, high)
+        mass, stroke = random.uniform(*masses), random.uniform(*STROKE)
+        target: Floats = start + stroke * (far - start)
+        yield Move(tuple(start.tolist()), tuple(target.tolist()), mass)
+
+
+def _check(number: int, move: Move, description: RobotDescription) -> None:
+    joints = description.robot.joints
+    for end, q in (("start", move.start), ("target", move.target)):
+        if len(q) != len(joints):
+            model = description.robot.model
+            raise MovesError(f"move {number}: {end} has {len(q)} angles; {model} has {len(joints)} joints")
+        for joint, (angle, limit) in enumerate(zip(q, description.limits.position, strict=True)):
+            if abs(angle) > limit:
+                raise MovesError(
+                    f"move {number}: {end} of joint {joint + 1} ({joints[joint]}) is {angle:g}: "
+                    f"must be within ±{limit:.6g} rad"
+                )
+    if max(abs(a - b) for a, b in zip(move.start, move.target, strict=True)) < LEAST:
+        raise MovesError(f"move {number} goes nowhere: no joint turns by {LEAST:g} rad or more")
+
+
+def _in_words(message: str) -> str:
+    """A message of msgspec with the place as a person counts: `$[2].start[1]` is move 3, start, joint 2."""
+    what, _, place = message.partition(" - at `$")
+    if not place:
+        return what
+    numbers = place.rstrip("`").replace("]", "").replace(".", "[").split("[")
+    words = [f"move {int(numbers[1]) + 1}"] if len(numbers) > 1 and numbers[1].isdigit() else []
+    words += [f"joint {int(part) + 1}" if part.isdigit() else part for part in numbers[2:]]
+    return f"{', '.join(words)}: {what}"

@@ -1,0 +1,112 @@
+"""Filters for a move: as the server makes them, with a payload believed in and, on purpose, a wrong frequency."""
+
+from dataclasses import dataclass, replace
+
+from tvist_lab.recordings import Floats
+from tvist_plant.description import RobotDescription
+from tvist_protocol.calibration import Calibration
+from tvist_server.choices import choose_filter, wanted_modes
+from tvist_server.mode_source import ModeSource
+from tvist_server.setup import paper_payload
+from tvist_server.trajectory import Limits
+from tvist_shaping.base import Filter
+from tvist_shaping.estimators.base import Estimator
+from tvist_shaping.estimators.fixed import Fixed
+
+
+class RecipeError(ValueError):
+    """There is no such filter for this arm; the sentence says why."""
+
+
+class Mistaken(Estimator):
+    """Another estimator's modes, at a frequency that is wrong by a share.
+
+    Args:
+        right: The other estimator.
+        error: Share by which every frequency is too high [-], > -1.
+    """
+
+    def __init__(self, right: Estimator, error: float) -> None:
+        self._right, self._factor = right, 1.0 + error
+
+    @property
+    def modes(self) -> int:
+        """As many as the other's."""
+        return self._right.modes
+
+    @property
+    def f_d_min(self) -> float:
+        """The other's, as wrong [Hz]."""
+        return self._right.f_d_min * self._factor
+
+    @property
+    def zeta_max(self) -> float:
+        """The other's."""
+        return self._right.zeta_max
+
+    def estimate(self, q: Floats) -> tuple[Floats, Floats]:
+        """Modes at a configuration; see `Estimator.estimate`."""
+        f_d, zeta = self._right.estimate(q)
+        return self._factor * f_d, zeta
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What a filter is made of; it travels between processes, where a filter would not."""
+
+    shaper: str
+    """Name of a filter, as in `set_shaper`."""
+    calibration: Calibration | None
+    """What is known of the arm; where there is a modal model, that, else polynomials."""
+    frequency_error: float = 0.0
+    """Share by which every frequency is too high [-]."""
+    modes: int = 1
+    """That a shaper of the catalogue suppresses; more than one takes a modal calibration."""
+
+    def make(self, description: RobotDescription, mass: float) -> Filter:
+        """The filter for a payload that is believed to be the paper's disc, of another mass.
+
+        Args:
+            description: The robot.
+            mass: Of the payload declared [kg].
+
+        Raises:
+            RecipeError: The calibration is of another arm, or does not know the modes that the filter wants.
+            RefusalError: There is no such filter, or its parts do not go together.
+        """
+        modes = wanted_modes(self.shaper, self.modes, "shaper")
+        if self.shaper == "none":
+            return choose_filter(self.shaper, Fixed([10.0], [0.1]), description.joints)
+        return choose_filter(self.shaper, self.estimator(description, mass, modes), description.joints)
+
+    def estimator(self, description: RobotDescription, mass: float, modes: int) -> Estimator:
+        """What the filter learns the modes from.
+
+        Args:
+            description: The robot.
+            mass: Of the payload declared [kg].
+            modes: How many.
+
+        Raises:
+            RecipeError: The calibration is of another arm, or does not know so many.
+        """
+        known = self.calibration
+        if known is None:
+            raise RecipeError(f"shaper {self.shaper} needs a calibration")
+        if known.robot != description.robot.model:
+            raise RecipeError(
+                f"calibration {known.name} is of a {known.robot}; this arm is a {description.robot.model}"
+            )
+        source = ModeSource("polynomial" if known.modal is None else "modal", description, known)
+        if modes > source.most:
+            raise RecipeError(
+                f"shaper {self.shaper} wants {modes} modes, calibration {known.name} knows {source.most}"
+                + (": make one with tvist identify --model modal" if known.modal is None else "")
+            )
+        right = source.estimator(modes, paper_payload(description, mass))
+        return Mistaken(right, self.frequency_error) if self.frequency_error else right
+
+
+def spared(limits: Limits, tvist: Filter) -> Limits:
+    """What a reference is to keep so that the shaped one keeps these limits."""
+    return replace(limits, acceleration=(1.0 - tvist.excess) * limits.acceleration)

@@ -1,0 +1,90 @@
+"""The catalogue of shapers: what each leaves when the frequency is wrong, and what that costs in time."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tvist_lab.figures.style import FAINT, INK, SHAPED, THIRD, UNSHAPED, note, panels, title
+from tvist_shaping import Shaper, residual
+
+FAMILIES = {
+    "Zero vibration": ("zv", "mzv", "zvd", "zvdd", "zvddd"),
+    "Extra-insensitive": ("ei", "ei_exact", "si", "ei2", "ei2_exact", "ei3", "ei3_exact"),
+    "Negative impulses: short, but beyond the reference's limits": ("um_zv", "um_zvd"),
+}
+"""Panels, and who is in them; whoever is in none has one at the end."""
+COLORS = (UNSHAPED, SHAPED, THIRD, "#CC79A7", INK, "#E69F00", "#56B4E9", FAINT)
+SHOWN = (0.4, 1.7)
+"""True over assumed frequency on the axis [-]."""
+HIGHEST = 25.0
+"""Residual vibration on the axis [%]."""
+ALLOWED = 0.05
+"""Residual vibration that the width of a band is told for [-]."""
+WIDEST = 1.6
+"""Width of a band that is drawn; one without end is drawn here [-]."""
+
+
+def catalogue_figure(shapers: Iterable[Shaper], zeta: float = 0.0) -> Figure:
+    """Residual vibration of each shaper over the true frequency, and the width of its band over its duration.
+
+    Args:
+        shapers: The shapers; one that is not for this damping, and one that does not shape, is left out.
+        zeta: Damping ratio, assumed and true [-].
+    """
+    shown = {shaper.name: shaper for shaper in shapers if zeta < shaper.zeta_max and shaper.duration_periods}
+    placed = {name for names in FAMILIES.values() for name in names}
+    families = FAMILIES | {"Others": tuple(name for name in shown if name not in placed)}
+    groups = {
+        words: group
+        for words, names in families.items()
+        if (group := [shown[name] for name in names if name in shown])
+    }
+    figure, axes = panels(len(groups) + 1, 1.0 + 2.1 * (len(groups) + 1), share_x=False)
+    for panel, (words, group) in zip(axes, groups.items(), strict=False):
+        title(panel, words)
+        _curves(panel, group, zeta)
+    axes[len(groups) - 1].set_xlabel("True over assumed frequency")
+    title(axes[-1], "What insensitivity costs")
+    _price(axes[-1], list(shown.values()), zeta)
+    return figure
+
+
+def _curves(panel: Axes, shapers: Sequence[Shaper], zeta: float) -> None:
+    f = np.linspace(*SHOWN, 1301)
+    colors: dict[str, str] = {}
+    for shaper in shapers:
+        left = 100.0 * residual(f, zeta, shaper.function(1.0, zeta))
+        dashes = "--" if shaper.name.endswith("_exact") else "-"
+        color = colors.setdefault(shaper.name.removesuffix("_exact"), COLORS[len(colors) % len(COLORS)])
+        panel.plot(f, left, color=color, linestyle=dashes, linewidth=1.5, label=shaper.name)
+    panel.axhline(100.0 * ALLOWED, color=INK, linewidth=0.8, linestyle=(0, (4, 3)))
+    panel.set(xlim=SHOWN, ylim=(0.0, HIGHEST), ylabel="Residual (%)")
+    panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False, labelcolor=INK)
+
+
+def _price(panel: Axes, shapers: Sequence[Shaper], zeta: float) -> None:
+    points: dict[tuple[float, float], list[Shaper]] = {}
+    for shaper in shapers:
+        low, high = shaper.band(ALLOWED * (1.0 + 1e-4), zeta)  # a hump of 5 % is within 5 %
+        width = min(high - low, WIDEST)
+        duration = shaper.function(1.0, zeta).duration
+        points.setdefault((round(duration, 2), round(width, 2)), []).append(shaper)
+    for place, group in sorted(points.items()):
+        color = SHAPED if group[0].peak == 1.0 else UNSHAPED
+        panel.plot(*place, "o", color=color, markersize=4.5)
+        words = ", ".join(shaper.name for shaper in group)
+        ends = place[0] > 1.7 or group[0].peak > 1.0
+        above = 4 if words.endswith("_exact") and len(group) == 1 else 0
+        note(
+            panel,
+            words,
+            place,
+            xytext=(-6 if ends else 6, above),
+            textcoords="offset points",
+            ha="right" if ends else "left",
+            va="center",
+        )
+    panel.set(xlim=(0.0, 2.1), xlabel="Duration (damped periods)", ylabel="5 % band, width")
+    panel.margins(y=0.12)

@@ -1,0 +1,69 @@
+"""Why the mean delay must not change: the same motion through a filter whose delay does, and one whose does not."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tvist_lab.figures.style import INK, SHAPED, UNSHAPED, legend, panels
+from tvist_lab.recordings import Floats
+from tvist_plant.description import load
+from tvist_plant.plant import PERIOD
+from tvist_server import calibrations
+from tvist_server.calibrations.modal import modal_estimator
+from tvist_server.setup import paper_payload
+from tvist_server.trajectory import DoubleS, Limits
+from tvist_shaping.base import Filter
+from tvist_shaping.named import make_filter, modes_of
+
+LIMITS = Limits(1.5, 2.0, 100.0)
+MODES = 3
+"""Of the product of zero-vibration shapers."""
+NAMES = ("zv of three modes", "auto, its mean delay constant")
+AFTER = 100
+"""Ticks shown after the reference has stopped."""
+
+
+def mean_delay_figure() -> Figure:
+    """A UR5e from Q3 to Q1: mean delay, velocity and acceleration of the shaped elbow, by two filters.
+
+    Top: the mean delay. Middle and bottom: velocity and acceleration, with the reference's limits.
+    """
+    description = load("ur5e")
+    payload, calibration = paper_payload(description), calibrations.load("ur5e_modal")
+    joints = description.joints
+    filters = [
+        make_filter(
+            name, modal_estimator(calibration, description, payload, modes_of(name, MODES)), joints=joints
+        )
+        for name in ("zv", "auto")
+    ]
+    start, end = (np.array(description.poses[name]) for name in ("Q3", "Q1"))
+    figure, (delays, velocities, accelerations) = panels(3, 5.6)
+    for tvist, color, name in zip(filters, (UNSHAPED, SHAPED), NAMES, strict=True):
+        delay, q = _shape(tvist, start, end)
+        time = PERIOD * np.arange(len(q))
+        joint = int(np.argmax(np.abs(end - start)))
+        along = (q[:, joint] - start[joint]) / (end - start)[joint] * abs(end - start).max()
+        delays.plot(time, 1e3 * delay, color=color, label=name)
+        velocities.plot(time[1:], np.diff(along) / PERIOD, color=color)
+        accelerations.plot(time[1:-1], np.diff(along, 2) / PERIOD**2, color=color)
+    velocities.axhline(LIMITS.velocity, color=INK, linewidth=0.6, linestyle=":")
+    for side in (-1.0, 1.0):
+        accelerations.axhline(side * LIMITS.acceleration, color=INK, linewidth=0.6, linestyle=":")
+    delays.set_ylabel("Mean delay in ms")
+    velocities.set_ylabel("Velocity in rad/s")
+    accelerations.set_ylabel("Acceleration in rad/s²")
+    accelerations.set_xlabel("Time in s")
+    legend(figure, delays)
+    return figure
+
+
+def _shape(tvist: Filter, start: Floats, end: Floats) -> tuple[Floats, Floats]:
+    """Mean delay [s] and shaped reference [rad] at each tick of a motion, shapes (N,) and (N, joints)."""
+    motion = DoubleS(start, end, LIMITS, PERIOD)
+    tvist.reset(start)
+    delays: list[float] = []
+    references: list[Floats] = []
+    while not motion.finished or len(references) < motion.duration / PERIOD + AFTER:
+        references.append(tvist.filter(motion.next()))
+        delays.append(tvist.mean_delay)
+    return np.array(delays), np.array(references)

@@ -1,0 +1,95 @@
+"""Where to make the arm ring so that few ring-downs say most: greedy D-optimal design.
+
+The arm as it is guessed is made to ring at many configurations; each ring-down has an information matrix about the
+parameters. One after the other those are chosen that make the determinant of the sum largest, so the volume of what
+is still possible smallest (Fedorov, 1972).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+from scipy.linalg import expm
+
+from tvist_lab.identification.modal_fit import information
+from tvist_lab.identification.ring_downs import SAMPLES, SKIPPED, Jog, Ringing
+from tvist_lab.identification.unknowns import Arm
+from tvist_lab.recordings import Floats
+from tvist_plant.plant import PERIOD
+from tvist_server.trajectory import DoubleS, Limits
+
+NOISE = 0.03
+"""rms that is counted on, an axis [m/s^2]."""
+LIMITS = Limits(velocity=1.5, acceleration=2.0, jerk=100.0)
+"""Of the jog, as a client's `move_j` has them."""
+
+
+def choose(arm: Arm, candidates: Sequence[Floats], jog: Jog, counts: Sequence[int]) -> list[tuple[int, int]]:
+    """Choose ring-downs.
+
+    Args:
+        arm: With its payloads.
+        candidates: Configurations, each of shape (n,) [rad].
+        jog: The move that makes it ring.
+        counts: How many ring-downs with each payload; together no more than candidates.
+
+    Returns:
+        Candidates and payloads by number, the most informative first; none twice.
+    """
+    knowledge = np.diag(arm.deviation**-2)
+    says = {
+        (number, payload): information(arm, predicted(arm, q, payload, jog), arm.guess)
+        for number, q in enumerate(candidates)
+        for payload in range(len(arm.payloads))
+    }
+    left, chosen = list(counts), []
+    while any(left) and says:
+        open_ = [key for key in says if left[key[1]] > 0]
+        if not open_:
+            break
+        best = max(open_, key=lambda key: float(np.linalg.slogdet(knowledge + says[key])[1]))
+        knowledge += says.pop(best)
+        left[best[1]] -= 1
+        chosen.append(best)
+    return chosen
+
+
+def predicted(arm: Arm, q: Floats, payload: int, jog: Jog) -> Ringing:
+    """Ring-down after a jog of the arm as guessed, linear about its end and with perfect feed-forward."""
+    flexible, mass = arm.flexible(payload), arm.mass(q, payload)
+    drivetrain = arm.drivetrain(arm.guess)
+    inertia, damping, stiffness = drivetrain.system(mass)
+    N, L = len(inertia), len(mass)
+    motors, joints = L + np.arange(N - L), flexible.joints
+    system = np.zeros((2 * N, 2 * N))
+    system[:N, N:] = np.eye(N)
+    system[N:, :N], system[N:, N:] = (-np.linalg.solve(inertia, part) for part in (stiffness, damping))
+    move = expm(PERIOD * system)
+    forced = np.linalg.solve(system, (move - np.eye(2 * N))[:, N:]) @ np.linalg.inv(inertia)
+    pushes = _pushes(drivetrain.rows[:, joints], mass[np.ix_(joints, joints)], jog.of(len(q)))
+    full = np.zeros((len(pushes), N))
+    full[:, motors] = pushes
+    z, rates = np.zeros(2 * N), []
+    for push in full:
+        z = move @ z + forced @ push
+        rates.append(system[N : N + L] @ z)
+    data, at = flexible.model.createData(), np.zeros(flexible.model.nv)
+    at[joints] = q
+    jacobian = pin.computeFrameJacobian(flexible.model, data, at, flexible.flange, pin.LOCAL).reshape(6, -1)[
+        :3
+    ]
+    force = np.array(rates[-SAMPLES:]) @ jacobian.T
+    return Ringing(q=q, payload=payload, force=force, noise=NOISE)
+
+
+def _pushes(rows: Floats, rigid: Floats, jog: Floats) -> Floats:
+    """What drives do to their motors during and after a jog, shape (ticks, n) [N m]."""
+    _, B, K_d, K_p, _ = rows
+    motion = DoubleS(np.zeros_like(jog), jog, LIMITS, PERIOD)
+    way = []
+    while not motion.finished:
+        way.append(motion.next())
+    q = np.array([np.zeros_like(jog), *way, *[jog] * (SKIPPED + SAMPLES + 1)])
+    qd = np.gradient(q, PERIOD, axis=0)
+    qdd = np.gradient(qd, PERIOD, axis=0)
+    return np.asarray(K_d * (qd + K_p * q) + qdd @ (rigid + np.diag(B)))

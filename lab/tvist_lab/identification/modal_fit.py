@@ -1,0 +1,219 @@
+"""Springs and drives from few ring-downs, by separable least squares.
+
+Each ring-down is the sum of the lowest modes, whose poles the parameters make, with amplitudes of its own:
+
+    α(t) = Σ_k Re(c_k e^(s_k(p) t)) + d e^(-rt) + g,    p the logarithms of the parameters
+
+The vectors c, d, g enter linearly and are eliminated (variable projection; Golub and Pereyra, 1973), so no mode has to
+be found in a signal or matched with one of the model. What measurements do not tell stays at a weak guess.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import least_squares
+
+from tvist_lab.identification.ring_downs import Ringing
+from tvist_lab.identification.unknowns import Arm
+from tvist_lab.metrics import SLOW_POLE
+from tvist_lab.recordings import Floats
+from tvist_plant.plant import PERIOD
+from tvist_shaping.estimators.modal import Drivetrain, follow
+
+Complex = npt.NDArray[np.complex128]
+
+MODES = 4
+"""Modes that ring-downs are made of; a robot arm's further ones are over in a few ticks."""
+STEP = 1e-4
+"""Change of a logarithm for differences [-]."""
+EVALUATIONS = 60
+STARTS = 5
+"""Points that are searched from, the guess the first."""
+SPREAD = 0.35
+"""Standard deviation of the others about it [-]."""
+
+
+@dataclass(frozen=True)
+class ModalFit:
+    """Parameters and how sure they are."""
+
+    logarithms: Floats
+    """Shape (P,)."""
+    deviations: Floats
+    """Standard deviations of the logarithms, shape (P,)."""
+    residual_to_noise: Floats
+    """rms of what the model leaves of each ring-down, over its noise, shape (N,) [-]."""
+    cost: float
+    """Half the sum of squares, that of the guess included [-]."""
+    drivetrain: Drivetrain
+
+
+class _Signal:
+    """One ring-down, the mass matrix it rang with, and the projection that eliminates amplitudes."""
+
+    def __init__(self, mass: Floats, force: Floats, noise: float) -> None:
+        self.mass, self.force, self.noise = mass, force, noise
+        self.time = PERIOD * np.arange(len(force))
+        self._always = np.column_stack([np.exp(-SLOW_POLE * self.time), np.ones(len(force))])
+
+    def left(self, poles: Complex) -> Floats:
+        """What poles leave of it, over its noise, flat."""
+        ringing = np.exp(np.outer(self.time, poles))
+        orthonormal, _ = np.linalg.qr(np.column_stack([ringing.real, ringing.imag, self._always]))
+        return np.asarray((self.force - orthonormal @ (orthonormal.T @ self.force)).ravel() / self.noise)
+
+    def change(self, drivetrains: Sequence[Drivetrain], poles: Complex, shapes: Complex) -> Floats:
+        """Derivative of `left` by each parameter, from a step of each; shape (samples, P)."""
+        here = self.left(poles)
+        columns = []
+        for drivetrain in drivetrains:
+            moved, scratch = poles.copy(), np.zeros((len(self.mass), len(self.mass) + 1), dtype=complex)
+            if not follow(self.mass, drivetrain.rows, moved, shapes.copy(), scratch):
+                moved = drivetrain.poles(self.mass)[0][:MODES]
+            columns.append((self.left(moved) - here) / STEP)
+        return np.column_stack(columns)
+
+
+def fit_modal(arm: Arm, ringings: Sequence[Ringing], start: Floats | None = None) -> ModalFit:
+    """Find the parameters.
+
+    Args:
+        arm: With the payloads of the ring-downs.
+        ringings: At least one.
+        start: Logarithms to search from; None: the guess.
+    """
+    signals = [_Signal(arm.mass(r.q, r.payload), r.force, r.noise) for r in ringings]
+
+    def residual(logarithms: Floats) -> Floats:
+        drivetrain = arm.drivetrain(logarithms)
+        left = [signal.left(drivetrain.poles(signal.mass)[0][:MODES]) for signal in signals]
+        return np.concatenate([*left, (logarithms - arm.guess) / arm.deviation])
+
+    def jacobian(logarithms: Floats) -> Floats:
+        changes = [sensitivity(arm, signal, logarithms) for signal in signals]
+        return np.vstack([*changes, np.diag(1.0 / arm.deviation)])
+
+    found = least_squares(
+        residual,
+        arm.guess if start is None else start,
+        jac=jacobian,
+        x_scale=0.1,
+        xtol=1e-5,
+        ftol=1e-6,
+        max_nfev=EVALUATIONS,
+    )
+    samples = sum(signal.force.size for signal in signals)
+    # What the model cannot follow is no white noise, but it is all that is known of its size.
+    excess = max(float(np.mean(found.fun[:samples] ** 2)), 1.0)
+    changes = found.jac[:samples]
+    knowledge = changes.T @ changes / excess + np.diag(arm.deviation**-2)
+    drivetrain = arm.drivetrain(found.x)
+    return ModalFit(
+        logarithms=found.x,
+        deviations=np.sqrt(np.diag(np.linalg.inv(knowledge))),
+        residual_to_noise=np.array(
+            [
+                float(np.sqrt(np.mean(signal.left(drivetrain.poles(signal.mass)[0][:MODES]) ** 2)))
+                for signal in signals
+            ]
+        ),
+        cost=float(found.cost),
+        drivetrain=drivetrain,
+    )
+
+
+def fit_from_many(arm: Arm, ringings: Sequence[Ringing]) -> ModalFit:
+    """The best of fits from several starts.
+
+    Parameters can stand in for each other, so that several sets explain ring-downs alike. Those that do count for
+    the deviations, each with its likelihood: a parameter in which they differ is not certain.
+    """
+    rng = np.random.default_rng(0)
+    starts = [arm.guess, *(arm.guess + rng.normal(0.0, SPREAD, (STARTS - 1, len(arm.guess))))]
+    fits = [fit_modal(arm, ringings, start) for start in starts]
+    best = min(fits, key=lambda fit: fit.cost)
+    likely = np.array([np.exp(best.cost - fit.cost) for fit in fits])
+    apart = np.array([fit.logarithms - best.logarithms for fit in fits])
+    between = np.max(likely[:, None] * apart**2, axis=0)
+    return replace(best, deviations=np.sqrt(best.deviations**2 + between))
+
+
+def sensitivity(arm: Arm, signal: _Signal, logarithms: Floats) -> Floats:
+    """Derivative of what is left of a ring-down by each parameter, shape (samples, P)."""
+    poles, shapes = (part[:MODES] for part in arm.drivetrain(logarithms).poles(signal.mass))
+    steps = STEP * np.eye(len(logarithms))
+    return signal.change([arm.drivetrain(logarithms + step) for step in steps], poles, shapes)
+
+
+def information(arm: Arm, ringing: Ringing, logarithms: Floats) -> Floats:
+    """What a ring-down says about the parameters: the inverse of their covariance, shape (P, P)."""
+    signal = _Signal(arm.mass(ringing.q, ringing.payload), ringing.force, ringing.noise)
+    change = sensitivity(arm, signal, logarithms)
+    return np.asarray(change.T @ change)
+
+
+@dataclass(frozen=True)
+class OwnPoles:
+    """Modes of one ring-down, how sure they are, and how far others are from explaining it."""
+
+    f_d: Floats
+    """Shape (k,) [Hz]."""
+    zeta: Floats
+    """Shape (k,) [-]."""
+    f_d_error: Floats
+    """Standard deviation of the logarithm, shape (k,) [-]."""
+    zeta_error: Floats
+    """Likewise."""
+    significance: float
+    """Sum of squares that the other poles leave more than these, over the noise's variance; 8 by chance [-]."""
+    share: float
+    """Its root, against that of all that rings [-]."""
+
+
+LOOSE = 0.5
+"""Deviation of the logarithms of f_d and ζ that a ring-down's own poles may take from where they are looked for [-]."""
+
+
+def own_poles(arm: Arm, ringing: Ringing, poles: Complex) -> OwnPoles:
+    """Poles that fit one ring-down best, near others, whatever springs and drives would have to be."""
+    signal = _Signal(arm.mass(ringing.q, ringing.payload), ringing.force, ringing.noise)
+    start = _logarithms(poles)
+
+    def residual(logarithms: Floats) -> Floats:
+        return np.concatenate([signal.left(_poles(logarithms)), (logarithms - start) / LOOSE])
+
+    found = least_squares(residual, start, x_scale=0.1, max_nfev=EVALUATIONS)
+    excess = max(float(np.mean(residual(found.x)[: -len(start)] ** 2)), 1.0)
+    errors = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)) * excess)
+    f_d, zeta = np.exp(found.x.reshape(2, -1))
+    f_d_error, zeta_error = errors.reshape(2, -1)
+    others, own, nothing = (
+        float(np.sum(signal.left(some) ** 2)) for some in (poles, _poles(found.x), poles[:0])
+    )
+    significance = max(others - own, 0.0)
+    return OwnPoles(
+        f_d=f_d,
+        zeta=zeta,
+        f_d_error=f_d_error,
+        zeta_error=zeta_error,
+        significance=significance,
+        share=float(np.sqrt(significance / max(nothing - signal.force.size, 1.0))),
+    )
+
+
+def describe(poles: Complex) -> tuple[Floats, Floats]:
+    """f_d [Hz] and ζ [-] of poles."""
+    return np.asarray(poles.imag / (2.0 * np.pi)), np.asarray(-poles.real / np.abs(poles))
+
+
+def _logarithms(poles: Complex) -> Floats:
+    f_d, zeta = describe(poles)
+    return np.asarray(np.log(np.concatenate([f_d, np.clip(zeta, 1e-4, 0.95)])))
+
+
+def _poles(logarithms: Floats) -> Complex:
+    f_d, zeta = np.exp(logarithms.reshape(2, -1))
+    omega, zeta = 2.0 * np.pi * f_d, np.minimum(zeta, 0.99)
+    return np.array(omega * (1j - zeta / np.sqrt(1.0 - zeta**2)))

@@ -1,0 +1,300 @@
+"""What the arm carries, by its own torques: at rest in several poses, and in a short motion beside that.
+
+At rest the motors hold the arm against gravity, which is linear in the payload's mass and first moment:
+
+    τ - g(q) = Y(q) (m, m c),    g of the bare arm
+
+Each pose is reached from either side, so that what friction holds has either sign. In motion the same two say what the
+arm needs beyond gravity; friction and rotors are found beside them.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from tvist_client.arm import Arm as Control
+from tvist_client.robot import Robot
+from tvist_lab.collect import collect
+from tvist_lab.identification.identify import IdentificationError
+from tvist_lab.identification.ring_downs import reach
+from tvist_lab.recordings import Floats, Recording
+from tvist_lab.workspace import WORKSPACE
+from tvist_plant.description import Payload as Body
+from tvist_plant.description import RobotDescription
+from tvist_plant.model import rigid_model
+from tvist_protocol.errors import RefusedError
+from tvist_protocol.values import Payload
+from tvist_server.collision import CollisionModel
+from tvist_server.setup import body, paper_payload
+
+POSES = 6
+CANDIDATES = 60
+"""Poses that are looked at, to choose from."""
+ASIDE = 0.08
+"""How far every joint comes from, to either side [rad]."""
+REST = 0.8
+"""Time to come to rest in a pose [s]."""
+LOOK = 0.2
+"""Time over which torques are averaged [s]."""
+SWING = 0.5
+"""How far the short motion goes [rad]."""
+BLOCK = 10
+"""Ticks that a motion's torques are averaged over."""
+LEAST = 3
+"""Poses that are needed."""
+LEAST_ERROR = 0.01
+"""Error of a torque that is counted on at least, as a share of the joint's friction [-]."""
+ROTOR = 3.0
+"""Largest inertia of a rotor that is counted on [kg m^2]."""
+STEEL = 7850.0
+"""Density that a payload's size is guessed from [kg/m^3]."""
+DISAGREEMENT = (0.3, 4.0)
+"""Masses at rest and in motion differ by more than this [kg], and this many standard deviations: one is wrong."""
+LIGHT = 0.1
+"""Below that mass nothing is said of its centre [kg]."""
+
+Progress = Callable[[], None]
+
+
+@dataclass(frozen=True)
+class PayloadFound:
+    """Mass and centre of mass, and how sure they are."""
+
+    payload: Payload
+    """To be declared; the inertia is that of a steel ball of the same mass."""
+    mass_deviation: float
+    """Standard deviation [kg]."""
+    com_deviation: tuple[float, float, float]
+    """Of each coordinate [m]."""
+    mass_in_motion: float
+    """What the short motion says [kg]."""
+    mass_in_motion_deviation: float
+    """[kg]."""
+    declared: Payload
+    """Before."""
+    poses: int
+    """In which the arm rested."""
+
+
+async def identify_payload(
+    robot: Robot,
+    control: Control,
+    description: RobotDescription,
+    *,
+    poses: int = POSES,
+    seed: int = 0,
+    progress: Progress,
+) -> PayloadFound:
+    """Find what the arm carries, as a client.
+
+    Args:
+        robot: The robot, on a network or in process.
+        control: Control of it.
+        description: The arm's masses, geometry and friction.
+        poses: In how many it rests, at least 3.
+        seed: Of the poses that are looked at.
+        progress: Told of each pose done, and of the motion.
+
+    Raises:
+        IdentificationError: The robot is not the one described, poses are too few or out of reach, or torques at rest
+            and in motion disagree.
+    """
+    info = await robot.info()
+    if info.model != description.robot.model:
+        raise IdentificationError(
+            f"the robot is a {info.model}, its description of a {description.robot.model}: name its file"
+        )
+    if poses < LEAST:
+        raise IdentificationError(f"{poses} poses do not tell mass and centre of mass: at least {LEAST} do")
+    arm = _Regressor(description)
+    period = 1.0 / info.rate_hz
+    rows, torques, rested = [], [], 0
+    for q in arm.choose(_free(description, info.payload, seed), 3 * poses):
+        if rested == poses:
+            break
+        try:
+            sides = [await _hold(robot, control, q + side * ASIDE, q, period) for side in (-1.0, 1.0)]
+        except RefusedError as error:
+            if error.reply.code != "collision":
+                raise
+            continue
+        rested += 1
+        progress()
+        at, torque = (np.mean(values, axis=0) for values in zip(*sides, strict=True))
+        rows.append(arm.static(at))
+        torques.append(torque - arm.torque(at, np.zeros_like(at), np.zeros_like(at)))
+    if rested < LEAST:
+        raise IdentificationError(
+            f"only {rested} of {poses} poses could be reached, {LEAST} are needed: give the arm more room"
+        )
+    found, deviations = arm.solve(np.vstack(rows), np.concatenate(torques))
+    in_motion, in_motion_deviation = arm.move(await _swing(robot, control, q, period))
+    progress()
+    mass = max(float(found[0]), 0.0)
+    apart = abs(in_motion - mass)
+    if apart > DISAGREEMENT[0] + DISAGREEMENT[1] * math.hypot(deviations[0], in_motion_deviation):
+        raise IdentificationError(
+            f"at rest the arm seems to carry {mass:.2f} kg, in motion {in_motion:.2f} kg: it touches something, or the "
+            "torques are not those of its motors"
+        )
+    com = found[1:] / mass if mass >= LIGHT else np.zeros(3)
+    spread = np.hypot(deviations[1:], com * deviations[0]) / mass if mass >= LIGHT else np.full(3, np.inf)
+    return PayloadFound(
+        payload=Payload(mass=mass, com=_three(com), inertia=_ball(mass)),
+        mass_deviation=float(deviations[0]),
+        com_deviation=_three(spread),
+        mass_in_motion=in_motion,
+        mass_in_motion_deviation=in_motion_deviation,
+        declared=info.payload,
+        poses=rested,
+    )
+
+
+class _Regressor:
+    """The torques that a payload adds, linear in mass and first moment."""
+
+    def __init__(self, description: RobotDescription) -> None:
+        self._bare = rigid_model(description, Body())
+        self._data = self._bare.createData()
+        places = ((0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
+        self._models = [rigid_model(description, Body(mass=1.0, com=(x, y, z))) for x, y, z in places]
+        friction = np.array(description.drives.coulomb_friction)
+        self._friction = np.maximum(friction, 0.01 * np.array(description.limits.torque))
+        self._width = description.drives.friction_width
+
+    def static(self, q: Floats) -> Floats:
+        """Y(q), shape (n, 4)."""
+        return self.dynamic(q, np.zeros_like(q), np.zeros_like(q))
+
+    def dynamic(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
+        """Y(q, q̇, q̈) without the payload's inertia about the flange, shape (n, 4).
+
+        That inertia is the same for a mass point 1 m to either side: half their difference is of the moment alone.
+        """
+        none = self.torque(q, qd, qdd)
+        mass, *sides = (np.array(pin.rnea(m, m.createData(), q, qd, qdd)) for m in self._models)
+        halves = (0.5 * (there - back) for there, back in zip(sides[::2], sides[1::2], strict=True))
+        return np.column_stack([mass - none, *halves])
+
+    def torque(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
+        """τ without payload, shape (n,) [N m]."""
+        return np.array(pin.rnea(self._bare, self._data, q, qd, qdd))
+
+    def choose(self, candidates: Sequence[Floats], count: int) -> list[Floats]:
+        """Poses that say most of mass and centre together, the best first."""
+        knowledge = np.diag([1e-2, 1.0, 1.0, 1.0])
+        left = {number: self.static(q) / self._friction[:, None] for number, q in enumerate(candidates)}
+        chosen: list[Floats] = []
+        while left and len(chosen) < count:
+            best = max(left, key=lambda n: float(np.linalg.slogdet(knowledge + left[n].T @ left[n])[1]))
+            rows = left.pop(best)
+            knowledge += rows.T @ rows
+            chosen.append(candidates[best])
+        return chosen
+
+    def solve(self, rows: Floats, torques: Floats) -> tuple[Floats, Floats]:
+        """(m, m c) by weighted least squares, and standard deviations from what is left."""
+        weight = np.tile(1.0 / self._friction, len(torques) // len(self._friction))
+        return _least_squares(rows * weight[:, None], torques * weight)
+
+    def move(self, recording: Recording) -> tuple[float, float]:
+        """Mass by a motion [kg], and its standard deviation.
+
+        Beside it, and the first moment, each joint's friction and rotor inertia are found.
+        """
+        q, qd, qdd = (recording[f"target_{name}"] for name in ("q", "qd", "qdd"))
+        moment = recording["actual_moment"]
+        moving = np.flatnonzero(np.abs(qd).max(axis=1) > 1e-3)
+        blocks = np.array_split(moving, max(len(moving) // BLOCK, 1))
+        n = q.shape[1]
+        rows, torques = [], []
+        for block in blocks:
+            own = np.mean([np.tanh(qd[block] / self._width), qd[block], qdd[block]], axis=1)
+            added = np.mean([self.dynamic(q[row], qd[row], qdd[row]) for row in block], axis=0)
+            rest = [moment[row] - self.torque(q[row], qd[row], qdd[row]) for row in block]
+            rows.append(np.hstack([added, *(np.diag(part) for part in own)]))
+            torques.append(np.mean(rest, axis=0))
+        matrix, right = np.vstack(rows), np.concatenate(torques)
+        weight = np.tile(1.0 / self._friction, len(blocks))
+        # Weakly held by how large rotors and friction can be: a short motion does not tell all of them apart.
+        largest = np.concatenate([self._friction, self._friction / self._width, np.full(n, ROTOR)])
+        prior = np.hstack([np.zeros((3 * n, 4)), np.diag(1.0 / largest)])
+        matrix = np.vstack([matrix * weight[:, None], prior])
+        found, deviations = _least_squares(matrix, np.concatenate([right * weight, np.zeros(3 * n)]))
+        return float(found[0]), float(deviations[0])
+
+
+def _least_squares(matrix: Floats, right: Floats) -> tuple[Floats, Floats]:
+    """Solution and standard deviations, from what is left."""
+    found, *_ = np.linalg.lstsq(matrix, right)
+    freedom = max(len(right) - matrix.shape[1], 1)
+    variance = max(float(np.sum((right - matrix @ found) ** 2)) / freedom, LEAST_ERROR**2)
+    return np.asarray(found), np.asarray(np.sqrt(np.diag(np.linalg.pinv(matrix.T @ matrix)) * variance))
+
+
+def _free(description: RobotDescription, declared: Payload, seed: int) -> list[Floats]:
+    """Poses with free wrists in which the arm meets nothing, whatever up to the rated payload it carries."""
+    joints = description.joints
+    models = [
+        CollisionModel(description, body(payload))
+        for payload in (declared, paper_payload(description, description.limits.payload))
+    ]
+    rng = np.random.default_rng(seed)
+    found: list[Floats] = []
+    for pose in WORKSPACE.random(20 * CANDIDATES, joints, seed):
+        if len(found) == CANDIDATES:
+            break
+        q = pose.copy()
+        q[0] *= 0.25
+        q[4:] = rng.uniform(-np.pi / 2.0, np.pi / 2.0, joints - 4) if joints > 4 else []
+        ends = (q, q - ASIDE, q + ASIDE)
+        if all(model.meeting(end) is None for model in models for end in ends):
+            found.append(q)
+    return found
+
+
+async def _hold(
+    robot: Robot, control: Control, aside: Floats, q: Floats, period: float
+) -> tuple[Floats, Floats]:
+    """Angles and torques at rest in a pose, reached from another."""
+    await reach(control, aside)
+    await control.move_j(q, acceleration=1.0)
+    await robot.advance(round(REST / period))
+    with collect(robot) as collected:
+        await robot.advance(round(LOOK / period))
+    recording = collected.recording()
+    return recording["actual_q"].mean(axis=0), recording["actual_moment"].mean(axis=0)
+
+
+async def _swing(robot: Robot, control: Control, q: Floats, period: float) -> Recording:
+    """There and back along one way, where it is free."""
+    shares = (1.0, 0.5, 0.25, -0.25, -0.5)
+    swing = np.zeros_like(q)
+    swing[1:4] = SWING
+    for share in shares:
+        with collect(robot) as collected:
+            try:
+                await control.move_j(q + share * swing)
+            except RefusedError as error:
+                if error.reply.code != "collision":
+                    raise
+                continue
+            await control.move_j(q)
+            await robot.advance(round(LOOK / period))
+        return collected.recording()
+    raise IdentificationError("there is no room for a short motion: give the arm more")
+
+
+def _ball(mass: float) -> tuple[float, float, float, float, float, float]:
+    """Inertia of a steel ball: what torques cannot tell beside that of the rotors."""
+    radius = (3.0 * mass / (4.0 * math.pi * STEEL)) ** (1.0 / 3.0)
+    moment = 0.4 * mass * radius**2
+    return (moment, 0.0, 0.0, moment, 0.0, moment)
+
+
+def _three(values: Floats) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z

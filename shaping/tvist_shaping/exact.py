@@ -1,0 +1,167 @@
+"""Extra-insensitive shapers that are exact under damping: humps of height V, and V at f_d where there is a hump.
+
+`ripple` has the undamped ones. With damping neither their times nor their amplitudes are right any more: taken times
+K^j they leave less than V, and the band is narrower than it could be. Here the conditions themselves are solved. With
+N = humps + 2 impulses, T_d = 1, s = 2π(ζ/√(1-ζ²) + i), c = Re s, r the true frequency over the design's, and
+
+    E(r) = Σ A_j exp(r (s τ_j - c τ_N))    (|E| is the residual of `sensitivity`)
+
+there are N - 1 zeros E = 0 and between them N - 2 humps |E| = V, d|E|/dr = 0; the middle one of all these stands at
+r = 1. Together with ΣA = 1 that is as many equations as unknowns A_j, τ_j and r. Solved from no damping upwards.
+
+The damping cannot be anything: the highest zero moves up and runs away to infinity. A shaper ends where it is at
+1.8 times the design frequency. (Fits of third degree in ζ to the shapers of two and three humps are in print and in
+printer firmware, valid to 0.3 and 0.2; their times are in *undamped* periods.)
+"""
+
+import math
+
+import numpy as np
+
+from tvist_shaping._types import Floats
+from tvist_shaping.amplitudes import ripple, widening
+from tvist_shaping.errors import ConvergenceError
+from tvist_shaping.impulses import Impulses, V
+from tvist_shaping.newton import solve
+from tvist_shaping.tabulated import Tabulated
+
+HIGHEST_ZERO = 1.8
+"""Where the highest zero may be, in design frequencies [-]."""
+
+
+class HumpShaper:
+    """The equations for a number of humps and their height."""
+
+    def __init__(self, humps: int, V: float) -> None:
+        """Set up the shaper.
+
+        Args:
+            humps: How many, at least 1.
+            V: Their height [-].
+
+        Raises:
+            DesignError: A number is out of range, see `ripple`.
+        """
+        self.humps, self.V, self.N = humps, V, humps + 2
+        degree = humps + 1
+        # Zeros and humps of Chebyshev's polynomial: where the undamped shaper has them.
+        x = np.cos(np.arange(1, 2 * degree) * math.pi / (2 * degree)) / widening(humps, V)
+        features = 2.0 / math.pi * np.arccos(x)
+        self.start: Floats = np.concatenate(
+            [ripple(humps, V), np.arange(1, self.N) / 2.0, np.delete(features, humps)]
+        )
+
+    def follow(self, zeta: float, near: Floats) -> tuple[Floats, Floats, Floats]:
+        """Unknowns, amplitudes [-] and times in damped periods [-] at ζ, from the unknowns at another."""
+        x = solve(lambda points: self._equations(zeta, points), near)
+        A, tau, _, _ = self._split(x[None])
+        return x, A[0], tau[0]
+
+    def limit(self) -> float:
+        """Highest damping ratio, to a hundredth [-]."""
+        zeta, x = 0.0, self.start
+        while zeta < 0.9:
+            try:
+                x, A, tau = self.follow(zeta + 0.01, x)
+            except ConvergenceError:
+                break
+            if x[-1] > HIGHEST_ZERO or A.min() <= 0.0 or np.diff(tau).min() <= 0.0:
+                break
+            zeta += 0.01
+        return round(zeta, 2)
+
+    def _split(self, points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Amplitudes, times, zeros and humps, shape (M, …) each."""
+        N, one = self.N, np.ones((len(points), 1))
+        A, tau = points[:, :N], np.hstack([0.0 * one, points[:, N : 2 * N - 1]])
+        below, above = np.split(points[:, 2 * N - 1 :], 2, axis=1)
+        features = np.hstack([below, one, above])
+        return A, tau, features[:, 0::2], features[:, 1::2]
+
+    def _equations(self, zeta: float, points: Floats) -> Floats:
+        A, tau, zeros, humps = self._split(points)
+        c = 2.0 * math.pi * zeta / math.sqrt(1.0 - zeta * zeta)
+        exponents = ((c + 2j * math.pi) * tau - c * tau[:, -1:])[:, None]
+        nothing = (A[:, None] * np.exp(zeros[:, :, None] * exponents)).sum(axis=-1)
+        waves = A[:, None] * np.exp(humps[:, :, None] * exponents)
+        E, slope = waves.sum(axis=-1), (waves * exponents).sum(axis=-1)
+        return np.hstack(
+            [
+                A.sum(axis=1, keepdims=True) - 1.0,
+                nothing.real,
+                nothing.imag,
+                np.abs(E) ** 2 / self.V - self.V,
+                (E.conj() * slope).real / self.V,
+            ]
+        )
+
+
+def exact(humps: int, V: float) -> Tabulated:
+    """The shaper of some humps of height V, up to the highest damping there is for it.
+
+    Args:
+        humps: 1 to 10.
+        V: Height of the humps [-], 1e-4 to 0.5.
+
+    Raises:
+        DesignError: A number is out of range.
+    """
+    shaper = HumpShaper(humps, V)
+    return Tabulated(
+        shaper.follow, shaper.start, shaper.limit(), f"take ei_of({humps}, {V:g}), which leaves less"
+    )
+
+
+EI, EI2, EI3 = (
+    Tabulated(shaper.follow, shaper.start, zeta_max, f"take {name}, which leaves less")
+    for humps, name, zeta_max in ((1, "ei", 0.52), (2, "ei2", 0.32), (3, "ei3", 0.2))
+    for shaper in (HumpShaper(humps, V),)
+)
+
+
+def ei_exact(f_d: float, zeta: float) -> Impulses:
+    """One hump of height V = 5 % under any damping up to 0.52; `ei` where there is none.
+
+    Args:
+        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
+        zeta: Damping ratio of the mode [-], 0 <= ζ < 0.52.
+
+    Returns:
+        A [-] and τ [s], each of shape (3,), of the equations at the top.
+
+    Raises:
+        ShaperRangeError: f_d or ζ is outside the range above.
+    """
+    return EI(f_d, zeta)
+
+
+def ei2_exact(f_d: float, zeta: float) -> Impulses:
+    """Two humps of height V = 5 % under any damping up to 0.32; `ei2` where there is none.
+
+    Args:
+        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
+        zeta: Damping ratio of the mode [-], 0 <= ζ < 0.32.
+
+    Returns:
+        A [-] and τ [s], each of shape (4,), of the equations at the top.
+
+    Raises:
+        ShaperRangeError: f_d or ζ is outside the range above.
+    """
+    return EI2(f_d, zeta)
+
+
+def ei3_exact(f_d: float, zeta: float) -> Impulses:
+    """Three humps of height V = 5 % under any damping up to 0.2; `ei3` where there is none.
+
+    Args:
+        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
+        zeta: Damping ratio of the mode [-], 0 <= ζ < 0.2.
+
+    Returns:
+        A [-] and τ [s], each of shape (5,), of the equations at the top.
+
+    Raises:
+        ShaperRangeError: f_d or ζ is outside the range above.
+    """
+    return EI3(f_d, zeta)

@@ -1,0 +1,150 @@
+"""Shapers with parameters, made to order, and shapers of the user's own impulses."""
+
+import math
+from functools import partial
+
+import numpy as np
+import numpy.typing as npt
+
+from tvist_shaping._types import Floats
+from tvist_shaping.amplitudes import modified, ripple
+from tvist_shaping.errors import DesignError
+from tvist_shaping.exact import exact as exact_humps
+from tvist_shaping.impulses import Impulses, V, check_mode, damped
+from tvist_shaping.sensitivity import residual
+from tvist_shaping.shaper import Shaper
+from tvist_shaping.specified import specified
+
+SMALL = 1e-6
+"""Share of V that a residual may be above it, for rounding [-]."""
+
+
+def mzv_of(n: int = 3, t: float = 0.75, *, name: str = "", description: str = "") -> Shaper:
+    """Modified zero-vibration shaper MZV(n, t): n impulses at equal distances in t periods.
+
+    Args:
+        n: Number of impulses, 3 to 30.
+        t: Duration in damped periods [-], less than (n-1)/2, and not so short that an amplitude is negative.
+        name: What to call it; "" for `mzv(n,t)`.
+        description: What to say of it; "" for a sentence.
+
+    Raises:
+        DesignError: n or t is out of range, or an amplitude would be negative.
+    """
+    a, periods = modified(n, t), np.linspace(0.0, t, n)
+    what = description or f"modified zero vibration, {n} impulses in {t:g} periods"
+    return Shaper(name or f"mzv({n},{t:g})", what, partial(_decayed, a, periods, 1.0), t)
+
+
+def ei_of(
+    humps: int = 1, V: float = V, *, exact: bool = False, name: str = "", description: str = ""
+) -> Shaper:
+    """Extra-insensitive shaper with humps of another height, or more of them.
+
+    Args:
+        humps: How many, 1 to 10; it lasts (humps + 1)/2 periods.
+        V: Their height, the residual vibration allowed [-], 1e-4 to 0.5.
+        exact: Whether the humps are to be of that height with damping too, see `tvist_shaping.exact`; its
+            damping is then limited, the more the higher and the more the humps. Otherwise they are lower.
+        name: What to call it; "" for `ei(humps,V)` or `ei_exact(humps,V)`.
+        description: What to say of it; "" for a sentence.
+
+    Raises:
+        DesignError: A number is out of range.
+    """
+    if humps < 1:
+        raise DesignError("humps", humps, "1 to 10")
+    a = ripple(humps, V)
+    what = (
+        description or f"extra-insensitive, {humps} hump(s) of {100.0 * V:g} %{' exactly' if exact else ''}"
+    )
+    if exact:
+        made = exact_humps(humps, V)
+        return Shaper(name or f"ei_exact({humps},{V:g})", what, made, made.duration_periods, made.zeta_max)
+    duration = (humps + 1) / 2.0
+    periods = np.linspace(0.0, duration, humps + 2)
+    return Shaper(name or f"ei({humps},{V:g})", what, partial(_decayed, a, periods, 1.0), duration)
+
+
+def si_of(
+    low: float = 0.75, high: float = 1.25, V: float = V, *, name: str = "", description: str = ""
+) -> Shaper:
+    """Specified-insensitivity shaper: the shortest positive train that leaves at most V from low to high.
+
+    Designed without damping (`tvist_shaping.specified`), damping taken in as elsewhere. Then less than V is left in
+    narrow bands at any damping, but a little more in very wide ones at some: it is for the damping ratios from 0 up to
+    where that begins.
+
+    Args:
+        low: Lowest true over assumed frequency [-], above 0, at most 1.
+        high: Highest true over assumed frequency [-], at least 1.
+        V: Residual vibration allowed between them [-], 1e-4 to 0.5.
+        name: What to call it; "" for `si(low,high,V)`.
+        description: What to say of it; "" for a sentence.
+
+    Raises:
+        DesignError: A number is out of range, or the band too wide for 12 impulses.
+    """
+    if not 0.0 < low <= 1.0:
+        raise DesignError("low", low, "above 0 and at most 1, the assumed frequency")
+    if not 1.0 <= high < math.inf:
+        raise DesignError("high", high, "at least 1, the assumed frequency")
+    a, periods = specified(low, high, V)
+    zeta_max, f = 0.0, np.linspace(low, high, 301)
+    for zeta in np.linspace(0.0, 0.99, 100):
+        if residual(f, zeta, damped(a, periods, 1.0, zeta)).max() > V * (1.0 + SMALL):
+            break
+        zeta_max = float(zeta)
+    zeta_max = 1.0 if zeta_max > 0.985 else zeta_max
+    what = description or f"specified insensitivity: at most {100.0 * V:g} % from {low:g} to {high:g}"
+    function = partial(_decayed, a, periods, zeta_max)
+    return Shaper(name or f"si({low:g},{high:g},{V:g})", what, function, float(periods[-1]), zeta_max)
+
+
+def custom(
+    name: str,
+    A: npt.ArrayLike,
+    tau: npt.ArrayLike,
+    f_d: float = 1.0,
+    *,
+    zeta_max: float = 1.0,
+    description: str = "",
+) -> Shaper:
+    """A shaper of your own impulses.
+
+    At another frequency than theirs it is played faster or slower; the amplitudes stay as they are at any damping.
+
+    Args:
+        name: What to call it.
+        A: Amplitudes [-], shape (N,), sum 1; negative ones exceed the reference's limits.
+        tau: Times [s], shape (N,), ascending from 0.
+        f_d: Damped frequency of the mode they are made for [Hz]. With 1, tau is in damped periods.
+        zeta_max: Damping ratios must stay below this [-], at most 1.
+        description: What to say of it; "" for a sentence.
+
+    Raises:
+        ImpulseError: A and tau are no train of impulses; it says why.
+        ShaperRangeError: f_d is out of range.
+        DesignError: zeta_max is.
+    """
+    check_mode(f_d, 0.0)
+    if not 0.0 < zeta_max <= 1.0:
+        raise DesignError("zeta_max", zeta_max, "above 0 and at most 1")
+    train = Impulses(np.asarray(A, dtype=float), np.asarray(tau, dtype=float) * f_d)
+
+    def function(f_d: float, zeta: float) -> Impulses:
+        check_mode(f_d, zeta, zeta_max)
+        return Impulses(train.A, train.tau / f_d)
+
+    peak = float(np.abs(train.A).sum())
+    return Shaper(
+        name, description or "impulses of your own", function, train.duration, zeta_max, max(peak, 1.0)
+    )
+
+
+def _decayed(a: Floats, periods: Floats, zeta_max: float, f_d: float, zeta: float) -> Impulses:
+    """`damped`, of a mode that is checked."""
+    check_mode(
+        f_d, zeta, zeta_max, "" if zeta_max == 1.0 else "more than V is left: take a higher V or ei_of"
+    )
+    return damped(a, periods, f_d, zeta)

@@ -1,0 +1,44 @@
+"""Newton's method for the handful of equations that define a shaper without a closed form."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tvist_shaping._types import Floats
+from tvist_shaping.errors import ConvergenceError
+
+STEP = 1e-7
+"""Of the difference quotients [-]: all unknowns here are of the order of one."""
+FARTHEST = 0.2
+"""No unknown changes by more in one step [-]."""
+SOLVED = 1e-12
+"""Largest residual of an equation that is none [-]."""
+
+
+def solve(equations: Callable[[Floats], Floats], start: Floats) -> Floats:
+    """Solve as many equations as there are unknowns.
+
+    Args:
+        equations: (M, m) -> (M, m): what is left of the m equations at each of M points.
+        start: Where to begin, shape (m,); close enough for Newton's method.
+
+    Returns:
+        A solution, shape (m,), every equation true to 1e-12.
+
+    Raises:
+        ConvergenceError: It was not found.
+    """
+    x, m = np.array(start, dtype=float), len(start)
+    with np.errstate(all="ignore"):  # where it diverges, it says so below
+        for _ in range(60):
+            left = equations(np.vstack([x, x + STEP * np.eye(m)]))
+            if not np.isfinite(left).all():
+                break
+            if np.abs(left[0]).max() < SOLVED:
+                return x
+            try:
+                change = np.linalg.solve((left[1:] - left[0]).T / STEP, -left[0])
+            except np.linalg.LinAlgError:
+                break
+            x = x + change * min(1.0, FARTHEST / max(float(np.abs(change).max()), 1e-300))
+    raise ConvergenceError(f"Newton's method found no solution of {m} equations from {start!r}")

@@ -1,0 +1,106 @@
+"""Specified insensitivity: the shortest positive train that leaves at most V anywhere in a band of frequencies.
+
+Singhose, Seering and Singer (J. Dyn. Sys. Meas. Control 118, 1996) ask for V at sampled frequencies of the band and
+let an optimisation find the train. Without damping the shortest one is symmetric, its residual is the cosine sum
+
+    R(f) = Σ a_j cos(2π f x_j),    x_j the times before and after its middle,
+
+and it touches the bound with alternating sign: +V at the lower end, then humps. So the samples that matter are as many
+as there are unknowns, and Newton's method moves them, and the train, to where they belong (Remez' exchange). N
+impulses have N - 1 unknowns (amplitudes of sum 1, times) and N - 1 extremes, of which
+
+* the last is a hump within the band, where the band is wide for N: then it is the extra-insensitive shaper of
+  `ripple`, played faster, until its own band begins where the one asked for does; what it forgives above is a gift;
+* or the last is the band's upper end, where the residual is still on its way: solved from there downwards.
+"""
+
+import math
+from functools import partial
+
+import numpy as np
+
+from tvist_shaping._types import Floats
+from tvist_shaping.amplitudes import ripple, widening
+from tvist_shaping.errors import DesignError
+from tvist_shaping.newton import solve
+
+MOST = 12
+"""Impulses of the longest train."""
+STRIDE = 0.02
+"""Change of the band's upper end that Newton's method follows at once [-]."""
+
+
+def specified(low: float, high: float, V: float) -> tuple[Floats, Floats]:
+    """The shortest train without damping.
+
+    Args:
+        low: Lower end of the band [any unit of frequency], > 0.
+        high: Upper end of the band [the same], at least low.
+        V: Residual vibration allowed in it [-], 1e-4 to 0.5.
+
+    Returns:
+        Amplitudes [-], positive, of sum 1, and times [one over the unit], each of shape (N,).
+
+    Raises:
+        DesignError: V is out of range, or the band too wide for 12 impulses.
+        ConvergenceError: No train was found.
+    """
+    if not 0.0 < low <= high < math.inf:
+        raise DesignError("band", low, "above 0, its lower end not above its upper")
+    ratio = high / low
+    for N in range(2, MOST + 1):
+        a = ripple(N - 2, V)
+        ends = 2.0 / math.pi * math.acos(1.0 / widening(N - 2, V))
+        if ratio <= (2.0 - ends) / ends:
+            break
+    else:
+        widest = low * (2.0 - ends) / ends
+        raise DesignError("band", high, f"at most {widest:g} at its upper end for {MOST} impulses and this V")
+    # The shaper of equal ripple, in units of the lower end: its band begins at 1.
+    x = np.asarray((np.arange(N) - (N - 1) / 2.0) / 2.0 * ends, dtype=float)
+    humps = _humps(N, V) / ends
+    if N > 2 and ratio < humps[-1]:
+        a, x = _followed(a, x, humps, ratio, V)
+    return a, (x - x[0]) / low
+
+
+def _humps(N: int, V: float) -> Floats:
+    """Where the residual of `ripple` has extremes within its band, in design frequencies, shape (N - 2,)."""
+    extremes = np.cos(np.arange(1, N - 1) * math.pi / (N - 1))
+    return np.asarray(2.0 / math.pi * np.arccos(extremes / widening(N - 2, V)))
+
+
+def _followed(a: Floats, x: Floats, humps: Floats, ratio: float, V: float) -> tuple[Floats, Floats]:
+    """The train whose last extreme is the band's upper end, from where it is a hump down to `ratio`."""
+    N, pairs = a.size, a.size // 2
+    free = (N - 1) // 2  # amplitudes: the innermost pair or the middle one makes the sum 1
+    signs = (-1.0) ** np.arange(1, N - 1)
+
+    def parts(points: Floats) -> tuple[Floats, Floats]:
+        """Amplitudes and times of the earlier half, the middle one last, counted twice where it is a pair."""
+        A, late = points[:, :free], points[:, free : free + pairs]
+        rest = 1.0 - 2.0 * A.sum(axis=1, keepdims=True)
+        if N % 2:
+            return np.hstack([2.0 * A, rest]), np.hstack([late, 0.0 * rest])
+        return np.hstack([2.0 * A, rest]), late
+
+    def equations(high: float, points: Floats) -> Floats:
+        A, late = parts(points)
+        inner, one = points[:, free + pairs :], np.ones((len(points), 1))
+        f = np.hstack([one, inner, high * one])
+        angles = 2.0 * math.pi * f[:, :, None] * late[:, None]
+        R = (A[:, None] * np.cos(angles)).sum(axis=-1)
+        slopes = ((A * late)[:, None] * np.sin(angles[:, 1:-1])).sum(axis=-1)
+        return np.hstack([R / V - np.concatenate([[1.0], signs]), slopes])
+
+    point = np.concatenate([a[:free], x[:pairs], humps[:-1]])
+    steps = math.ceil((humps[-1] - ratio) / STRIDE)
+    for high in np.linspace(humps[-1], ratio, steps + 1)[1:]:
+        point = solve(partial(equations, float(high)), point)
+    A, late = (part[0] for part in parts(point[None]))
+    middle = [A[-1]] if N % 2 else [A[-1] / 2.0, A[-1] / 2.0]
+    outer = A[:-1] / 2.0
+    return (
+        np.concatenate([outer, middle, outer[::-1]]),
+        np.concatenate([late[:pairs], late[pairs:], -late[:pairs][::-1]]),
+    )

@@ -1,0 +1,87 @@
+"""A shaper whose amplitudes and times have no closed form in ζ: solved once, then read off.
+
+It is solved at Chebyshev's nodes between no damping and the highest allowed, each from the one before, and what lies
+between is the polynomial through them: as exact as the solutions, smooth in ζ, and a microsecond's work a tick.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from tvist_shaping._types import Floats
+from tvist_shaping.impulses import Impulses, check_mode
+
+NODES = 32
+"""Degree + 1 of the polynomials in ζ."""
+
+
+class Tabulated:
+    """Impulses of one mode as polynomials in ζ.
+
+    Attributes:
+        zeta_max: Damping ratios must stay below this [-].
+        duration_periods: Longest duration over every ζ, to 1e-9 damped periods [-].
+    """
+
+    zeta_max: float
+    duration_periods: float
+
+    def __init__(
+        self,
+        follow: Callable[[float, Floats], tuple[Floats, Floats, Floats]],
+        start: Floats,
+        zeta_max: float,
+        instead: str,
+    ) -> None:
+        """Solve and fit.
+
+        Args:
+            follow: (ζ, the unknowns at a ζ a little below) -> the unknowns, A [-] and times in damped periods [-].
+            start: The unknowns without damping.
+            zeta_max: Highest damping ratio [-].
+            instead: What to take beyond it, in words.
+
+        Raises:
+            ConvergenceError: There is no solution up to there.
+        """
+        self.zeta_max, self._instead = zeta_max, instead
+        k = np.arange(NODES)
+        nodes = np.cos((k + 0.5) * math.pi / NODES)[::-1]
+        values, last, x, zeta = [], start, start, 0.0
+        slope = np.zeros(start.size)
+        for node in nodes:
+            step, zeta = 0.5 * zeta_max * (1.0 + float(node)) - zeta, 0.5 * zeta_max * (1.0 + float(node))
+            x, A, periods = follow(zeta, last + step * slope)
+            slope, last = (x - last) / step, x
+            values.append(np.concatenate([A, periods]))
+        terms = np.cos(np.outer(np.arccos(nodes), k))  # T_k at the nodes, orthogonal
+        self._coefficients = (terms.T @ np.array(values)) * np.where(k == 0, 1.0, 2.0)[:, None] / NODES
+        self._k, self._N = k, values[0].size // 2
+        ends = [float(follow(end, x)[2][-1]) for end, x in ((0.0, start), (zeta_max, last))]
+        between = [float(self._at(zeta)[1][-1]) for zeta in np.linspace(0.0, zeta_max, 33)[1:-1]]
+        self.duration_periods = round(max(*ends, *between), 9)
+
+    def __call__(self, f_d: float, zeta: float) -> Impulses:
+        """The impulses.
+
+        Args:
+            f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
+            zeta: Damping ratio of the mode [-], 0 <= ζ < zeta_max.
+
+        Returns:
+            A [-] and τ [s].
+
+        Raises:
+            ShaperRangeError: f_d or ζ is outside the range above.
+        """
+        check_mode(f_d, zeta, self.zeta_max, self._instead)
+        A, periods = self._at(zeta)
+        return Impulses._by_construction(A, periods / f_d)  # noqa: SLF001  solved, and of sum 1
+
+    def _at(self, zeta: float) -> tuple[Floats, Floats]:
+        angle = math.acos(min(max(2.0 * zeta / self.zeta_max - 1.0, -1.0), 1.0))
+        values = np.cos(angle * self._k) @ self._coefficients
+        A, periods = values[: self._N], values[self._N :]
+        periods[0] = 0.0
+        return A / A.sum(), periods

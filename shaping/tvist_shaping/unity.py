@@ -1,0 +1,85 @@
+"""Unity-magnitude shapers: impulses +1, -1, +1, …, shorter than any positive train.
+
+They pay with the reference's limits: a positive train is a mean of the reference's past and keeps its limits of
+velocity and acceleration; +1 -1 +1 may reach three times as much, five impulses five times. And they excite
+what swings faster than the mode they are made for. Impulses have no freedom but their times (Singhose, Singer and
+Seering, "Time-optimal negative input shapers", J. Dyn. Sys. Meas. Control 119, 1997), found here by Newton's method.
+With ζ their first times grow and pairs of impulses close up; they end at ζ = 0.5, the last pair a twentieth of a period
+apart.
+"""
+
+import math
+
+import numpy as np
+
+from tvist_shaping._types import Floats
+from tvist_shaping.impulses import Impulses
+from tvist_shaping.newton import solve
+from tvist_shaping.tabulated import Tabulated
+
+
+class UnityShaper:
+    """The equations: E(1) = 0, and with `derivative` E'(1) = 0 too, E(r) = Σ ±exp(r s τ_j), T_d = 1 (see `exact`)."""
+
+    def __init__(self, *, derivative: bool) -> None:
+        """Set up the shaper of three impulses, or of five."""
+        self.derivative = derivative
+        self.A = np.array([1.0, -1.0, 1.0, -1.0, 1.0] if derivative else [1.0, -1.0, 1.0])
+        # Without damping; what is known of the five to four digits is enough to begin with.
+        self.start: Floats = np.array([0.0895, 0.3662, 0.643, 0.7325] if derivative else [1 / 6, 1 / 3])
+
+    def follow(self, zeta: float, near: Floats) -> tuple[Floats, Floats, Floats]:
+        """Unknowns, amplitudes [-] and times in damped periods [-] at ζ, from the unknowns at another."""
+        s = 2.0 * math.pi * (zeta / math.sqrt(1.0 - zeta * zeta) + 1j)
+
+        def equations(points: Floats) -> Floats:
+            tau = np.hstack([np.zeros((len(points), 1)), points])
+            waves = self.A * np.exp(s * (tau - tau[:, -1:]))
+            sums = [waves.sum(axis=1)]
+            if self.derivative:
+                sums.append((waves * tau).sum(axis=1))
+            return np.stack([part for value in sums for part in (value.real, value.imag)], axis=1)
+
+        x = solve(equations, near)
+        return x, self.A, np.concatenate([[0.0], x])
+
+
+ZETA_MAX = 0.5
+"""Highest damping ratio [-]."""
+UM_ZV, UM_ZVD = (
+    Tabulated(shaper.follow, shaper.start, ZETA_MAX, f"take {name}")
+    for name, shaper in (("zv", UnityShaper(derivative=False)), ("zvd", UnityShaper(derivative=True)))
+)
+
+
+def um_zv(f_d: float, zeta: float) -> Impulses:
+    """Unity-magnitude zero-vibration shaper: up to 3 times the reference's acceleration.
+
+    Args:
+        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
+        zeta: Damping ratio of the mode [-], 0 <= ζ < 0.5.
+
+    Returns:
+        A = (1, -1, 1) [-] and τ [s], each of shape (3,); τ = (0, 1/6, 1/3)/f_d without damping.
+
+    Raises:
+        ShaperRangeError: f_d or ζ is outside the range above.
+    """
+    return UM_ZV(f_d, zeta)
+
+
+def um_zvd(f_d: float, zeta: float) -> Impulses:
+    """Unity-magnitude zero-vibration-and-derivative shaper: up to 5 times the reference's acceleration.
+
+    Args:
+        f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
+        zeta: Damping ratio of the mode [-], 0 <= ζ < 0.5.
+
+    Returns:
+        A = (1, -1, 1, -1, 1) [-] and τ [s], each of shape (5,); τ = (0, 0.0895, 0.3662, 0.6430, 0.7325)/f_d
+        without damping.
+
+    Raises:
+        ShaperRangeError: f_d or ζ is outside the range above.
+    """
+    return UM_ZVD(f_d, zeta)

@@ -1,0 +1,248 @@
+"""Moves by the hundred: what comes in, what is made of it, and that the answers are those of the line itself."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from tvist_lab.evaluation.baselines import EQUAL_DURATION, baselines
+from tvist_lab.evaluation.evaluate import WORTH, Job, Judged, Made, evaluate, interval, judge, report
+from tvist_lab.evaluation.line import (
+    PAPER,
+    control_line,
+    lengthened,
+    point_to_point,
+    round_a_corner,
+    shape,
+    simulate,
+)
+from tvist_lab.evaluation.moves import Move, MovesError, draw_moves, is_free, read_moves, write_moves
+from tvist_lab.evaluation.recipes import Mistaken, Recipe, RecipeError
+from tvist_plant.description import load
+from tvist_plant.plant import PERIOD
+from tvist_server import calibrations
+from tvist_server.collision import CollisionModel
+from tvist_server.cycle import ControlCycle
+from tvist_server.refusal import RefusalError
+from tvist_server.setup import body, paper_payload
+from tvist_shaping.estimators.fixed import Fixed
+
+
+@pytest.fixture(scope="module")
+def ur5e():
+    return load("ur5e")
+
+
+@pytest.fixture(scope="module")
+def paper(ur5e):
+    return calibrations.load(calibrations.DEFAULT)
+
+
+@pytest.fixture
+def move(ur5e):
+    return Move(ur5e.poses["Q1"], ur5e.poses["Q3"], 5.0)
+
+
+@pytest.fixture
+def written(tmp_path, ur5e):
+    """Write a file and read it as moves."""
+
+    def read(content):
+        path = tmp_path / "moves.json"
+        path.write_text(content if isinstance(content, str) else json.dumps(content), encoding="utf-8")
+        return read_moves(path, ur5e, lambda: 5.0)
+
+    return read
+
+
+HOME = [0.0, -1.0, 1.0, -1.0, 0.0, 0.0]
+
+
+def but(joint, angle):
+    return [angle if number == joint else home for number, home in enumerate(HOME)]
+
+
+class TestFiles:
+    def test_a_move_says_where_from_and_where_to(self, written):
+        (move,) = written([{"start": HOME, "target": but(0, 1.0)}])
+        assert move == Move(tuple(HOME), tuple(but(0, 1.0)), 5.0)
+
+    def test_a_move_may_have_a_payload_of_its_own(self, written):
+        first, second = written(
+            [{"start": HOME, "target": but(0, 1.0), "payload": 0}, {"start": HOME, "target": but(1, 0.0)}]
+        )
+        assert (first.mass, second.mass) == (0.0, 5.0)
+
+    def test_what_is_written_is_read(self, tmp_path, ur5e):
+        moves = draw_moves(ur5e, 5, 1, (0.0, 5.0)).moves
+        write_moves(tmp_path / "moves.json", moves)
+        assert read_moves(tmp_path / "moves.json", ur5e, lambda: math.nan) == moves
+
+    @pytest.mark.parametrize(
+        ("content", "words"),
+        [
+            ("[{", ["moves.json"]),
+            ("{}", ["moves.json", "array"]),
+            ([], ["moves.json", "length >= 1"]),
+            ([{"start": HOME}], ["move 1", "target"]),
+            ([{"start": HOME, "target": but(0, 1.0), "load": 1}], ["move 1", "load"]),
+            ([{"start": HOME, "target": but(0, 1.0), "payload": -1}], ["move 1", "payload", "0"]),
+            ([{"start": HOME, "target": but(0, 1.0)}, {"start": HOME, "target": HOME}], ["move 2", "nowhere"]),
+            ([{"start": HOME, "target": HOME[:5]}], ["move 1", "target", "5 angles", "6 joints"]),
+            ([{"start": HOME, "target": but(2, 9.0)}], ["move 1", "target", "joint 3", "elbow", "±6.28319"]),
+            ([{"start": but(4, "x"), "target": HOME}], ["move 1", "start", "joint 5"]),
+            ('[{"start": [0, 0, 0, 0, 0, NaN], "target": []}]', ["moves.json"]),
+            ([{"start": HOME, "target": but(0, 1e300)}], ["move 1", "target", "joint 1"]),
+        ],
+    )
+    def test_what_is_wrong_is_named(self, written, content, words):
+        with pytest.raises(MovesError) as error:
+            written(content)
+        assert all(word in str(error.value) for word in words), error.value
+
+    def test_a_file_that_is_not_there_is_named(self, tmp_path, ur5e):
+        with pytest.raises(MovesError, match=r"none\.json"):
+            read_moves(tmp_path / "none.json", ur5e, lambda: 5.0)
+
+
+class TestDraws:
+    def test_a_seed_draws_the_same_moves_whatever_the_number(self, ur5e):
+        few, many = draw_moves(ur5e, 5, 3, (0.0, 5.0)), draw_moves(ur5e, 20, 3, (0.0, 5.0))
+        assert few.moves == many.moves[:5]
+        assert few.moves != draw_moves(ur5e, 5, 4, (0.0, 5.0)).moves
+
+    def test_moves_are_those_of_the_workspace_and_free(self, ur5e):
+        drawn = draw_moves(ur5e, 60, 7, (1.0, 4.0))
+        collision = CollisionModel(ur5e, body(paper_payload(ur5e, 5.0)))
+        for move in drawn.moves:
+            start, target = np.array(move.start), np.array(move.target)
+            for q in (start, target):
+                assert np.abs(q[0]) <= np.pi
+                assert -np.pi <= min(q[1], q[3]) <= max(q[1], q[3]) <= 0.0
+                assert np.abs(q[2]) <= 5.0 * np.pi / 6.0
+                assert not q[4:].any()
+            assert 1.0 <= move.mass <= 4.0
+            collision.carry(body(paper_payload(ur5e, move.mass)))
+            assert is_free(collision, move)
+            for share in np.linspace(0.0, 1.0, 50):
+                assert collision.meeting(start + share * (target - start)) is None
+        assert 0.0 < drawn.share <= 1.0
+
+    def test_wrists_turn_where_they_may(self, ur5e):
+        wrists = np.array([move.target[4:] for move in draw_moves(ur5e, 20, 7, (0.0, 0.0), wrists=True).moves])
+        assert np.abs(wrists).max() > 1.5
+
+
+class TestLine:
+    def test_shaping_first_is_to_the_bit_what_the_line_does(self, ur5e, paper, move):
+        start, target = np.array(move.start), np.array(move.target)
+        carried = body(paper_payload(ur5e, 5.0))
+        recipe = Recipe("zv", paper)
+        cycle = ControlCycle(
+            ur5e, recipe.make(ur5e, 5.0), q=start, declared=carried, carried=carried, seed=3
+        )
+        for _ in range(4):
+            cycle.step()
+        cycle.start(cycle.plan(target, PAPER))
+        felt = []
+        while not cycle.at_rest:
+            cycle.step()
+            felt.append(cycle.arm.truth().specific_force)
+        tvist = recipe.make(ur5e, 5.0)
+        tvist.reset(start)
+        reference = point_to_point(start, target)
+        shaped, ended = shape(tvist.filter, reference)
+        assert ended
+        recording = simulate(control_line(ur5e, start, carried, carried), start, reference, shaped, 3)
+        np.testing.assert_array_equal(recording["truth_tool_acceleration"][4 : 4 + len(felt)], felt)
+
+    def test_a_longer_double_S_takes_the_time_it_is_told(self, move):
+        start, target = np.array(move.start), np.array(move.target)
+        for ticks in (len(point_to_point(start, target)) + extra for extra in (0, 7, 40, 150)):
+            longer = lengthened(start, target, ticks)
+            assert abs(len(longer) - ticks) <= 1
+            np.testing.assert_array_equal(longer[-1], target)
+            assert np.abs(np.diff(longer, 2, axis=0)).max() <= (1.0 + 1e-9) * PAPER.acceleration * PERIOD**2
+
+    def test_a_path_round_a_corner_is_smooth_and_ends_at_the_target(self):
+        path = round_a_corner(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([1.0, -1.0, 0.5]))
+        np.testing.assert_allclose(path[-1], [1.0, -1.0, 0.5], atol=1e-12)
+        assert np.abs(np.diff(path, 2, axis=0)).max() <= 2.0 * PAPER.acceleration * PERIOD**2
+
+    def test_a_reference_that_is_not_followed_to_the_end_is_said_not_to_end(self):
+        reference = point_to_point(np.zeros(2), np.ones(2))
+        assert not shape(lambda q: 0.999 * q, reference)[1]
+
+
+class TestRecipes:
+    def test_a_wrong_frequency_is_wrong_by_the_share(self):
+        wrong = Mistaken(Fixed([10.0, 20.0], [0.1, 0.2]), -0.2)
+        f_d, zeta = wrong.estimate(np.zeros(6))
+        np.testing.assert_allclose(f_d, [8.0, 16.0])
+        np.testing.assert_allclose(zeta, [0.1, 0.2])
+        assert (wrong.modes, wrong.f_d_min, wrong.zeta_max) == (2, 8.0, 0.2)
+
+    def test_several_modes_need_a_modal_calibration(self, ur5e, paper):
+        with pytest.raises(RecipeError, match="tvist identify --model modal"):
+            Recipe("zv", paper, modes=3).make(ur5e, 5.0)
+
+    def test_an_unknown_shaper_is_refused(self, ur5e, paper):
+        with pytest.raises(RefusalError, match="zz"):
+            Recipe("zz", paper).make(ur5e, 5.0)
+
+
+class TestReport:
+    @staticmethod
+    def judged(unshaped, shaped):
+        return Judged(Made(unshaped, 1.0, 1.2, 1.0, 0.9), Made(shaped, 1.1, None, 1.01, 1.0))
+
+    def test_percentages_leave_out_what_did_not_vibrate_and_list_it(self, ur5e, paper, move):
+        peaks = [(1.0, 0.1), (2.0, 0.5), (0.5 * WORTH, 0.1 * WORTH)]
+        judged = [self.judged(*pair) for pair in peaks]
+        told = report([Job(ur5e, move, Recipe("zv", paper))] * 3, judged)
+        assert [row["reduction_percent"] for row in told["moves"]] == [pytest.approx(90.0), pytest.approx(75.0), None]
+        assert told["left_out"] == [3]
+        assert told["counted"] == 2
+        assert told["reduction_percent"] == pytest.approx({"median": 82.5, "p5": 75.75, "min": 75.0})
+        assert told["delay_ms"] == pytest.approx({"median": 100.0, "max": 100.0})
+        assert told["moves"][0]["still_after_ms"] == {"unshaped": 1200.0, "shaped": None}
+        assert told["never_still"] == 3
+
+    def test_nothing_but_moves_without_vibration_is_no_percentage(self, ur5e, paper, move):
+        told = report([Job(ur5e, move, Recipe("zv", paper))], [self.judged(0.1, 0.05)])
+        assert told["reduction_percent"] == {"median": None, "p5": None, "min": None}
+        assert told["reduction_percent_interval"] == {"median": None, "p5": None}
+
+    def test_an_interval_covers_the_percentile_of_a_known_distribution(self):
+        random = np.random.default_rng(5)
+        hits = [
+            low <= 0.0 <= high
+            for low, high in (interval(random.standard_normal(200), 50) for _ in range(60))
+        ]
+        assert 0.85 <= np.mean(hits) <= 1.0
+
+
+class TestMoves:
+    @pytest.mark.slow
+    def test_the_papers_motion_is_what_the_paper_page_says(self, ur5e, paper, move):
+        recipe = Recipe("zv", paper)
+        job = Job(ur5e, move, recipe, baselines(recipe, ur5e, (5.0, 5.0)))
+        one = judge(job)
+        assert one.counts
+        assert one.reduction(one.shaped) > 80.0
+        assert 50.0 <= one.delay(one.shaped) <= 85.0
+        assert set(one.baselines) == {
+            "equal_duration_double_s", "zv_frozen_at_end", "fixed_mzv", "fixed_ei2", "fixed_ei3"
+        }  # fmt: skip
+        longer = one.baselines[EQUAL_DURATION.name]
+        assert longer.duration == pytest.approx(one.shaped.duration, abs=1.5 * PERIOD)
+        assert longer.acceleration <= 1.0 + 1e-9
+
+    @pytest.mark.slow
+    def test_other_processes_give_the_same_figures(self, ur5e, paper):
+        jobs = [
+            Job(ur5e, move, Recipe("zv", paper), seed=number)
+            for number, move in enumerate(draw_moves(ur5e, 9, 2, (5.0, 5.0)).moves)
+        ]
+        assert list(evaluate(jobs)) == [judge(job) for job in jobs]

@@ -1,0 +1,187 @@
+"""Springs and drives from a few ring-downs, as a client; and what is said where they do not do."""
+
+import asyncio
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tvist_lab.identification import modal
+from tvist_lab.identification.design import choose, predicted
+from tvist_lab.identification.identify import IdentificationError
+from tvist_lab.identification.modal import ModalPlan, calibrate, free_configurations, identify_modal
+from tvist_lab.identification.modal_fit import describe, fit_from_many, own_poles
+from tvist_lab.identification.ring_downs import Jog
+from tvist_lab.identification.unknowns import Arm
+from tvist_lab.in_process import free_setup, robot_in_process
+from tvist_plant.description import load
+from tvist_protocol.calibration import calibration_from_json, calibration_to_json
+from tvist_server.calibrations.modal import modal_estimator
+from tvist_server.collision import CollisionModel
+from tvist_server.setup import body, paper_payload
+
+ROBOT = load("ur5e")
+PAYLOADS = (paper_payload(ROBOT, 0.0), paper_payload(ROBOT, 5.0))
+
+
+def measured(ring_downs, seed, payloads=PAYLOADS, description=ROBOT):
+    async def run():
+        setup = replace(free_setup(calibration="none", seed=seed), description=ROBOT)
+        async with robot_in_process(setup) as robot, robot.control("test") as arm:
+            plan = ModalPlan(ring_downs, payloads, seed)
+            done = await identify_modal(
+                robot, arm, description, plan, name="test", command="a test", progress=lambda: None
+            )
+            return done, await robot.info()
+
+    return asyncio.run(run())
+
+
+@pytest.fixture(scope="module")
+def done():
+    return measured(8, seed=11)
+
+
+@pytest.fixture(scope="module")
+def synthetic():
+    """Ring-downs of the arm as guessed, with the noise of the accelerometer."""
+    arm = Arm(ROBOT, PAYLOADS)
+    plan = ModalPlan(8, PAYLOADS, seed=5)
+    candidates = free_configurations(ROBOT, PAYLOADS, 16, plan)
+    rng = np.random.default_rng(6)
+    rings = []
+    for number, q in enumerate(candidates[:8]):
+        ring = predicted(arm, q, number % 2, Jog())
+        rings.append(replace(ring, force=ring.force + rng.normal(0.0, ring.noise, ring.force.shape)))
+    return arm, candidates, rings
+
+
+@pytest.mark.slow
+def test_eight_ring_downs_say_three_modes_at_poses_and_with_payloads_never_seen(done):
+    found, _ = done
+    assert found.errors is not None
+    first, second, third = found.errors
+    assert first.f_d.median < 3.0
+    assert second.f_d.median < 4.0
+    assert third.f_d.median < 4.0
+    assert first.zeta.median < 10.0
+
+
+@pytest.mark.slow
+def test_the_calibration_says_how_sure_it_is_and_what_it_came_from(done):
+    found, info = done
+    calibration = found.calibration
+    model = calibration.modal
+    assert calibration.robot == info.model
+    assert calibration.provenance.ring_downs == len(model.ring_downs) == 8
+    assert [ring.payload for ring in model.ring_downs].count(0) == 4
+    assert [payload.mass for payload in model.payloads] == [0.0, 5.0]
+    assert 0.8 < model.residual_to_noise < 1.3
+    status = {(p.quantity, p.joints): p for p in model.parameters}
+    shoulder = status["gear_stiffness", (1,)]
+    assert shoulder.status == "identified"
+    assert shoulder.interval[0] < shoulder.value < shoulder.interval[1]
+    # five standard deviations, since what the model leaves out is not in them
+    assert abs(np.log(shoulder.value / 32_500.0)) < 5.0 * shoulder.deviation
+    rotor = status["rotor_inertia", (1,)]
+    assert (rotor.status, rotor.value, rotor.deviation) == ("assumed", 1.0, 0.0)
+    assert calibration_from_json(calibration_to_json(calibration)) == calibration
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        payload = paper_payload(ROBOT, float(rng.uniform(0.0, 5.0)))
+        estimator = modal_estimator(calibration, ROBOT, payload)
+        estimator.estimate(rng.uniform(-np.pi, np.pi, 6))
+        assert not estimator.clipped
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wrong", [(2,), (1, 6)])
+def test_a_ring_down_with_another_payload_than_declared_is_named(done, wrong):
+    found, info = done
+    mislabelled = [
+        replace(ring, payload=1 - ring.payload) if number in wrong else ring
+        for number, ring in enumerate(found.ringings)
+    ]
+    with pytest.raises(IdentificationError, match="contradict") as error:
+        calibrate(Arm(ROBOT, PAYLOADS), mislabelled, info, ModalPlan(), 0, name="x", command="x")
+    assert any(f"number {number + 1} " in str(error.value) for number in wrong)
+
+
+@pytest.mark.slow
+def test_one_payload_alone_is_enough_for_that_payload():
+    found, _ = measured(6, seed=3, payloads=())
+    assert [payload.mass for payload in found.calibration.modal.payloads] == [5.0]
+    assert found.calibration.modal.cross_validated_f_d_percent[0].median < 5.0
+
+
+def test_too_few_ring_downs_are_refused_before_the_arm_moves():
+    with pytest.raises(IdentificationError, match="at least 4 are needed"):
+        measured(3, seed=0)
+    many = tuple(paper_payload(ROBOT, float(mass)) for mass in range(6))
+    with pytest.raises(IdentificationError, match="at least 6 are needed"):
+        measured(5, seed=0, payloads=many)
+
+
+def test_the_file_of_another_arm_is_refused():
+    import msgspec
+
+    other = msgspec.structs.replace(ROBOT, robot=msgspec.structs.replace(ROBOT.robot, model="other"))
+    with pytest.raises(IdentificationError, match="is a UR5e"):
+        measured(4, seed=0, description=other)
+
+
+def test_what_the_model_can_say_is_found_from_noisy_ring_downs(synthetic):
+    arm, _, rings = synthetic
+    fit = fit_from_many(arm, rings)
+    assert np.all(np.abs(fit.logarithms - arm.guess) < 5.0 * fit.deviations)
+    np.testing.assert_allclose(fit.residual_to_noise, 1.0, atol=0.15)
+    for ring in rings:
+        mass = arm.mass(ring.q, ring.payload)
+        found, _ = describe(fit.drivetrain.poles(mass)[0][:2])
+        true, _ = describe(arm.drivetrain(arm.guess).poles(mass)[0][:2])
+        np.testing.assert_allclose(found, true, rtol=0.03)
+
+
+def test_a_ring_down_s_own_poles_explain_no_more_than_the_right_ones_but_for_noise(synthetic):
+    arm, _, rings = synthetic
+    for ring in rings:
+        poles = arm.drivetrain(arm.guess).poles(arm.mass(ring.q, ring.payload))[0][:4]
+        right = own_poles(arm, ring, poles)
+        assert right.significance < modal.SIGNIFICANT
+        swapped = arm.drivetrain(arm.guess).poles(arm.mass(ring.q, 1 - ring.payload))[0][:4]
+        assert own_poles(arm, ring, swapped).significance > right.significance
+
+
+def test_poses_chosen_say_more_than_the_first_ones_and_none_twice(synthetic):
+    from tvist_lab.identification.modal_fit import information
+
+    arm, candidates, _ = synthetic
+    chosen = choose(arm, candidates, Jog(), (3, 3))
+    assert len(set(chosen)) == 6
+    assert [payload for _, payload in chosen].count(0) == 3
+
+    def knowledge(keys):
+        says = [information(arm, predicted(arm, candidates[n], p, Jog()), arm.guess) for n, p in keys]
+        return np.linalg.slogdet(np.diag(arm.deviation**-2) + sum(says))[1]
+
+    assert knowledge(chosen) > knowledge([(n, p) for n in range(3) for p in range(2)])
+
+
+def test_configurations_are_free_of_collision_at_either_end_of_the_jog():
+    plan = ModalPlan(seed=2)
+    model = CollisionModel(ROBOT, body(PAYLOADS[1]))
+    found = free_configurations(ROBOT, PAYLOADS, 30, plan)
+    assert len(found) == 30
+    for q in found:
+        assert model.meeting(q) is None
+        assert model.meeting(q - plan.jog.of(6)) is None
+
+
+def test_what_ring_downs_do_not_tell_is_said_to_be_not_identifiable(synthetic):
+    arm, _, rings = synthetic
+    fit = fit_from_many(arm, rings[:1])
+    status = [p.status for p in arm.parameters(fit.logarithms, fit.deviations)]
+    assert status.count("not identifiable") >= 4
+    for parameter in arm.parameters(fit.logarithms, fit.deviations):
+        low, high = parameter.interval
+        assert low <= parameter.value <= high

@@ -1,0 +1,59 @@
+"""What the arm carries, found as a client by its torques."""
+
+import asyncio
+
+import msgspec
+import numpy as np
+import pytest
+
+from tvist_client.arm import make_payload
+from tvist_lab.identification.identify import IdentificationError
+from tvist_lab.identification.payload import identify_payload
+from tvist_lab.in_process import free_setup, robot_in_process
+from tvist_plant.description import load
+
+ROBOT = load("ur5e")
+INERTIA = (0.002, 0.0, 0.0, 0.002, 0.0, 0.002)
+
+
+def found(mass, com, *, declared=2.0, poses=4, seed=0, description=ROBOT, push=None):
+    async def run():
+        async with robot_in_process(free_setup(seed=seed)) as robot, robot.control("test") as arm:
+            await arm.reset(payload=make_payload(mass, com, INERTIA if mass else (0.0,) * 6))
+            await arm.set_payload(declared, (0.0, 0.0, 0.04), INERTIA)
+            if push is not None:
+                await arm.inject("push", joint=1, seconds=1e3, value=push)
+            return await identify_payload(
+                robot, arm, description, poses=poses, seed=seed, progress=lambda: None
+            )
+
+    return asyncio.run(run())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("mass", "com", "seed"),
+    [(3.3, (-0.02, 0.05, 0.06), 1), (0.6, (0.03, 0.0, 0.05), 2), (5.0, (0, 0, 0.0405), 3)],
+)
+def test_mass_and_centre_are_found_whatever_is_declared(mass, com, seed):
+    payload = found(mass, com, seed=seed)
+    assert payload.payload.mass == pytest.approx(mass, abs=0.02)
+    np.testing.assert_allclose(payload.payload.com, com, atol=0.002)
+    assert payload.mass_in_motion == pytest.approx(mass, abs=0.15)
+    assert abs(payload.payload.mass - mass) < 5.0 * payload.mass_deviation
+    assert payload.declared.mass == 2.0
+
+
+@pytest.mark.slow
+def test_nothing_carried_is_found_to_be_nothing():
+    payload = found(0.0, (0.0, 0.0, 0.0))
+    assert payload.payload.mass < 0.02
+    assert payload.payload.com == (0.0, 0.0, 0.0)
+
+
+def test_too_few_poses_and_the_file_of_another_arm_are_refused():
+    with pytest.raises(IdentificationError, match="at least 3"):
+        found(1.0, (0.0, 0.0, 0.0), poses=2)
+    other = msgspec.structs.replace(ROBOT, robot=msgspec.structs.replace(ROBOT.robot, model="other"))
+    with pytest.raises(IdentificationError, match="is a UR5e"):
+        found(1.0, (0.0, 0.0, 0.0), description=other)

@@ -1,0 +1,155 @@
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from tvist_shaping import FilterError
+from tvist_shaping.fir import EDGE, ENERGY, SCALE, FirDesign, solve
+
+H = 0.002
+WANTED = FirDesign()
+N = int(WANTED.longest / H) + 1
+
+
+def modes(random):
+    """Four modes of an arm, one above the other."""
+    f_d = np.cumprod(random.uniform((5.0, 1.05, 1.5, 1.2), (12.0, 2.0, 3.0, 2.5)))
+    return f_d, random.uniform(0.03, 0.25, 4)
+
+
+class Programme:
+    """The programme in arrays, and what `solve` makes of it."""
+
+    def __init__(self, f_d, zeta, length, mean):
+        self.f_d, self.zeta, self.length, self.mean = f_d, zeta, length, mean
+        self.t = H * np.arange(N)
+        self.room = np.clip((length - self.t) / EDGE, 0.0, 1.0) * H / (ENERGY * length)
+        rows, weights = [], []
+        for f, z, spread, weight in zip(f_d, zeta, WANTED.spread, WANTED.weight, strict=True):
+            for factor in [1.0] if spread == 0.0 else [1.0 - spread, 1.0 + spread]:
+                s = 2.0 * np.pi * f * factor * (z / np.sqrt(1.0 - z**2) + 1j)
+                wave = np.exp(s * self.t - s.real * length)
+                rows += [wave.real, wave.imag]
+                weights += [weight, weight]
+        self.rows, self.weights = np.array(rows), np.array(weights)
+        self.dual = np.zeros(WANTED.rows)
+
+    def solve(self):
+        taps, remains = np.empty(N), np.empty(4)
+        solved = solve(
+            self.f_d, self.zeta, self.length, self.mean, H,
+            np.array(WANTED.spread), np.array(WANTED.weight),
+            self.dual, np.empty((WANTED.rows, N)), np.empty((WANTED.rows, WANTED.rows + 2)), taps, remains,
+        )  # fmt: skip
+        return taps, remains, solved
+
+    def cost(self, taps):
+        used = self.room > 0.0
+        energy = (taps[used] ** 2 / self.room[used]).sum()
+        return 0.5 * energy + 0.5 * self.weights @ (self.rows @ taps) ** 2
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_the_solution_is_optimal(seed):
+    """Karush, Kuhn and Tucker: feasible, and every weight is what its price allows, none where that is negative."""
+    random = np.random.default_rng(seed)
+    mean = random.uniform(0.026, 0.034)
+    programme = Programme(*modes(random), random.uniform(0.05, 0.15), mean)
+    taps, remains, solved = programme.solve()
+    assert solved
+    assert taps.min() >= 0.0
+    assert taps.sum() == pytest.approx(1.0, abs=1e-14)
+    assert programme.t @ taps == pytest.approx(mean, abs=1e-10)
+    # The multipliers of what remains are what remains itself, times its price.
+    np.testing.assert_allclose(programme.dual[2:], -programme.weights * (programme.rows @ taps), atol=1e-5)
+    slope = (
+        programme.dual[0]
+        + programme.dual[1] * (programme.t - mean) / SCALE
+        + programme.dual[2:] @ programme.rows
+    )
+    np.testing.assert_allclose(taps, programme.room * np.maximum(slope, 0.0), atol=1e-9)
+    left = np.split((programme.rows @ taps) ** 2, np.cumsum([2 * (1 + (s > 0)) for s in WANTED.spread])[:-1])
+    np.testing.assert_allclose(remains, [np.sqrt(part.sum()) for part in left], atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_another_solver_finds_nothing_better(seed):
+    random = np.random.default_rng(seed)
+    f_d = np.cumprod([random.uniform(6.0, 10.0), *random.uniform(1.2, 2.0, 3)])
+    programme = Programme(f_d, random.uniform(0.01, 0.2, 4), random.uniform(0.06, 0.12), 0.028)
+    taps, _, _ = programme.solve()
+    used = programme.room > 0.0
+    rows, room, t = programme.rows[:, used], programme.room[used], programme.t[used]
+    hessian = np.diag(1.0 / room) + rows.T @ (programme.weights[:, None] * rows)
+    found = minimize(
+        lambda h: 0.5 * h @ hessian @ h,
+        np.full(used.sum(), 1.0 / used.sum()),
+        jac=lambda h: hessian @ h,
+        method="SLSQP",
+        bounds=[(0.0, None)] * used.sum(),
+        constraints=[
+            {"type": "eq", "fun": lambda h: h.sum() - 1.0, "jac": np.ones_like},
+            {"type": "eq", "fun": lambda h: (t @ h - 0.028) / SCALE, "jac": lambda _: t / SCALE},
+        ],
+        options={"ftol": 1e-15, "maxiter": 2000},
+    )
+    theirs = np.zeros(N)
+    theirs[used] = found.x
+    assert programme.cost(taps) == pytest.approx(programme.cost(theirs), rel=1e-6)
+    np.testing.assert_allclose(taps, theirs, atol=3e-4)
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_it_does_not_matter_where_it_begins(seed):
+    """From the solution for any other arm, and from nothing: the dual has one maximum."""
+    random = np.random.default_rng(seed)
+    arm, length = modes(random), random.uniform(0.055, 0.15)
+    cold, warm = (Programme(*arm, length, 0.028) for _ in range(2))
+    elsewhere = Programme(*modes(random), 0.1, 0.028)
+    elsewhere.solve()
+    warm.dual[:] = elsewhere.dual
+    (cold_taps, cold_left, _), (warm_taps, warm_left, solved) = cold.solve(), warm.solve()
+    assert solved
+    np.testing.assert_allclose(warm_taps, cold_taps, atol=1e-9)
+    np.testing.assert_allclose(warm_left, cold_left, atol=1e-9)
+
+
+def test_a_multiplier_that_is_no_number_is_got_over():
+    programme = Programme(np.array([7.0, 9.0, 20.0, 40.0]), np.full(4, 0.05), 0.1, 0.028)
+    right, _, _ = programme.solve()
+    for wrong in (np.nan, np.inf, 1e300):
+        programme.dual[:] = wrong
+        taps, _, solved = programme.solve()
+        assert solved
+        np.testing.assert_allclose(taps, right, atol=1e-9)
+
+
+def test_longer_filters_leave_less():
+    f_d, zeta = np.array([7.0, 9.0, 20.0, 40.0]), np.full(4, 0.05)
+    left = [np.hypot.reduce(Programme(f_d, zeta, T, 0.028).solve()[1]) for T in np.linspace(0.06, 0.15, 10)]
+    assert left[-1] < 0.4 * left[0]
+
+
+def test_what_cannot_be_is_not_called_solved():
+    """A mean delay behind the last weight."""
+    programme = Programme(np.array([7.0, 9.0, 20.0, 40.0]), np.full(4, 0.05), 0.05, 0.06)
+    _, _, solved = programme.solve()
+    assert not solved
+
+
+@pytest.mark.parametrize(
+    ("numbers", "field"),
+    [
+        ({"weight": (1.0,)}, "weight"),
+        ({"residual": (0.05, 0.05, 0.05)}, "residual"),
+        ({"spread": (), "residual": (), "weight": ()}, "spread"),
+        ({"spread": (-0.1, 0.0, 0.0, 0.0)}, "spread"),
+        ({"weight": (1.0, 1.0, 1.0, float("nan"))}, "weight"),
+        ({"residual": (0.0, 0.05, 0.05, 0.05)}, "residual"),
+        ({"shortest": 0.2}, "shortest"),
+        ({"shortest": 0.01}, "shortest"),
+    ],
+)
+def test_numbers_that_do_not_fit_are_refused_before_compiled_code_sees_them(numbers, field):
+    with pytest.raises(FilterError) as error:
+        FirDesign(**numbers)
+    assert error.value.field == field

@@ -1,0 +1,258 @@
+"""Modes out of a mass matrix: they are the eigenvalues of the whole system, and none ever jumps."""
+
+import json
+import subprocess
+import sys
+
+import msgspec
+import numpy as np
+import pytest
+
+from tvist_plant.description import load
+from tvist_plant.model import flexible_model
+from tvist_plant.plant import Plant
+from tvist_server.calibrations.modal import mass_matrix
+from tvist_shaping.errors import EstimatorError
+from tvist_shaping.estimators import modal
+from tvist_shaping.estimators.modal import Drivetrain, Modal
+
+ROBOT = load("ur5e")
+Q1 = np.array(ROBOT.poses["Q1"])
+LOW, HIGH = np.array([-3, -3, -2.6, -3, -2, -2]), np.array([3, 0, 2.6, 0, 2, 2])
+
+
+def ur5e(payload=ROBOT.payload, *, damping=True):
+    """Mass matrix and drivetrain of the arm, of its own parameters but those that `Drivetrain` does not know."""
+    flexible, drives = flexible_model(ROBOT, payload), ROBOT.drives
+    K, B, K_d, K_p, D = np.zeros((5, flexible.model.nv))
+    joints, flexes = flexible.joints, flexible.flexes
+    K[joints], K[flexes] = drives.gear_stiffness, flexible.flex_stiffness
+    B[joints] = drives.rotor_inertia
+    # Friction about rest is viscous, in parallel with the velocity loop.
+    K_d[joints] = np.array(drives.velocity_gain) + np.array(drives.coulomb_friction) / drives.friction_width
+    K_p[joints] = np.array(drives.velocity_gain) * np.array(drives.position_gain) / K_d[joints]
+    D[joints], D[flexes] = drives.gear_damping, flexible.flex_damping
+    rows = [tuple(row) for row in (K, B, K_d, K_p, D)]
+    return mass_matrix(flexible), Drivetrain(*(rows if damping else rows[:4]))
+
+
+def arm(modes=4, **changes):
+    mass, drivetrain = ur5e()
+    return Modal(mass, drivetrain, modes=modes, **changes), mass, drivetrain
+
+
+def paths(count, seed, steps=400):
+    """Straight lines of up to five radians a joint, at most 15 mrad a step."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        a, b = rng.uniform(LOW, HIGH, (2, 6))
+        yield a + np.linspace(0.0, 1.0, steps)[:, None] * (b - a)
+
+
+def crossing(x):
+    """Two coordinates that know nothing of each other, whose frequencies cross at x = 1."""
+    return np.diag([1.0 + x[0], 2.0])
+
+
+TWO = Drivetrain((9e3, 9e3), (0.3, 0.3), (150.0, 150.0), (15.0, 15.0))
+
+
+def test_each_pole_is_an_eigenvalue_of_the_whole_system_along_any_path():
+    estimator, mass, drivetrain = arm()
+    for path in paths(8, seed=1):
+        for number, q in enumerate(path):
+            found = estimator.poles(q)
+            if number % 20 == 0:
+                every, _ = drivetrain.poles(mass(q))
+                apart = np.abs(every[:, None] - found) / np.abs(found)
+                assert apart.min(axis=0).max() < 1e-6
+                # and no two are one
+                assert len(set(apart.argmin(axis=0))) == len(found)
+
+
+def test_the_first_estimate_is_the_lowest_modes_in_order():
+    rng = np.random.default_rng(2)
+    for q in rng.uniform(LOW, HIGH, (20, 6)):
+        estimator, mass, drivetrain = arm()
+        np.testing.assert_array_equal(estimator.poles(q), drivetrain.poles(mass(q))[0][:4])
+
+
+def test_no_mode_jumps_and_half_the_step_is_half_the_change():
+    changes = []
+    for steps in (400, 800):
+        largest = 0.0
+        for path in paths(5, seed=3, steps=steps):
+            estimator, *_ = arm()
+            found = np.array([estimator.poles(q) for q in path])
+            largest = max(largest, float(np.max(np.abs(np.diff(found, axis=0)) / np.abs(found[1:]))))
+        changes.append(largest)
+    assert changes[0] < 0.06
+    assert changes[1] < 0.6 * changes[0]
+
+
+def test_modes_that_cross_go_on_as_what_they_were():
+    estimator = Modal(crossing, TWO, modes=2)
+    for x in np.linspace(0.0, 2.5, 200):  # q in radians: no step is a jump
+        poles = estimator.poles(np.array([x]))
+        own = [TWO.poles(np.diag([m, m]))[0][0] for m in (1.0 + x, 2.0)]
+        # at the start the first coordinate is the lighter one, so the second mode
+        np.testing.assert_allclose(poles, own[::-1], rtol=1e-6)
+    assert poles.imag[0] > poles.imag[1]
+
+
+def test_two_modes_that_are_almost_one_stay_two_at_the_stretched_arm():
+    estimator, mass, drivetrain = arm()
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        away = rng.uniform(-0.4, 0.4, 6)
+        for share in np.linspace(-1.0, 1.0, 300):
+            q = Q1 + share * away
+            f_d, _ = estimator.estimate(q)
+        expected = np.sort(drivetrain.poles(mass(q))[0][:2].imag) / (2.0 * np.pi)
+        np.testing.assert_allclose(np.sort(f_d[:2]), expected, rtol=1e-6)
+
+
+def test_with_the_plant_s_own_parameters_they_are_the_plant_s_modes():
+    # without what the estimator leaves out: the integrator and gravity's little stiffness
+    drives = msgspec.structs.replace(ROBOT.drives, integral_gain=(0.0,) * 6)
+    plant = Plant(msgspec.structs.replace(ROBOT, drives=drives), ROBOT.payload)
+    rng = np.random.default_rng(5)
+    for q in [Q1, *rng.uniform(LOW, HIGH, (15, 6))]:
+        estimator, *_ = arm(modes=3)
+        f_d, zeta = estimator.estimate(q)
+        true = plant.modes(q)
+        np.testing.assert_allclose(f_d, true.f_d[:3], rtol=0.01)
+        np.testing.assert_allclose(zeta, true.zeta[:3], rtol=0.03)
+
+
+def test_a_payload_changes_the_modes():
+    heavy, _, _ = arm()
+    mass, drivetrain = ur5e(msgspec.structs.replace(ROBOT.payload, mass=0.0))
+    light = Modal(mass, drivetrain, modes=4)
+    assert light.estimate(Q1)[0][0] > 1.2 * heavy.estimate(Q1)[0][0]
+
+
+def test_a_jump_starts_anew_with_the_lowest():
+    estimator, *_ = arm()
+    for path in paths(3, seed=6):
+        for q in path:
+            estimator.estimate(q)
+        there = estimator.estimate(Q1)
+        fresh, *_ = arm()
+        np.testing.assert_array_equal(there, fresh.estimate(Q1))
+
+
+def test_at_rest_the_lowest_are_taken_anew():
+    estimator = Modal(crossing, TWO, modes=1)
+    for x in np.linspace(0.0, 2.0, 200):
+        following = estimator.poles(np.array([x]))[0]
+    resting = estimator.poles(np.array([2.0]))[0]
+    assert resting.imag < following.imag  # the other coordinate is the lower one now
+    assert resting == estimator.poles(np.array([2.0]))[0]
+
+
+def test_a_pole_that_is_lost_is_found_again(monkeypatch):
+    estimator, mass, drivetrain = arm()
+    estimator.estimate(Q1)
+    monkeypatch.setattr(modal, "follow", lambda *_: False)
+    q = Q1 + 0.01
+    np.testing.assert_array_equal(estimator.poles(q), drivetrain.poles(mass(q))[0][:4])
+
+
+def test_what_is_not_believed_is_held_and_said():
+    estimator, *_ = arm(f_d_min=8.0, zeta_max=0.2)
+    f_d, zeta = estimator.estimate(Q1)
+    assert estimator.clipped
+    assert f_d.min() == 8.0
+    assert zeta.max() == 0.2
+    free, *_ = arm()
+    free.estimate(Q1)
+    assert not free.clipped
+
+
+def test_equal_paths_give_equal_bits_and_no_estimate_changes_afterwards():
+    path = next(paths(1, seed=7))
+    first, second = (arm()[0] for _ in range(2))
+    estimates = [first.estimate(q) for q in path]
+    kept = [np.copy(estimate) for estimate in estimates]
+    np.testing.assert_array_equal(kept, [second.estimate(q) for q in path])
+    np.testing.assert_array_equal(kept, estimates)
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"modes": 0}, "modes"),
+        ({"modes": 3}, "modes"),
+        ({"f_d_min": 0.0}, "f_d_min"),
+        ({"f_d_min": np.nan}, "f_d_min"),
+        ({"zeta_max": 1.0}, "zeta_max"),
+        ({"zeta_max": np.nan}, "zeta_max"),
+    ],
+)
+def test_a_bad_parameter_is_refused_by_name(change, field):
+    with pytest.raises(EstimatorError, match=f"{field} is") as error:
+        Modal(crossing, TWO, **({"modes": 2} | change))
+    assert error.value.field == field
+
+
+@pytest.mark.parametrize(
+    ("rows", "field"),
+    [
+        (((1.0, 0.0), (1.0, 1.0), (1.0, 1.0), (1.0, 1.0)), "stiffness"),
+        (((1.0, 1.0), (1.0,), (1.0, 1.0), (1.0, 1.0)), "rotor_inertia"),
+        (((1.0, 1.0), (0.0, 0.0), (1.0, 1.0), (1.0, 1.0)), "rotor_inertia"),
+        (((1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (1.0, 1.0)), "velocity_gain"),
+        (((1.0, 1.0), (1.0, 1.0), (1.0, 1.0), (1.0, np.inf)), "position_gain"),
+        (((1.0, 1.0), (1.0, 1.0), (1.0, 1.0), (1.0, 1.0), (np.nan, 0.0)), "damping"),
+        (((), (), (), ()), "stiffness"),
+    ],
+)
+def test_springs_and_motors_that_cannot_be_are_refused_by_name(rows, field):
+    with pytest.raises(EstimatorError, match=f"{field} is") as error:
+        Drivetrain(*rows)
+    assert error.value.field == field
+
+
+def test_a_mass_matrix_of_other_size_or_none_at_all_is_refused():
+    with pytest.raises(EstimatorError, match="of shape"):
+        Modal(lambda _: np.eye(3), TWO, modes=1).estimate(np.zeros(1))
+    estimator = Modal(crossing, TWO, modes=1)
+    with pytest.raises(EstimatorError, match="finite"):
+        estimator.estimate(np.array([np.nan]))
+    assert np.isfinite(estimator.estimate(np.zeros(1))).all()  # nothing of it is left
+
+
+def test_more_modes_than_vibrate_are_refused_where_it_shows():
+    # A light motor with K_d = √(Km)/2.4 takes all there is of a vibration.
+    overdamped = Drivetrain((9e3, 9e3), (0.3, 1e-3), (150.0, 40.0), (15.0, 1e-3))
+    with pytest.raises(EstimatorError, match="at most 1"):
+        Modal(lambda _: np.eye(2), overdamped, modes=2).estimate(np.zeros(1))
+
+
+SCRIPT = """
+import json, sys
+if sys.argv[1] == "without":
+    sys.modules["numba"] = None
+import numpy as np
+from tvist_shaping.estimators.modal import Drivetrain, Modal
+drivetrain = Drivetrain((9e3, 8e3, 5e4), (0.3, 0.2, 0.0), (150.0, 120.0, 0.0), (15.0, 15.0, 0.0), (1.0, 1.0, 5.0))
+def mass(q):
+    c, d = np.cos(q)
+    return np.array([[4 + 2 * c, 1 + c, 0.2], [1 + c, 1.5, 0.1 * d], [0.2, 0.1 * d, 0.6]])
+estimator = Modal(mass, drivetrain, modes=3)
+path = [np.array([np.sin(3 * t), t]) for t in 0.004 * np.arange(400)]
+print(json.dumps([np.ravel(estimator.estimate(q)).tolist() for q in path]))
+"""
+
+
+def test_without_numba_it_says_the_same():
+    with_numba, without = (
+        np.array(
+            json.loads(
+                subprocess.run([sys.executable, "-c", SCRIPT, how], check=True, capture_output=True).stdout
+            )
+        )
+        for how in ("with", "without")
+    )
+    np.testing.assert_allclose(without, with_numba, rtol=1e-9)

@@ -1,0 +1,109 @@
+"""`tvist shapers`: the catalogue of input shapers."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tvist_cli.failure import told
+from tvist_cli.output import err, out, print_json, table
+
+if TYPE_CHECKING:
+    from tvist_shaping import Impulses, Shaper
+
+BANDS = {"5": 0.05, "10": 0.1}
+"""Percent to residual vibration."""
+TOUCHING = 1.0 + 1e-4
+"""A hump as high as the bound is within it, however it is rounded."""
+
+
+def shapers(
+    *,
+    f_d: float = 10.0,
+    zeta: float = 0.0,
+    figures: Path | None = None,
+    json: bool = False,
+) -> None:
+    """List the input shapers that a robot can use, for one mode.
+
+    Args:
+        f_d: Damped frequency of the mode in Hz.
+        zeta: Its damping ratio.
+        figures: Folder for figures: what each leaves when the frequency is wrong; why the mean delay must not change.
+        json: Print one JSON object.
+    """
+    from tvist_shaping import SHAPERS, ShapingError
+
+    with told(ShapingError, code=2):
+        SHAPERS["none"].function(f_d, zeta)
+    found = [_about(shaper, f_d, zeta) for shaper in SHAPERS.values()]
+    if figures is not None:
+        from tvist_lab.figures import catalogue_figure, mean_delay_figure, save
+
+        with told(OSError):
+            err.print(str(save(catalogue_figure(SHAPERS.values(), zeta), figures / "shapers.png")))
+            err.print(str(save(mean_delay_figure(), figures / "mean_delay.png")))
+    if json:
+        print_json({"f_d_hz": f_d, "zeta": zeta, "shapers": found})
+        return
+    table(
+        f"input shapers for a mode of {f_d:g} Hz, ζ = {zeta:g}",
+        ("shaper", "impulses", "ms", "mean ms", "5 % band", "10 % band", "ζ below", "peak"),
+        [_row(about) for about in found],
+    )
+    width = max(len(shaper.name) for shaper in SHAPERS.values())
+    for shaper in SHAPERS.values():
+        out.print(f"{shaper.name:{width}}  {shaper.description}", markup=False)
+    out.print(
+        "\nms: how much later a motion ends; mean ms: how far it trails a motion of constant velocity;\n"
+        "band: true over assumed frequency where at most that much of the vibration is left;\n"
+        "ζ below: damping it is made for; peak: how many times its acceleration a reference may get",
+        markup=False,
+    )
+
+
+def _about(shaper: "Shaper", f_d: float, zeta: float) -> dict[str, Any]:
+    """What there is to say of a shaper; where it is not for this damping, that."""
+    from tvist_shaping import ShaperRangeError
+
+    said: dict[str, Any] = {
+        "name": shaper.name,
+        "description": shaper.description,
+        "duration_periods": shaper.duration_periods,
+        "zeta_max": shaper.zeta_max,
+        "peak": shaper.peak,
+    }
+    try:
+        impulses = shaper.function(f_d, zeta)
+    except ShaperRangeError as error:
+        return said | {"not_for_this_mode": str(error)}
+    return said | _figures(shaper, impulses, zeta)
+
+
+def _figures(shaper: "Shaper", impulses: "Impulses", zeta: float) -> dict[str, Any]:
+    return {
+        "amplitudes": impulses.A.tolist(),
+        "times_s": impulses.tau.tolist(),
+        "duration_ms": 1000.0 * impulses.duration,
+        "mean_delay_ms": 1000.0 * impulses.mean_delay,
+        **{f"band_{percent}_percent": _band(shaper, V, zeta) for percent, V in BANDS.items()},
+    }
+
+
+def _band(shaper: "Shaper", V: float, zeta: float) -> list[float | None] | None:
+    """Lowest and highest ratio; None where even the assumed frequency is not in it, or where there is no end."""
+    low, high = shaper.band(V * TOUCHING, zeta)
+    return None if math.isnan(low) else [low, high if math.isfinite(high) else None]
+
+
+def _row(about: dict[str, Any]) -> tuple[str, ...]:
+    limit, peak = f"{about['zeta_max']:g}", f"{about['peak']:g}"
+    if "not_for_this_mode" in about:
+        return about["name"], *("–" for _ in range(3 + len(BANDS))), limit, peak
+    bands = (about[f"band_{percent}_percent"] for percent in BANDS)
+    spans = ("–" if band is None else f"{band[0]:.3f} – {_end(band[1])}" for band in bands)
+    times = (f"{about[key]:.1f}" for key in ("duration_ms", "mean_delay_ms"))
+    return about["name"], str(len(about["amplitudes"])), *times, *spans, limit, peak
+
+
+def _end(high: float | None) -> str:
+    return "∞" if high is None else f"{high:.3f}"

@@ -1,0 +1,210 @@
+"""What `tvist identify` found, for people and for programs."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tvist_cli.output import out, print_json, table
+
+if TYPE_CHECKING:
+    from tvist_lab.identification.identify import Identification
+    from tvist_lab.identification.modal import ModalIdentification
+    from tvist_lab.identification.payload import PayloadFound
+    from tvist_protocol.calibration import ModalParameter, Spread
+
+PAPER_MASS = 5.0
+"""What a served robot carries unless told otherwise [kg]."""
+UNSEEN = "ring-downs at poses that a fit did not see"
+QUANTITIES = {
+    "gear_stiffness": ("gear stiffness", "N m/rad"),
+    "velocity_gain": ("velocity gain", "N m s/rad"),
+    "position_gain": ("position gain", "1/s"),
+    "rotor_inertia": ("rotor inertia", "kg m²"),
+    "damping_time": ("damping over stiffness", "s"),
+    "bending_stiffness": ("bending stiffness", "N m/rad"),
+}
+
+
+def report_polynomial(done: "Identification", output: Path, *, json: bool) -> None:
+    """Polynomials and how far they are off."""
+    how = done.calibration.provenance
+    if json:
+        print_json(
+            {
+                "file": str(output),
+                "configurations": how.configurations,
+                "ring_downs": how.ring_downs,
+                "rejected": how.rejected,
+                "f_d_range_hz": how.measured_f_d_range,
+                "zeta_range": how.measured_zeta_range,
+                "error_f_d_percent": done.error_f_d.median,
+                "error_zeta_percent": done.error_zeta.median,
+                "error_f_d_p90_percent": done.error_f_d.p90,
+                "error_zeta_p90_percent": done.error_zeta.p90,
+                "against": done.against,
+                "cross_validated_f_d_percent": _median(how.cross_validated_f_d_percent),
+                "cross_validated_zeta_percent": _median(how.cross_validated_zeta_percent),
+                "poses": done.poses(),
+            }
+        )
+        return
+    low, high = how.measured_f_d_range
+    out.print(
+        f"{how.configurations} configurations, {how.ring_downs} ring-downs, {how.rejected} configurations rejected; "
+        f"f_d spans {low:.1f} to {high:.1f} Hz over the workspace (paper: 6 to 15 Hz)"
+    )
+    table(
+        "deviation of the calibration",
+        ("against", "f_d median %", "p90 %", "ζ median %", "p90 %"),
+        [
+            _row("its own measurements", how.residual_f_d_percent, how.residual_zeta_percent),
+            _row(
+                "measurements it did not see",
+                how.cross_validated_f_d_percent,
+                how.cross_validated_zeta_percent,
+            ),
+            *([_row(done.against, done.error_f_d, done.error_zeta)] if done.true_f_d is not None else []),
+        ],
+    )
+    mass = (
+        f" --payload {done.calibration.payload.mass:g}" if done.calibration.payload.mass != PAPER_MASS else ""
+    )
+    out.print(f"written to {output}; use it with: tvist serve --calibration {output}{mass}")
+
+
+def report_modal(done: "ModalIdentification", output: Path, *, json: bool) -> None:
+    """Springs and drives, and how far the modes they make are off."""
+    how, model = done.calibration.provenance, done.calibration.modal
+    if model is None:
+        raise TypeError("an identification of springs and drives has a modal model")
+    crossed = list(zip(model.cross_validated_f_d_percent, model.cross_validated_zeta_percent, strict=True))
+    true = [] if done.errors is None else [(mode.f_d, mode.zeta) for mode in done.errors]
+    judged = true or crossed
+    against = "true modes, unseen poses and payloads" if true else UNSEEN
+    if json:
+        print_json(
+            {
+                "file": str(output),
+                "configurations": how.configurations,
+                "ring_downs": how.ring_downs,
+                "rejected": how.rejected,
+                "payloads_kg": [payload.mass for payload in model.payloads],
+                "f_d_range_hz": how.measured_f_d_range,
+                "zeta_range": how.measured_zeta_range,
+                "residual_to_noise": model.residual_to_noise,
+                "error_f_d_percent": _median(judged[0][0]),
+                "error_zeta_percent": _median(judged[0][1]),
+                "against": against,
+                "modes": [_errors(number, *pair) for number, pair in enumerate(judged, 1)],
+                "cross_validated": [_errors(number, *pair) for number, pair in enumerate(crossed, 1)],
+                "parameters": model.parameters,
+            }
+        )
+        return
+    masses = " and ".join(f"{payload.mass:g}" for payload in model.payloads)
+    out.print(
+        f"{how.ring_downs} ring-downs in {how.configurations} configurations with {masses} kg; the fit leaves "
+        f"{model.residual_to_noise:.2f} times the noise of {model.noise:.3f} m/s²"
+    )
+    table(
+        "springs and drives",
+        ("parameter", "joints", "value", "95 % from", "to", "unit", ""),
+        [_parameter(parameter) for parameter in model.parameters],
+    )
+    table(
+        f"deviation of the modes from {against}",
+        ("mode", "f_d median %", "p90 %", "ζ median %", "p90 %"),
+        [_row(str(number), *pair) for number, pair in enumerate(judged, 1)],
+    )
+    if true:
+        table(
+            f"the same from {UNSEEN}",
+            ("mode", "f_d median %", "p90 %", "ζ median %", "p90 %"),
+            [_row(str(number), *pair) for number, pair in enumerate(crossed, 1)],
+        )
+    lost = [p for p in model.parameters if p.status == "not identifiable"]
+    if lost:
+        names = ", ".join(f"{QUANTITIES[p.quantity][0]} of {_joints(p)}" for p in lost)
+        out.print(
+            f"Not identifiable by these ring-downs: {names}. What rings hardly depends on it, so the guess stays."
+        )
+    out.print(f"written to {output}; use it with: tvist serve --calibration {output}")
+
+
+def report_payload(found: "PayloadFound", *, declared: bool, json: bool) -> None:
+    """Mass and centre of mass."""
+    payload = found.payload
+    if json:
+        print_json(
+            {
+                "mass_kg": payload.mass,
+                "mass_deviation_kg": found.mass_deviation,
+                "com_m": payload.com,
+                "com_deviation_m": found.com_deviation,
+                "mass_in_motion_kg": found.mass_in_motion,
+                "mass_in_motion_deviation_kg": found.mass_in_motion_deviation,
+                "declared_kg": found.declared.mass,
+                "poses": found.poses,
+                "set_payload": {"mass": payload.mass, "com": payload.com, "inertia": payload.inertia},
+                "declared": declared,
+            }
+        )
+        return
+    table(
+        f"what the arm carries, by its torques in {found.poses} poses",
+        ("", "found", "± (one standard deviation)", "declared before"),
+        [
+            (
+                "mass [kg]",
+                f"{payload.mass:.3f}",
+                f"{found.mass_deviation:.3f}",
+                f"{found.declared.mass:.3f}",
+            ),
+            *(
+                (f"centre {axis} [mm]", f"{1e3 * c:.1f}", f"{1e3 * d:.1f}", f"{1e3 * before:.1f}")
+                for axis, c, d, before in zip(
+                    "xyz", payload.com, found.com_deviation, found.declared.com, strict=True
+                )
+            ),
+        ],
+    )
+    out.print(
+        f"A short motion says {found.mass_in_motion:.2f} ± {found.mass_in_motion_deviation:.2f} kg. The inertia is not "
+        "identifiable beside that of the rotors: a steel ball's is taken."
+    )
+    what = f"mass={payload.mass:.3f}, com=({', '.join(f'{c:.4f}' for c in payload.com)})"
+    inertia = ", ".join(f"{moment:.5f}" for moment in payload.inertia)
+    out.print(
+        "It is declared now." if declared else f"To declare it: set_payload {what}, inertia=({inertia})"
+    )
+
+
+def _median(spread: "Spread | None") -> float | None:
+    return None if spread is None else spread.median
+
+
+def _errors(number: int, f_d: "Spread | None", zeta: "Spread | None") -> dict[str, float | None]:
+    return {
+        "mode": number,
+        "f_d_percent": _median(f_d),
+        "f_d_p90_percent": None if f_d is None else f_d.p90,
+        "zeta_percent": _median(zeta),
+        "zeta_p90_percent": None if zeta is None else zeta.p90,
+    }
+
+
+def _row(name: str, f_d: "Spread | None", zeta: "Spread | None") -> tuple[str, ...]:
+    figures = [f"{v:.1f}" for s in (f_d, zeta) if s is not None for v in (s.median, s.p90)]
+    return (name, *(figures or ["–"] * 4))
+
+
+def _parameter(parameter: "ModalParameter") -> tuple[str, ...]:
+    name, unit = QUANTITIES[parameter.quantity]
+    low, high = (f"{end:.4g}" for end in parameter.interval)
+    sure = ("", "") if parameter.status == "assumed" else (low, high)
+    said = "" if parameter.status == "identified" else parameter.status
+    return (name, _joints(parameter), f"{parameter.value:.4g}", *sure, unit, said)
+
+
+def _joints(parameter: "ModalParameter") -> str:
+    word = "link" if parameter.quantity == "bending_stiffness" else "joint"
+    return f"{word} {', '.join(str(joint + 1) for joint in parameter.joints)}"
