@@ -98,6 +98,13 @@ class Filter(ABC):
         self._q_star[:] = q
         self._start()
 
+    def aim(self, q: npt.ArrayLike | None) -> None:  # noqa: B027  most filters do not care
+        """Hear where the motion that begins now will end; the reference must be at rest.
+
+        Args:
+            q: Joint angles at the end [rad], shape (joints,); None: it is not known, as in a stream.
+        """
+
     def filter(self, q_ref: npt.ArrayLike) -> Floats:
         """Shape one sample.
 

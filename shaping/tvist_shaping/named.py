@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from difflib import get_close_matches
 from types import MappingProxyType
 
+from tvist_shaping.aimed import AimedFilter
 from tvist_shaping.base import Filter
 from tvist_shaping.catalogue import SHAPERS, shaper
 from tvist_shaping.errors import UnknownShaperError
@@ -21,8 +22,16 @@ def _short() -> Design:
     return ShortDesign(0.028, wanted=FirDesign(residual=(0.05, 0.05, 0.08, 0.2)), name="short")
 
 
-DESIGNS: Mapping[str, Callable[[], Design]] = MappingProxyType({"auto": _auto, "short": _short})
-"""Designs of constant mean delay against an arm's four lowest modes: one that leaves less, one that is shorter."""
+def _auto_target() -> Design:
+    return ShortDesign(0.026, wanted=FirDesign(residual=(0.035, 0.035, 0.06, 0.2)), name=AIMED)
+
+
+AIMED = "auto-target"
+DESIGNS: Mapping[str, Callable[[], Design]] = MappingProxyType(
+    {"auto": _auto, "short": _short, AIMED: _auto_target}
+)
+"""Designs of constant mean delay against an arm's four lowest modes: one that leaves less, one that is shorter, and one
+that knows where a motion will end."""
 
 
 def names() -> tuple[str, ...]:
@@ -69,5 +78,6 @@ def make_filter(name: str, estimator: Estimator, *, joints: int) -> Filter:
     """
     check_name(name)
     if name in DESIGNS:
-        return SteadyFilter(DESIGNS[name](), estimator, joints=joints)
+        kind = AimedFilter if name == AIMED else SteadyFilter
+        return kind(DESIGNS[name](), estimator, joints=joints)
     return TvistFilter(shaper(name), estimator, joints=joints)

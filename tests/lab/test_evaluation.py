@@ -231,7 +231,7 @@ class TestMoves:
         one = judge(job)
         assert one.counts
         assert one.reduction(one.shaped) > 80.0
-        assert 50.0 <= one.delay(one.shaped) <= 85.0
+        assert 28.0 <= one.delay(one.shaped) <= 38.0  # half a period at Q3, where the mode is at 15 Hz
         assert set(one.baselines) == {
             "equal_duration_double_s", "zv_frozen_at_end", "fixed_mzv", "fixed_ei2", "fixed_ei3"
         }  # fmt: skip

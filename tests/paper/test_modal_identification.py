@@ -95,7 +95,7 @@ def test_the_calibration_says_how_sure_it_is_and_what_it_came_from(done):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("wrong", [(2,), (1, 6)])
+@pytest.mark.parametrize("wrong", [(2,), pytest.param((1, 6), marks=pytest.mark.nightly)])
 def test_a_ring_down_with_another_payload_than_declared_is_named(done, wrong):
     found, info = done
     mislabelled = [
@@ -107,7 +107,7 @@ def test_a_ring_down_with_another_payload_than_declared_is_named(done, wrong):
     assert any(f"number {number + 1} " in str(error.value) for number in wrong)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_one_payload_alone_is_enough_for_that_payload():
     found, _ = measured(6, seed=3, payloads=())
     assert [payload.mass for payload in found.calibration.modal.payloads] == [5.0]

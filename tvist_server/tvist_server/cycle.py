@@ -164,6 +164,7 @@ class ControlCycle:
 
     def stream(self, stream_period: float, limits: Limits) -> SetpointStream:
         """Start to follow set-points; the arm must be at rest."""
+        self.tvist.aim(None)
         reach = np.array(self.description.limits.position)
         torque = TorqueRoom(self.description, self.inverse_dynamics)
         return self.start(

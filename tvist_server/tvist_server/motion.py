@@ -126,6 +126,7 @@ class MotionControl:
             share, meeting = found
             after = trajectory.time_at(share)
             raise RefusalError("collision", "q", f"{_met(meeting)} {after:.2f} s after the start", CLEARANCE)
+        self.cycle.tvist.aim(target)
         self.cycle.start(trajectory)
         self._started += 1
         self._motion, self._trajectory, self._velocity = self._started, trajectory, limits.velocity

@@ -383,6 +383,7 @@ def _row(
         "by_arm": {
             arm.name: _summary([pair for pair in pairs if pair[0].arm == number])
             for number, arm in enumerate(ARMS)
+            if any(pair[0].arm == number for pair in pairs)
         },
         "by_payload_error": {
             f"{100 * error:+.0f} %": _summary([pair for pair in pairs if pair[0].error == error])

@@ -48,6 +48,8 @@ CONTRADICTION = 0.2
 """Share of a ring-down that its own poles explain and the others' do not, from which on it contradicts them ... [-]"""
 SIGNIFICANT = 60.0
 """... where noise alone does not make that; see `OwnPoles.significance` [-]."""
+SUSPECTS = 3
+"""Ring-downs that are left out for a trial."""
 GUILTY = 3
 """More than one in so many, and it cannot be said which are wrong."""
 TOLD = 3
@@ -206,8 +208,8 @@ def calibrate(
     Raises:
         IdentificationError: The ring-downs contradict each other.
     """
+    _check_contradictions(arm, ringings, fit_modal(arm, ringings))
     fit = fit_from_many(arm, ringings)
-    _check_contradictions(arm, ringings, fit)
     unseen = _cross_validate(arm, ringings, fit)
     first = np.array(
         [np.ravel(describe(fit.drivetrain.poles(arm.mass(r.q, r.payload))[0][:1])) for r in ringings]
@@ -250,19 +252,24 @@ def calibrate(
 def _check_contradictions(arm: Arm, ringings: Sequence[Ringing], fit: ModalFit) -> None:
     """Find what no springs and drives can explain together.
 
-    A ring-down that is wrong spoils the fit of the others, too: the one that is explained worst is left out, until
-    the rest agrees.
+    A ring-down that is wrong spoils the fit of the others, too. So of those that are explained worst the one is left
+    out without which the rest fits best, until all that is left agrees.
     """
     rest = list(range(len(ringings)))
     guilty: list[int] = []
     while len(guilty) <= len(ringings) // GUILTY:
         explained = {number: _own(arm, ringings[number], fit) for number in rest}
-        worst = max(rest, key=lambda number: explained[number].share)
-        if explained[worst].share < CONTRADICTION or explained[worst].significance < SIGNIFICANT:
+        worst = sorted(rest, key=lambda number: -explained[number].share)[:SUSPECTS]
+        if all(own.share < CONTRADICTION or own.significance < SIGNIFICANT for own in explained.values()):
             break
-        guilty.append(worst)
-        rest.remove(worst)
-        fit = fit_modal(arm, [ringings[number] for number in rest], fit.logarithms)
+        without = {
+            number: fit_modal(arm, [ringings[other] for other in rest if other != number], fit.logarithms)
+            for number in worst
+        }
+        removed = min(worst, key=lambda number: without[number].cost)
+        guilty.append(removed)
+        rest.remove(removed)
+        fit = without[removed]
     else:
         raise IdentificationError(
             f"the {len(ringings)} ring-downs contradict each other: no springs and drives explain them together. Was "

@@ -29,7 +29,7 @@ MODES = 4
 STEP = 1e-4
 """Change of a logarithm for differences [-]."""
 EVALUATIONS = 60
-STARTS = 5
+STARTS = 4
 """Points that are searched from, the guess the first."""
 SPREAD = 0.35
 """Standard deviation of the others about it [-]."""

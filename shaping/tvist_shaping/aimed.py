@@ -1,0 +1,52 @@
+"""A filter that is told where a motion will end, and takes the weights of that place from the start."""
+
+import numpy as np
+import numpy.typing as npt
+
+from tvist_shaping.estimators.base import Estimator
+from tvist_shaping.steady import SMOOTH, Design, SteadyFilter
+
+
+class AimedFilter(SteadyFilter):
+    """For motions whose end is known: what rings after a motion is the arm at its end, wherever it came from.
+
+    Weights that do not change cannot exceed the limits of what they shape, need no averaging and do not lag behind
+    the arm. In motion, where the arm is still elsewhere, they fit less. Where no end is told, for a stream, it is a
+    `SteadyFilter`.
+    """
+
+    def __init__(self, design: Design, estimator: Estimator, *, joints: int, smooth: int = SMOOTH) -> None:
+        """As of `SteadyFilter`."""
+        self._aimed = False
+        super().__init__(design, estimator, joints=joints, smooth=smooth)
+        self.excess = 0.0
+
+    def with_estimator(self, estimator: Estimator) -> "AimedFilter":
+        """The same design for other modes, not aimed; see `Filter.with_estimator`."""
+        other = AimedFilter(self.design.copy(), estimator, joints=self.joints, smooth=self._smooth)
+        other.take_over(self)
+        return other
+
+    def aim(self, q: npt.ArrayLike | None) -> None:
+        """Take the weights of where a motion will end; the reference must be at rest.
+
+        Args:
+            q: Joint angles at the end [rad], shape (joints,); None: it is not known.
+        """
+        if q is None:
+            self._start()
+            return
+        self.f_d, self.zeta = self.estimator.estimate(np.asarray(q, dtype=float))
+        self.clipped = not self.design.start(self.f_d, self.zeta, self._designed)
+        self._taps[:] = self._designed
+        self._aimed = True
+
+    def _start(self) -> None:
+        self._aimed = False
+        super()._start()
+
+    def _weigh(self) -> None:
+        if self._aimed:
+            self._line.gather(self._taps, self._delays, self._q_star)
+        else:
+            super()._weigh()
