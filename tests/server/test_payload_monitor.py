@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_plant.description import load
 from tvist_server.collision import CollisionModel
 from tvist_server.cycle import ControlCycle
@@ -149,3 +150,17 @@ def test_a_new_declaration_starts_anew():
     watched.cycle.declare(disc(1.0))
     watched.monitor.declare(disc(1.0))
     assert watched.move(PAPER[3]) or watched.move(PAPER[0])
+
+
+@pytest.mark.parametrize(("declared", "told"), [(2.0, 1), (5.0, 0)])
+async def test_a_robot_warns_of_it_within_three_moves(declared, told):
+    warnings = []
+    setup = free_setup(calibration="ur5e_modal")
+    async with robot_in_process(setup) as robot, robot.control("test") as arm:
+        payload = paper_payload(ROBOT, declared)
+        await arm.reset(q=PAPER[0], payload=paper_payload(ROBOT, 5.0))
+        await arm.set_payload(payload.mass, payload.com, payload.inertia)
+        robot.on_event(lambda event: warnings.append(event) if event.kind == "warning" else None)
+        for q in PAPER[1:]:
+            await arm.move_j(q)
+    assert [event.code for event in warnings] == ["payload_mismatch"] * told

@@ -11,16 +11,18 @@ import numpy as np
 
 from tvist_plant.plant import PERIOD, PlantError
 from tvist_protocol import commands as c
+from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Accepted, Code, Done, Refused, Reply
 from tvist_protocol.stream import Event, EventKind, State, Truth
 from tvist_protocol.values import PROTOCOL_VERSION, Payload
 from tvist_server.calibrations import fits
 from tvist_server.choices import choose_filter, choose_source, make_estimator, wanted_modes
 from tvist_server.collision import CollisionModel
-from tvist_server.cycle import ControlCycle
+from tvist_server.cycle import ControlCycle, Sample
 from tvist_server.faults import Faults
 from tvist_server.mode_source import ModeSource, modal_source
 from tvist_server.motion import MotionControl
+from tvist_server.payload_monitor import PayloadMonitor
 from tvist_server.refusal import RefusalError, check_body, check_joints, check_motion
 from tvist_server.reporting import Reporter
 from tvist_server.session import NoControlError, Session
@@ -80,6 +82,7 @@ class Controller:
         collisions = CollisionModel(setup.description, body(setup.payload))
         self.motion = MotionControl(self.cycle, collisions, self._emit, setup.mode)
         self._faults = Faults(self.motion)
+        self._payload_monitor = PayloadMonitor(setup.description, body(setup.payload))
         self._warn_of_payload()
 
     @property
@@ -143,6 +146,8 @@ class Controller:
         except PlantError as error:
             self._faults.clear()
             sample = self.motion.recover(error, self._seed)
+            self._payload_monitor.reset()
+        self._watch_payload(sample)
         self.tick_number += 1
         events, self._events = self._events, []
         state = self._reporter.state(
@@ -180,6 +185,13 @@ class Controller:
             self._lose_lease("the lease ran out: no command renewed it")
         if self.setup.clock == "realtime":
             self.motion.watch(self.now)
+
+    def _watch_payload(self, sample: Sample) -> None:
+        """Say when the arm does not carry what was declared; where the brakes hold it, nobody can tell."""
+        if self.motion.activity.robot_mode is RobotMode.RUNNING:
+            why = self._payload_monitor.update(sample.target, sample.fed_forward, sample.measured.moment)
+            if why is not None:
+                self._emit("warning", code="payload_mismatch", why=why)
 
     def _lose_lease(self, why: str) -> None:
         self.session.release()
@@ -267,6 +279,7 @@ class Controller:
         """Power the arm and release its brakes."""
         self._authorize(command.token)
         self.motion.power_on()
+        self._payload_monitor.reset()
         return Done()
 
     def power_off(self, command: c.PowerOff) -> Reply:
@@ -311,6 +324,7 @@ class Controller:
             present = self.cycle.tvist
             self.cycle.use(present.with_estimator(self.source.estimator(present.estimator.modes, payload)))
         self.motion.collisions.carry(body(payload))
+        self._payload_monitor.declare(body(payload))
         self._warn_of_payload()
         return Done()
 
@@ -336,6 +350,7 @@ class Controller:
             self._seed = command.seed
         self.cycle.reset(q, carried=carried, seed=self._seed)
         self.motion.put(command.mode)
+        self._payload_monitor.reset()
         self._reporter.forget_modes()
         return Done(tick=self.tick_number)
 

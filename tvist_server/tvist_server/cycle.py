@@ -31,6 +31,8 @@ class Sample(Struct, frozen=True, eq=False, gc=False):
     """q* and its derivatives, of the tick before: central differences cost one."""
     torque: Floats
     """τ* of the rigid arm for that target, shape (n,) [N m]."""
+    fed_forward: Floats
+    """The same with rotors and friction, as the drives get it, shape (n,) [N m]."""
     measured: Measurement
     """What the arm did."""
 
@@ -94,9 +96,10 @@ class ControlCycle:
         self.inverse_dynamics.advance()
         torque = self.inverse_dynamics.torque(target.q, target.qd, target.qdd)  # τ* [N m]
         gravity = self.inverse_dynamics.gravity(target.q)
-        measured = self.arm.step(self._joint_controllers.command(target, torque, gravity))
+        command = self._joint_controllers.command(target, torque, gravity)
+        measured = self.arm.step(command)
         self._settle(reference, target)
-        return Sample(reference, target, torque, measured)
+        return Sample(reference, target, torque, command.torque, measured)
 
     def _shape(self, reference: Floats) -> Floats:
         """Shaped reference, on the way from one filter to another where there is one."""

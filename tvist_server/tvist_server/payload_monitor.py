@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.model import rigid_model
+from tvist_plant.model import FLANGE, rigid_model
 from tvist_plant.plant import PERIOD
 from tvist_server.control.differentiator import Floats, Target
 from tvist_server.control.inverse_dynamics import SLEW
@@ -42,7 +42,12 @@ class PayloadMonitor:
     """
 
     def __init__(self, description: RobotDescription, declared: Payload) -> None:
-        self._description = description
+        self._model = rigid_model(description, Payload())
+        for number in range(self._model.njoints):  # what is left weighs nothing but the kilogram
+            self._model.inertias[number] = pin.Inertia.Zero()
+        flange = self._model.frames[self._model.getFrameId(FLANGE)]
+        self._last, self._placement = flange.parentJoint, flange.placement
+        self._data = self._model.createData()
         self._friction = np.array(description.drives.coulomb_friction)
         # A joint without friction would count for everything.
         self._friction = np.maximum(self._friction, 0.01 * np.array(description.limits.torque))
@@ -53,12 +58,8 @@ class PayloadMonitor:
     def declare(self, payload: Payload) -> None:
         """Something else is declared: forget what was seen, and wait until it is in force."""
         self.payload = payload
-        carried = Payload(mass=1.0, com=payload.com)
-        self._model = rigid_model(self._description, carried)
-        bare = rigid_model(self._description, Payload())
-        for number in range(self._model.njoints):
-            self._model.inertias[number] = self._model.inertias[number] - bare.inertias[number]
-        self._data = self._model.createData()
+        kilogram = pin.Inertia(1.0, np.array(payload.com), np.zeros((3, 3)))
+        self._model.inertias[self._last] = self._placement.act(kilogram)
         self.reset()
         self._wait = SLEW
 

@@ -166,8 +166,8 @@ def _write(result: dict[str, Any], output: Path | None, figures: Path | None, ma
 def _print(result: dict[str, Any]) -> None:
     errors = len(result["payload_errors"])
     table(
-        f"{result['moves']} moves on {len(result['arms'])} arms with {errors} payload errors; * none better in both "
-        "still and residual",
+        f"{result['moves']} moves on {len(result['arms'])} arms with {errors} payload errors; "
+        "* keeps the limits, and none that does is better in both still and ring",
         (
             "shaper", "still ms", "p90", "ring m/s²", "less %", "p5", "delay ms", "moving", "q̈/limit", "q̇/limit",
             "bend mrad", "µs",
@@ -176,7 +176,7 @@ def _print(result: dict[str, Any]) -> None:
     )  # fmt: skip
     out.print(
         "still: last time |α| exceeds 0.1 m/s², from the unshaped reference's stop, median and p90; ring: envelope\n"
-        "within 3 to 60 Hz after the shaper's own stop; less: than waiting; moving: vibration in motion over waiting's;\n"
+        "within 3 to 60 Hz after the shaper's own stop; less: than waiting; moving: vibration in motion over its;\n"
         "peaks are the largest; bend: distance from a path round a corner; µs: of a tick with its estimates, here.",
         markup=False,
     )
