@@ -1,6 +1,8 @@
 # `make demo` and `make test` are the two commands; both set themselves up first.
 PYTHON ?= python3
 BIN := .venv/bin
+# Matrices here are small: threads for them only get in each other's way.
+export OPENBLAS_NUM_THREADS ?= 1
 READY := .venv/.ready
 
 .PHONY: setup demo test test-all lint bench format lock schemas clean

@@ -88,7 +88,10 @@ class TestFiles:
             ([{"start": HOME}], ["move 1", "target"]),
             ([{"start": HOME, "target": but(0, 1.0), "load": 1}], ["move 1", "load"]),
             ([{"start": HOME, "target": but(0, 1.0), "payload": -1}], ["move 1", "payload", "0"]),
-            ([{"start": HOME, "target": but(0, 1.0)}, {"start": HOME, "target": HOME}], ["move 2", "nowhere"]),
+            (
+                [{"start": HOME, "target": but(0, 1.0)}, {"start": HOME, "target": HOME}],
+                ["move 2", "nowhere"],
+            ),
             ([{"start": HOME, "target": HOME[:5]}], ["move 1", "target", "5 angles", "6 joints"]),
             ([{"start": HOME, "target": but(2, 9.0)}], ["move 1", "target", "joint 3", "elbow", "±6.28319"]),
             ([{"start": but(4, "x"), "target": HOME}], ["move 1", "start", "joint 5"]),
@@ -130,7 +133,9 @@ class TestDraws:
         assert 0.0 < drawn.share <= 1.0
 
     def test_wrists_turn_where_they_may(self, ur5e):
-        wrists = np.array([move.target[4:] for move in draw_moves(ur5e, 20, 7, (0.0, 0.0), wrists=True).moves])
+        wrists = np.array(
+            [move.target[4:] for move in draw_moves(ur5e, 20, 7, (0.0, 0.0), wrists=True).moves]
+        )
         assert np.abs(wrists).max() > 1.5
 
 
@@ -139,9 +144,7 @@ class TestLine:
         start, target = np.array(move.start), np.array(move.target)
         carried = body(paper_payload(ur5e, 5.0))
         recipe = Recipe("zv", paper)
-        cycle = ControlCycle(
-            ur5e, recipe.make(ur5e, 5.0), q=start, declared=carried, carried=carried, seed=3
-        )
+        cycle = ControlCycle(ur5e, recipe.make(ur5e, 5.0), q=start, declared=carried, carried=carried, seed=3)
         for _ in range(4):
             cycle.step()
         cycle.start(cycle.plan(target, PAPER))
@@ -201,7 +204,11 @@ class TestReport:
         peaks = [(1.0, 0.1), (2.0, 0.5), (0.5 * WORTH, 0.1 * WORTH)]
         judged = [self.judged(*pair) for pair in peaks]
         told = report([Job(ur5e, move, Recipe("zv", paper))] * 3, judged)
-        assert [row["reduction_percent"] for row in told["moves"]] == [pytest.approx(90.0), pytest.approx(75.0), None]
+        assert [row["reduction_percent"] for row in told["moves"]] == [
+            pytest.approx(90.0),
+            pytest.approx(75.0),
+            None,
+        ]
         assert told["left_out"] == [3]
         assert told["counted"] == 2
         assert told["reduction_percent"] == pytest.approx({"median": 82.5, "p5": 75.75, "min": 75.0})
@@ -217,8 +224,7 @@ class TestReport:
     def test_an_interval_covers_the_percentile_of_a_known_distribution(self):
         random = np.random.default_rng(5)
         hits = [
-            low <= 0.0 <= high
-            for low, high in (interval(random.standard_normal(200), 50) for _ in range(60))
+            low <= 0.0 <= high for low, high in (interval(random.standard_normal(200), 50) for _ in range(60))
         ]
         assert 0.85 <= np.mean(hits) <= 1.0
 

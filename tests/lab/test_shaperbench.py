@@ -118,17 +118,26 @@ class TestFromFile:
         assert 6.0 < info.f_d[0] < 8.0  # at Q1 with 5 kg
 
     def test_it_may_write_to_what_it_is_given(self, own, task):
-        shaped = own("def step(q_ref, info):\n    out = q_ref.copy()\n    q_ref[:] = 9.0\n    return out").shaped(task)
+        shaped = own(
+            "def step(q_ref, info):\n    out = q_ref.copy()\n    q_ref[:] = 9.0\n    return out"
+        ).shaped(task)
         np.testing.assert_array_equal(shaped.q[len(task.reference) - 1], task.reference[-1])
 
     @pytest.mark.parametrize(
         ("body", "words"),
         [
-            ("self.n += 1\n        if self.n == 8: raise KeyError('gain')\n        return q_ref", ["KeyError", "tick 7"]),
-            ("self.n += 1\n        return q_ref if self.n < 8 else q_ref * float('nan')", ["tick 7", "finite"]),
+            (
+                "self.n += 1\n        if self.n == 8: raise KeyError('gain')\n        return q_ref",
+                ["KeyError", "tick 7"],
+            ),
+            (
+                "self.n += 1\n        return q_ref if self.n < 8 else q_ref * float('nan')",
+                ["tick 7", "finite"],
+            ),
             ("return q_ref[:5]", ["tick 0", "(5,)", "(6,)"]),
             ("return None", ["tick 0", "(6,)"]),
             ("return 'left'", ["tick 0", "str"]),
+            ("return q_ref + 1e300", ["tick 0", "1e+300", "joint 1"]),
             ("return 0.999 * q_ref", ["does not end", "rad from the target"]),
             ("self.y = self.y + 0.001 * (q_ref - self.y)\n        return self.y", ["does not end"]),
         ],
@@ -150,7 +159,10 @@ class TestFromFile:
             ("x = (", "SyntaxError"),
             ("x = 1", "neither a class"),
             ("class A:\n    def step(self, q, info): ...\nclass B(A):\n    ...", "A, B"),
-            ("class A:\n    def __init__(self, x): ...\n    def step(self, q, info): ...", "without arguments"),
+            (
+                "class A:\n    def __init__(self, x): ...\n    def step(self, q, info): ...",
+                "without arguments",
+            ),
         ],
     )
     def test_a_file_without_a_shaper_is_named(self, own, text, words):
@@ -273,7 +285,9 @@ class TestArms:
     def test_a_base_that_hardly_yields_is_rigid(self, ur5e, q1_q3):
         stiff = q1_q3(VariantPlant(ur5e, ur5e.payload, Variant(base=Yields(stiffness=1e9))))
         plain = q1_q3(Plant(ur5e, ur5e.payload, substeps=8))
-        np.testing.assert_allclose(stiff, plain, rtol=0.0, atol=0.01)  # measured 2e-3; it falls with the stiffness
+        np.testing.assert_allclose(
+            stiff, plain, rtol=0.0, atol=0.01
+        )  # measured 2e-3; it falls with the stiffness
 
     def test_a_base_that_yields_lowers_every_frequency(self, ur5e):
         arms = (Plant(ur5e, ur5e.payload), VariantPlant(ur5e, ur5e.payload, Variant(base=Yields())))
@@ -287,7 +301,10 @@ class TestArms:
 
     def test_mujocos_arm_rings_as_the_plant_does(self, ur5e, q1_q3):
         """Two integrators of different order and no gear error in one: alike, not equal."""
-        peak = [np.abs(q1_q3(arm)[-300:]).max() for arm in (Plant(ur5e, ur5e.payload), MujocoArm(ur5e, ur5e.payload))]
+        peak = [
+            np.abs(q1_q3(arm)[-300:]).max()
+            for arm in (Plant(ur5e, ur5e.payload), MujocoArm(ur5e, ur5e.payload))
+        ]
         assert peak[1] == pytest.approx(peak[0], rel=0.5, abs=0.01)
 
     @pytest.mark.parametrize("arm", ARMS, ids=lambda arm: arm.name)
@@ -298,6 +315,14 @@ class TestArms:
         cycle = control_line(ur5e, start, ur5e.payload, ur5e.payload, made)
         alpha = best_tool_acceleration(simulate(cycle, start, at_rest, at_rest, 1))
         assert np.abs(alpha).max() < 1e-6
+
+    def test_every_seed_scatters_stiffness_and_gains_its_own_way(self, ur5e):
+        (scattered,) = (arm for arm in ARMS if arm.name == "scattered")
+        first, again, other = (scattered.make(ur5e, ur5e.payload, seed).description for seed in (1, 1, 2))
+        assert first == again != other
+        for name in ("gear_stiffness", "velocity_gain", "position_gain"):
+            ratio = np.divide(getattr(first.drives, name), getattr(ur5e.drives, name))
+            np.testing.assert_allclose(np.abs(ratio - 1.0), 0.15)
 
     def test_hysteresis_is_dahls(self):
         """Against the differential equation in many small steps; and it never exceeds its bound."""
@@ -339,7 +364,7 @@ class TestScores:
         assert shaped.delay == 0.0
 
     @pytest.mark.slow
-    def test_a_leaderboard_ranks_and_says_why_it_does_not(self, ur5e, calibration, own, task):
+    def test_a_leaderboard_ranks_and_says_why_it_does_not(self, ur5e, calibration, own):
         candidate = own("def step(q_ref, info):\n    return q_ref[:5]")
         standing = [*candidates(ur5e, calibration, None, ["zv", "double_s_as_zv"]), candidate]
         moves = draw(ur5e, 1, 0)
@@ -353,6 +378,15 @@ class TestScores:
         assert ranked["zv"]["residual_m_s2"]["median"] < ranked["none"]["residual_m_s2"]["median"]
         assert [row["place"] for row in board["shapers"][:3]] == [1, 2, 3]
         assert any(row["pareto"] for row in board["shapers"][:3])
+        about = {
+            "command": "",
+            "moves": 1,
+            "seed": 0,
+            "calibration": "",
+            "arms": {ARMS[0].name: ARMS[0].label},
+        }
+        written = page(about | board)
+        assert all(row["name"] in written for row in board["shapers"])
 
     def test_curved_paths_are_run_by_all_that_shape_references(self, ur5e, calibration):
         standing = candidates(ur5e, calibration, None, ["zv", "double_s_as_zv"])

@@ -24,7 +24,7 @@ def disc(mass):
 
 
 def random_poses(rng, count):
-    """Free ones, wrists free beside the region of the issue's random moves."""
+    """Free ones, all over the workspace and with the wrists free."""
     model, found = CollisionModel(ROBOT, disc(5.0)), []
     while len(found) < count:
         q = rng.uniform([-np.pi, -np.pi, -2.6, -np.pi, -3, -3], [np.pi, 0, 2.6, 0, 3, 3])

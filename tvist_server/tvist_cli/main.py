@@ -30,6 +30,8 @@ def main() -> None:
         # Nothing is served yet, so whoever ends it gets what was asked for. As the first process of a container
         # it has no default to end by.
         signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
+    # Matrices here are small: threads for them only get in each other's, and in the ticks', way.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from importlib.metadata import version
 
     try:

@@ -12,7 +12,7 @@ from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import Plant
 
 SCATTER = 0.15
-"""By which stiffness and gains may differ from the description's, either way [-]."""
+"""By which each stiffness and gain differs from the description's, up or down by chance [-]."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def _scattered(description: RobotDescription, carried: Payload, seed: int) -> Pl
     random = np.random.default_rng([seed, 15])
 
     def scattered(values: tuple[float, ...]) -> tuple[float, ...]:
-        return tuple((np.array(values) * random.uniform(1.0 - SCATTER, 1.0 + SCATTER, len(values))).tolist())
+        return tuple((np.array(values) * random.choice([1.0 - SCATTER, 1.0 + SCATTER], len(values))).tolist())
 
     drives, links = description.drives, description.link_flexibility
     names = ("gear_stiffness", "velocity_gain", "position_gain")
@@ -80,7 +80,11 @@ ARMS = (
         _hysteretic,
     ),
     Arm("piecewise", "gears 25 % softer below a tenth of the torque", _piecewise),
-    Arm("scattered", "stiffness and gains of every joint and link off by up to 15 %", _scattered),
+    Arm(
+        "scattered",
+        "stiffness and gains of every joint and link off by 15 %, up or down by chance",
+        _scattered,
+    ),
     Arm("base", "a base that yields, 150 kN m/rad about two axes", _on_base),
     Arm("mujoco", "built in MuJoCo alone, no gear error", _mujoco),
 )

@@ -34,6 +34,8 @@ TAIL = 1e-6
 """So far it may move in that time, or stay away from the target [rad]."""
 SLACK = 3
 """Ticks by which a shaper may end later than it declares: interpolation takes samples on both sides."""
+WARM = 20
+"""First ticks of a reference, whose time does not count: they may compile."""
 ENDED = 10
 """So many ticks at the target are an end."""
 MODES = 4
@@ -89,7 +91,7 @@ class Shaped:
     delay: float
     """From the reference's end to its own, but no more than it declared [s]."""
     cost: float | None
-    """Of a tick, as it happened to take [s]."""
+    """Processor time of a tick, as it happened to take [s]."""
 
 
 class Stepper(Protocol):
@@ -207,7 +209,13 @@ class FromFile(Candidate):
             f_d=np.zeros(MODES),
             zeta=np.zeros(MODES),
         )
-        return Foreign(load_shaper(Path(self.path))(), info, estimator, np.array(move.start))
+        try:
+            made = load_shaper(Path(self.path))()
+        except CandidateError:
+            raise
+        except Exception as error:
+            raise ShaperFaultError(f"raises {_named(error)} when it is made") from error
+        return Foreign(made, info, estimator, np.array(move.start), np.array(description.limits.position))
 
 
 @dataclass(frozen=True)
@@ -233,13 +241,14 @@ class Foreign:
         info: What it is told, but for the modes.
         estimator: Of these.
         start: Where the reference rests, shape (n,) [rad].
+        reach: How far each joint turns either way, shape (n,) [rad].
 
     Raises:
         ShaperFaultError: Its `reset` raises.
     """
 
-    def __init__(self, made: Any, info: Info, estimator: Estimator, start: Floats) -> None:
-        self._made, self._info, self._estimator = made, info, estimator
+    def __init__(self, made: Any, info: Info, estimator: Estimator, start: Floats, reach: Floats) -> None:
+        self._made, self._info, self._estimator, self._reach = made, info, estimator, reach
         self._q_star, self._tick = start.copy(), 0
         if hasattr(made, "reset"):
             try:
@@ -250,7 +259,10 @@ class Foreign:
     @property
     def delay(self) -> float | None:
         """What it declares."""
-        declared = getattr(self._made, "delay", None)
+        try:
+            declared = getattr(self._made, "delay", None)
+        except Exception as error:
+            raise ShaperFaultError(f"raises {_named(error)} when asked for its delay") from error
         return float(declared) if isinstance(declared, int | float | np.floating) else None
 
     def step(self, q: Floats) -> Floats:
@@ -276,6 +288,11 @@ class Foreign:
             raise ShaperFaultError(f"gives shape {q_star.shape} {where}, where {q.shape} is wanted")
         if not np.isfinite(q_star).all():
             raise ShaperFaultError(f"gives {q_star.tolist()} {where}: not every number is finite")
+        if (np.abs(q_star) > self._reach).any():
+            joint = int(np.argmax(np.abs(q_star) - self._reach))
+            raise ShaperFaultError(
+                f"gives {q_star[joint]:g} rad for joint {joint + 1} {where}: it turns ±{self._reach[joint]:.4g} rad"
+            )
         self._q_star, self._tick = q_star, self._tick + 1
         return q_star.copy()
 
@@ -287,11 +304,11 @@ def run(stepper: Stepper, reference: Floats) -> Shaped:
         ShaperFaultError: It does not end at the target, or goes on after its end or its declared delay.
     """
     target, stop = reference[-1], len(reference) - 1
-    q, times = [], [time.perf_counter()]
-    for sample in reference:
-        q.append(stepper.step(sample))
-        times.append(time.perf_counter())
-    cost = float(np.median(np.diff(times)))  # the first ones may compile
+    warm = min(WARM, stop)
+    q = [stepper.step(sample) for sample in reference[:warm]]
+    began = time.thread_time()
+    q += [stepper.step(sample) for sample in reference[warm:]]
+    cost = (time.thread_time() - began) / (len(reference) - warm)
     declared = [stepper.delay]
     quiet = 0
     while quiet < ENDED:

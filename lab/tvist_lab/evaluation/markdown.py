@@ -15,14 +15,22 @@ def page(result: dict[str, Any]) -> str:
     arms = list(result["arms"])
     return f"""# ShaperBench
 
-Made by `{result["command"]} --output leaderboard.json --markdown shaperbench.md`; the numbers with all their
-digits are in [leaderboard.json](leaderboard.json). {result["moves"]} random moves, seed {
+Made by
+
+```sh
+{
+        result["command"]
+    } --output docs/reference/leaderboard.json --markdown docs/reference/shaperbench.md --figures docs/images
+```
+
+which writes the numbers with all their digits into [leaderboard.json](leaderboard.json). {
+        result["moves"]
+    } random moves,
+seed {
         result["seed"]
-    }, with payloads
-of 0 to 5 kg, of which the controller knows 100, 110 and 90 %; eight arms; calibration `{
-        result["calibration"]
-    }`, which is
-of the first of them. How to put a shaper of yours on it: [Evaluate a shaper](../how-to/evaluate-a-shaper.md).
+    }, with payloads of 0 to 5 kg, of which the controller knows 100, 110 and 90 %; eight arms; calibration
+`{result["calibration"]}`, which is of the first of them. How to put a shaper of yours on it:
+[Evaluate a shaper](../how-to/evaluate-a-shaper.md).
 
 {
         _table(
@@ -34,17 +42,21 @@ of the first of them. How to put a shaper of yours on it: [Evaluate a shaper](..
         )
     }
 
-Bold: no other is better in both *still* and *ring*. All are medians over moves, arms and payload errors, but the
-peaks and *bend*, which are the largest.
+Bold: it keeps the limits, and no other that does is better in both *still* and *ring*. All are medians over moves,
+arms and payload errors, but the peaks and *bend*, which are the largest. `zv_frozen_at_end` and the double S have to
+know the target in advance: they are nothing for a stream.
 
-- *still*: last time |α|, the true acceleration of the tool, exceeds 0.1 m/s², from the stop of the **unshaped** reference;
+![Time until still against what rings](../images/pareto.png)
+
+- *still*: last time |α|, the true acceleration of the tool, exceeds 0.1 m/s², from the stop of the **unshaped**
+  reference;
 - *ring*: envelope of α within 3 to 60 Hz after the shaped reference's own stop; *less*: than waiting leaves, where
   that is at least 0.2 m/s²;
 - *in motion*: rms of α against the rigid arm, over that of waiting;
 - *q̈/limit*, *q̇/limit*: of the shaped reference over the limits that the reference uses to the full. A robot asks a
   little less of the reference where that is above 1 (`move_j` with `auto` and `short`), the bench does not;
 - *bend*: largest distance in joint space of a path round a corner from where it was asked to go;
-- *µs*: of a tick with its estimates, in Python where the shaper is Python, on the machine that made this page.
+- *µs*: processor time of a tick with its estimates, on the machine that made this page, which had other work, too.
 
 | name | what it is |
 |---|---|

@@ -258,9 +258,9 @@ class Bend:
 def bends(
     description: RobotDescription, candidates: Sequence[Candidate], moves: Sequence[Move]
 ) -> list[Bend]:
-    """Every candidate that shapes references, on each of a few paths round a corner."""
+    """Every candidate that shapes references, on each of a few moves that go on to where the next one starts."""
     paths = [
-        (first, replace(second, start=first.target, mass=first.mass))
+        (first, replace(second, start=first.target, target=second.start, mass=first.mass))
         for first, second in zip(moves[:CORNERS], [*moves[1:], moves[0]], strict=False)
     ]
     return [
@@ -346,7 +346,9 @@ def leaderboard(
     ranked = sorted((row for row in rows if row["ranked"]), key=_place)
     for place, row in enumerate(ranked, 1):
         row["place"] = place
-        row["pareto"] = not any(_beats(other, row) for other in ranked)
+        row["pareto"] = row["keeps_limits"] and not any(
+            _beats(other, row) for other in ranked if other["keeps_limits"]
+        )
     return {"shapers": [*ranked, *(row for row in rows if not row["ranked"])]}
 
 

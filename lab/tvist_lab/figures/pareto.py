@@ -16,12 +16,14 @@ def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
     """
     figure, (panel,) = panels(1, 4.6)
     ranked = [row for row in rows if row["ranked"]]
-    for row in ranked:
+    for place, row in enumerate(sorted(ranked, key=lambda row: row["residual_m_s2"]["median"])):
         x, y = row["time_until_still_ms"]["median"], row["residual_m_s2"]["median"]
-        panel.semilogy(
-            x, y, "o" if row["keeps_limits"] else "^", color=SHAPED if row["pareto"] else FAINT, markersize=5
+        marker, color = "o" if row["keeps_limits"] else "^", SHAPED if row["pareto"] else FAINT
+        panel.semilogy(x, y, marker, color=color, markersize=5)
+        where: dict[str, Any] = (
+            {"xytext": (6, 1), "ha": "left"} if place % 2 else {"xytext": (-6, -1), "ha": "right"}
         )
-        note(panel, row["name"], (x, y), xytext=(5, 2), textcoords="offset points")
+        note(panel, row["name"], (x, y), textcoords="offset points", va="center", **where)
     front = sorted(
         (row["time_until_still_ms"]["median"], row["residual_m_s2"]["median"])
         for row in ranked
@@ -29,6 +31,6 @@ def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
     )
     panel.semilogy(*zip(*front, strict=True), color=THIRD, linewidth=1.0, zorder=0)
     panel.set(xlabel="Still after the unshaped reference's stop (ms)", ylabel="Residual, 3 to 60 Hz (m/s²)")
-    panel.margins(x=0.15)
+    panel.margins(x=0.3)
     title(panel, "Settling against residual; ▲ exceeds a limit of the motion")
     return figure

@@ -1,5 +1,6 @@
 """From a few ring-downs with one or two payloads to modes at any configuration with any payload."""
 
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
@@ -7,6 +8,7 @@ from importlib.metadata import version
 import numpy as np
 
 from tvist_client.arm import Arm as Control
+from tvist_client.errors import ClientError
 from tvist_client.robot import Robot
 from tvist_lab.collect import collect
 from tvist_lab.identification.design import choose
@@ -133,6 +135,27 @@ async def identify_modal(
     await control.set_shaper("none")
     arm = Arm(description, payloads)
     candidates = free_configurations(description, payloads, CANDIDATES, plan)
+    try:
+        ringings, rejected = await _measure(robot, control, arm, candidates, plan, progress)
+        calibration = calibrate(arm, ringings, info, plan, rejected, name=name, command=command)
+        errors = await _against_truth(robot, control, calibration, description, plan, info)
+    finally:
+        if plan.payloads:
+            with contextlib.suppress(ClientError, RefusedError):
+                await _carry(control, info.payload)
+    return ModalIdentification(calibration, tuple(ringings), errors)
+
+
+async def _measure(
+    robot: Robot,
+    control: Control,
+    arm: Arm,
+    candidates: Sequence[Floats],
+    plan: ModalPlan,
+    progress: Progress,
+) -> tuple[list[Ringing], int]:
+    """The ring-downs that say most, and how many more were tried."""
+    payloads = arm.payloads
     counts = [len(range(number, plan.ring_downs, len(payloads))) for number in range(len(payloads))]
     order = choose(arm, candidates, plan.jog, [SPARE * count for count in counts])
     ringings: list[Ringing] = []
@@ -156,11 +179,7 @@ async def identify_modal(
             f"only {len(ringings)} of {plan.ring_downs} ring-downs could be used, {rejected} configurations were "
             "out of reach or too quiet: does the arm move, and is its accelerometer read?"
         )
-    calibration = calibrate(arm, ringings, info, plan, rejected, name=name, command=command)
-    errors = await _against_truth(robot, control, calibration, description, plan)
-    if plan.payloads:
-        await _carry(control, info.payload)
-    return ModalIdentification(calibration, tuple(ringings), errors)
+    return ringings, rejected
 
 
 def check(plan: ModalPlan, payloads: int) -> None:
@@ -346,9 +365,22 @@ async def _ringing(robot: Robot, control: Control, q: Floats, payload: int, jog:
 
 
 async def _against_truth(
-    robot: Robot, control: Control, calibration: Calibration, description: RobotDescription, plan: ModalPlan
+    robot: Robot,
+    control: Control,
+    calibration: Calibration,
+    description: RobotDescription,
+    plan: ModalPlan,
+    info: Info,
 ) -> tuple[ModeErrors, ...] | None:
-    """Errors where nothing was measured, at random with random payloads; None where the robot tells no truth."""
+    """Errors where nothing was measured, at random; None where the robot tells no truth.
+
+    With random payloads, too, where the arm was made to carry some; else with what is declared.
+    """
+    with collect(robot) as collected:
+        start = (await robot.state()).target_q
+        await robot.advance(2)
+    if not collected.truths:
+        return None
     rng = np.random.default_rng(plan.seed + 1)
     places = free_configurations(
         description,
@@ -358,17 +390,18 @@ async def _against_truth(
     )
     pairs = []
     for q in places:
-        payload = paper_payload(description, float(rng.uniform(0.0, description.limits.payload)))
+        payload = info.payload
+        if plan.payloads:
+            payload = paper_payload(description, float(rng.uniform(0.0, description.limits.payload)))
         with collect(robot) as collected:
-            await control.reset(q=q, payload=payload)
+            await control.reset(q=q, payload=payload if plan.payloads else None)
             await robot.advance(1)
-        if not collected.truths:
-            return None
         truth = collected.truths[-1]
         try:
             f_d, zeta = modal_estimator(calibration, description, payload, TOLD).estimate(q)
         except EstimatorError:
             continue
         pairs.append((f_d, truth.f_d[:TOLD], zeta, truth.zeta[:TOLD]))
+    await control.reset(q=start)
     f_d, true_f_d, zeta, true_zeta = np.array(pairs).transpose(1, 2, 0)
     return tuple(ModeErrors(spread(f_d[k], true_f_d[k]), spread(zeta[k], true_zeta[k])) for k in range(TOLD))

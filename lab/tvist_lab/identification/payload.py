@@ -53,6 +53,8 @@ STEEL = 7850.0
 """Density that a payload's size is guessed from [kg/m^3]."""
 DISAGREEMENT = (0.3, 4.0)
 """Masses at rest and in motion differ by more than this [kg], and this many standard deviations: one is wrong."""
+CERTAIN = 4.0
+"""Standard deviations within which a mass may be another [-]."""
 LIGHT = 0.1
 """Below that mass nothing is said of its centre [kg]."""
 
@@ -140,6 +142,10 @@ async def identify_payload(
             f"at rest the arm seems to carry {mass:.2f} kg, in motion {in_motion:.2f} kg: it touches something, or the "
             "torques are not those of its motors"
         )
+    # What cannot be told from the rated payload is no more than that: more is never accepted.
+    rated = info.limits.payload
+    if rated < mass < rated + CERTAIN * float(deviations[0]):
+        mass = rated
     com = found[1:] / mass if mass >= LIGHT else np.zeros(3)
     spread = np.hypot(deviations[1:], com * deviations[0]) / mass if mass >= LIGHT else np.full(3, np.inf)
     return PayloadFound(

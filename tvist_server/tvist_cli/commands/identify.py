@@ -78,6 +78,8 @@ def identify(
     """
     if min(configurations, repeats, ring_downs, poses) < 1:
         raise Failure("configurations, repeats, ring-downs and poses must be at least 1", code=2)
+    if not output.absolute().parent.is_dir():  # said before half an hour of jogs
+        raise Failure(f"output is {output}: there is no such folder", code=2)
     endpoint, mass = _endpoint_and_mass(endpoint, payload)
     from tvist_plant.description import DescriptionError, load
 

@@ -1,0 +1,143 @@
+"""`tvist evaluate` and `tvist shaperbench` from a shell: seconds, one JSON object, one sentence when it goes wrong."""
+
+import json
+from pathlib import Path
+
+import pytest
+from tests.system.test_command_line import tvist
+
+from tvist_cli.commands.evaluate import evaluate
+from tvist_cli.commands.shaperbench import shaperbench
+from tvist_cli.failure import Failure
+
+MOVES = [
+    {"start": [0.0, -2.2, 1.9, -1.3, 0.0, 0.0], "target": [1.2, -1.4, 1.5, -1.6, 0.0, 0.0]},
+    {"start": [1.2, -1.4, 1.5, -1.6, 0.0, 0.0], "target": [0.0, -2.2, 1.9, -1.3, 0.0, 0.0], "payload": 1.5},
+]
+PEEKS = """
+past = []
+
+
+class Memory:
+    def reset(self, q):
+        past.append([])
+
+    def step(self, q_ref, info):
+        past[-1].append(q_ref.copy())
+        return past[0][min(len(past[-1]) + 5, len(past[0]) - 1)]
+"""
+
+
+def assert_misuse(command, arguments, words):
+    """The command refuses, in this process, with these words."""
+    with pytest.raises(Failure) as failure:
+        command(**arguments)
+    assert failure.value.code == 2
+    assert all(word in str(failure.value) for word in words), failure.value
+
+
+@pytest.fixture
+def moves(tmp_path):
+    path = tmp_path / "moves.json"
+    path.write_text(json.dumps(MOVES), encoding="utf-8")
+    return path
+
+
+class TestEvaluate:
+    def test_moves_of_a_file_have_the_keys_that_are_promised(self, moves):
+        told = (
+            tvist("evaluate", "--moves", moves, "--payload", 5, "--shaper", "zv", "--json").assert_done().json
+        )
+        assert len(told["moves"]) == 2
+        for move in told["moves"]:
+            assert {
+                "unshaped_peak_m_s2", "shaped_peak_m_s2", "reduction_percent", "delay_ms", "still_after_ms",
+                "peak_acceleration_ratio", "peak_velocity_ratio",
+            } <= set(move)  # fmt: skip
+            assert set(move["still_after_ms"]) == {"unshaped", "shaped"}
+            assert 0.0 <= move["shaped_peak_m_s2"] < move["unshaped_peak_m_s2"]
+        assert [move["payload_kg"] for move in told["moves"]] == [5.0, 1.5]
+        assert set(told["reduction_percent"]) == {"median", "p5", "min"}
+        assert set(told["delay_ms"]) == {"median", "max"}
+        assert set(told["peak_acceleration_ratio"]) == {"median", "p90", "max"}
+
+    @pytest.mark.slow
+    def test_random_moves_can_be_kept_and_made_again(self, tmp_path):
+        saved = tmp_path / "drawn.json"
+        first = tvist(
+            "evaluate", "--random", 2, "--seed", 5, "--payload", "uniform", "--clean", "--shaper", "auto",
+            "--save-moves", saved, "--figures", tmp_path / "figures", "--json",
+        ).assert_done().json  # fmt: skip
+        again = (
+            tvist("evaluate", "--moves", saved, "--clean", "--shaper", "auto", "--json").assert_done().json
+        )
+        assert first["moves"] == again["moves"]
+        assert 0.0 < first["free_of_collision"] <= 1.0
+        assert {path.name for path in (tmp_path / "figures").iterdir()} == {"moves.png", "one_move.png"}
+
+    @pytest.mark.slow
+    def test_words_are_for_people(self, moves):
+        said = tvist("evaluate", "--moves", moves, "--payload", 5).assert_done()
+        assert "unshaped m/s²" in said.out
+        assert "carry something else" in said.err
+
+    @pytest.mark.parametrize(
+        ("arguments", "words"),
+        [
+            ({}, ("--moves", "--random")),
+            ({"random": 0}, ("random is 0",)),
+            ({"random": 1, "payload": "heavy"}, ("payload", "heavy")),
+            ({"random": 1, "payload": "nan"}, ("payload", "nan")),
+            ({"random": 1, "seed": -1}, ("seed is -1",)),
+            ({"random": 1, "shaper": "zz"}, ("zz", "zv")),
+            ({"random": 1, "calibration": "none.json"}, ("none.json",)),
+            ({"random": 1, "shaper": "auto", "calibration": "ur5e_5kg"}, ("auto", "modes")),
+            ({"random": 1, "frequency_error": -100}, ("frequency-error",)),
+            ({"moves": Path("none.json")}, ("none.json",)),
+        ],
+    )
+    def test_misuse_is_said(self, arguments, words):
+        assert_misuse(evaluate, arguments, words)
+
+    def test_a_move_beyond_a_limit_is_named(self, tmp_path):
+        path = tmp_path / "moves.json"
+        path.write_text(json.dumps([MOVES[0], {**MOVES[0], "target": [0, 0, 7, 0, 0, 0]}]), encoding="utf-8")
+        tvist("evaluate", "--moves", path).assert_failed(2, "move 2", "joint 3", "elbow", "6.28319")
+
+
+class TestShaperBench:
+    @pytest.mark.slow
+    def test_a_cheat_is_named_and_not_ranked(self, tmp_path):
+        path, board = tmp_path / "peeks.py", tmp_path / "board.json"
+        path.write_text(PEEKS, encoding="utf-8")
+        ended = tvist(
+            "shaperbench",
+            "--quick",
+            "--moves",
+            1,
+            "--against",
+            "zv",
+            "--shaper",
+            path,
+            "--output",
+            board,
+            "--json",
+        ).assert_failed(1, "not ranked", "peeks at the future")
+        rows = {row["name"]: row for row in ended.json["shapers"]}
+        assert [rows[name]["ranked"] for name in ("none", "zv", "file")] == [True, True, False]
+        assert "peeks at the future" in rows["file"]["fault"]
+        assert json.loads(board.read_text(encoding="utf-8")) == ended.json
+        assert set(rows["zv"]["by_arm"]) == set(ended.json["arms"])
+        assert len(ended.json["arms"]) == 8
+
+    @pytest.mark.parametrize(
+        ("arguments", "words"),
+        [
+            ({"shaper": Path("none.py")}, ("none.py",)),
+            ({"against": ["zz"]}, ("zz", "auto")),
+            ({"moves": 0}, ("moves is 0",)),
+            ({"calibration": "ur5e_5kg"}, ("ur5e_5kg", "modal")),
+        ],
+    )
+    def test_misuse_is_said(self, arguments, words):
+        assert_misuse(shaperbench, arguments, words)

@@ -1,0 +1,88 @@
+"""`tvist identify --model modal` and `--payload`: in process, over a network, and where it cannot be done."""
+
+import json
+
+import pytest
+from tests.system.test_command_line import tvist
+
+from tvist_protocol.calibration import calibration_from_json
+
+KEYS = {"configurations", "ring_downs", "error_f_d_percent", "error_zeta_percent"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("--model", "springs"), "springs"),
+        (("--model", "modal", "--ring-downs", "0"), "ring-downs"),
+        (("--model", "modal", "--payloads", "heavy"), "payloads"),
+        (("--model", "modal", "--payloads", "2,2"), "payloads"),
+        (("--payload", "heavy"), "payload"),
+        (("--description", "nope"), "nope"),
+        (("--output", "nowhere/mine.json"), "output"),
+    ],
+)
+def test_misuse_is_exit_code_2_and_a_sentence_that_names_it(arguments, named):
+    assert tvist("identify", *arguments).assert_failed(2, named).out == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("--model", "modal", "--ring-downs", "3"), "at least 4"),
+        (("--payload", "--poses", "2"), "at least 3"),
+    ],
+)
+def test_too_few_measurements_are_a_sentence_and_no_file(arguments, named, tmp_path):
+    ended = tvist("identify", *arguments, "--output", tmp_path / "never.json", "--json")
+    assert ended.assert_failed(1, named).out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_a_few_ring_downs_make_a_calibration(tmp_path):
+    path = tmp_path / "mine.json"
+    options = ("--model", "modal", "--ring-downs", 5, "--output", path, "--json")
+    said = tvist("identify", *options, timeout=110).assert_done().json
+    assert said.keys() >= KEYS
+    assert said["ring_downs"] == 5
+    assert said["payloads_kg"] == [0.0, 5.0]
+    assert said["error_f_d_percent"] < 6.0
+    calibration = calibration_from_json(path.read_bytes())
+    assert calibration.name == "mine"
+    assert calibration.provenance.command == (
+        "tvist identify --model modal --ring-downs 5 --seed 0 --payloads 0,5"
+    )
+
+
+@pytest.mark.nightly
+def test_people_get_tables_of_springs_and_of_errors(tmp_path):
+    ended = tvist(
+        "identify", "--model", "modal", "--ring-downs", 4, "--payloads", "5", cwd=tmp_path, timeout=110
+    ).assert_done()
+    for words in ("gear stiffness", "assumed", "95 %", "true modes", "calibration.json"):
+        assert words in ended.out
+
+
+@pytest.mark.nightly
+def test_it_finds_the_same_over_the_network_as_in_process(lockstep, tmp_path):
+    options = ("--model", "modal", "--ring-downs", 4, "--payloads", "0,5", "--json")
+    found = []
+    for name, endpoint in (("network", (lockstep.endpoint,)), ("process", ())):
+        path = tmp_path / f"{name}.json"
+        tvist("identify", *endpoint, *options, "--output", path, timeout=110).assert_done()
+        found.append(json.loads(path.read_text(encoding="utf-8"))["modal"]["parameters"])
+    for there, here in zip(*found, strict=True):
+        assert there["value"] == pytest.approx(here["value"], rel=0.02)
+
+
+@pytest.mark.slow
+def test_the_payload_of_a_served_robot_is_found_and_declared(lockstep):
+    options = ("--payload", "--poses", 3, "--json")
+    said = tvist("identify", lockstep.endpoint, *options, "--declare", timeout=110).assert_done().json
+    assert said["mass_kg"] == pytest.approx(5.0, abs=0.05)
+    assert said["com_m"] == pytest.approx([0.0, 0.0, 0.0405], abs=0.003)
+    assert said["declared"] is True
+    again = tvist("identify", *options[:1], lockstep.endpoint, *options[1:], timeout=110).assert_done().json
+    assert again["declared_kg"] == pytest.approx(said["mass_kg"])
+    assert again["set_payload"]["mass"] == again["mass_kg"]
