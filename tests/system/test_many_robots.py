@@ -127,7 +127,9 @@ def test_each_is_recorded_into_a_file_of_its_own_that_replays_equal(tmp_path):
             wire.until(wire.state()["tick"] + 300)
         code, took = served.end()
         assert code == 0
-        assert took < 5.0  # how fast is for the bench and the 200 ends: here robots with recorders end in order
+        assert (
+            took < 5.0
+        )  # how fast is for the bench and the 200 ends: here robots with recorders end in order
     assert not path.exists()
     first, second = (read(tmp_path / f"out-ur5e-{number}.mcap") for number in (1, 2))
     assert [recorded.robot for recorded in (first, second)] == ["ur5e-1", "ur5e-2"]

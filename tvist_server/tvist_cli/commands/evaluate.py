@@ -226,7 +226,9 @@ def _notes(
 
     notes = []
     if share is not None:
-        notes.append(f"{100.0 * share:.0f} % of the moves drawn were free of collision; these are among them")
+        notes.append(
+            f"{100.0 * share:.0f} % of the draws were free of collision from start to target; the others were replaced"
+        )
     if result["left_out"]:
         notes.append(
             f"{len(result['left_out'])} of {len(chosen)} moves have an unshaped peak below {WORTH:g} m/s²: they are "
