@@ -81,9 +81,9 @@ def test_a_disk_that_does_not_answer_for_a_second_costs_nothing(system, tmp_path
 @pytest.mark.slow
 def test_a_disk_that_does_not_answer_for_longer_loses_what_is_counted_and_nothing_else(system, tmp_path):
     path = tmp_path / "run.mcap"
-    # Four times as fast, with the truth: the recorder's queue is full after about two seconds.
+    # Twice as fast, with the truth: the recorder's queue is full after about four seconds.
     with (
-        Served("--record", str(path), "--truth", "--speed", "4") as served,
+        Served("--record", str(path), "--truth", "--speed", "2") as served,
         Bystander(served.endpoint) as bystander,
     ):
         system.stop_disk()
