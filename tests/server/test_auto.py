@@ -125,3 +125,20 @@ def test_a_payload_that_no_calibration_saw():
     robot.send(c.MoveJ, q=tuple(Q3))
     robot.until_rest()
     assert ringing(robot) < 0.1
+
+
+def test_a_filter_that_cannot_do_what_it_should_says_so_once():
+    """Hardly damped modes would need a longer filter than this one gets."""
+    robot = Robot()
+    slow = {"f_d": (2.0, 3.0, 4.0, 5.0), "zeta": (0.01, 0.01, 0.01, 0.01)}
+    assert robot.send(c.SetEstimator, name="fixed", **slow) == Done()
+    assert robot.send(c.SetShaper, name="auto") == Done()
+    robot.tick(50)
+    said = [event for event in robot.events if event.code == "out_of_range"]
+    assert len(said) == 1
+    assert "auto" in said[0].why
+    assert robot.send(c.SetShaper, name="none") == Done()
+    robot.tick(5)
+    assert robot.send(c.SetShaper, name="auto") == Done()
+    robot.tick(5)
+    assert len([event for event in robot.events if event.code == "out_of_range"]) == 2

@@ -78,6 +78,7 @@ class Controller:
             self._choose("auto", self._modal)[1].filter(np.zeros(setup.description.joints))
         self._reporter = Reporter(setup.description)
         self._events: list[Event] = []
+        self._clipped = False
         self._seed = setup.seed
         collisions = CollisionModel(setup.description, body(setup.payload))
         self.motion = MotionControl(self.cycle, collisions, self._emit, setup.mode)
@@ -148,6 +149,7 @@ class Controller:
             sample = self.motion.recover(error, self._seed)
             self._payload_monitor.reset()
         self._watch_payload(sample)
+        self._watch_filter()
         self.tick_number += 1
         events, self._events = self._events, []
         state = self._reporter.state(
@@ -192,6 +194,15 @@ class Controller:
             why = self._payload_monitor.update(sample.target, sample.fed_forward, sample.measured.moment)
             if why is not None:
                 self._emit("warning", code="payload_mismatch", why=why)
+
+    def _watch_filter(self) -> None:
+        """Say when the filter cannot do what it should, once until it can again."""
+        clipped = self.cycle.tvist.clipped
+        if clipped and not self._clipped:
+            name = self.cycle.tvist.name
+            why = f"{name} cannot do here what it should: a delay is beyond what it holds, or more is left"
+            self._emit("warning", code="out_of_range", why=why)
+        self._clipped = clipped
 
     def _lose_lease(self, why: str) -> None:
         self.session.release()

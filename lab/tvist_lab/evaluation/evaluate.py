@@ -130,6 +130,7 @@ def _record(job: Job) -> tuple[Recording, Recording, dict[str, Recording]]:
 
     tvist = recipe.make(description, move.mass)
     tvist.reset(start)
+    tvist.aim(target)  # as the robot does before a move
     shaped = follow(shape(tvist.filter, point_to_point(start, target, spared(PAPER, tvist)))[0])
     ticks = round(motions(shaped)[0].shaped_duration(shaped) / PERIOD)
     others = {
