@@ -21,12 +21,6 @@ class AimedFilter(SteadyFilter):
         super().__init__(design, estimator, joints=joints, smooth=smooth)
         self.excess = 0.0
 
-    def with_estimator(self, estimator: Estimator) -> "AimedFilter":
-        """The same design for other modes, not aimed; see `Filter.with_estimator`."""
-        other = AimedFilter(self.design.copy(), estimator, joints=self.joints, smooth=self._smooth)
-        other.take_over(self)
-        return other
-
     def aim(self, q: npt.ArrayLike | None) -> None:
         """Take the weights of where a motion will end; the reference must be at rest.
 

@@ -11,6 +11,7 @@ kinks; the mean of tap vectors of one sum and one mean delay has these, too.
 
 import math
 from abc import ABC, abstractmethod
+from typing import Self
 
 import numpy as np
 
@@ -237,9 +238,9 @@ class SteadyFilter(Filter):
         """Of the taps of the last tick [s]."""
         return float(self._taps @ self._delays) * self.period
 
-    def with_estimator(self, estimator: Estimator) -> "SteadyFilter":
+    def with_estimator(self, estimator: Estimator) -> Self:
         """The same design for other modes; see `Filter.with_estimator`."""
-        other = SteadyFilter(self.design.copy(), estimator, joints=self.joints, smooth=self._smooth)
+        other = type(self)(self.design.copy(), estimator, joints=self.joints, smooth=self._smooth)
         other.take_over(self)
         return other
 

@@ -337,3 +337,12 @@ def test_a_stream_that_may_be_faster_is_stopped_and_not_started():
     reply = robot.send(c.ServoStart)
     assert (reply.code, reply.where, reply.limit) == ("limit_velocity", "velocity", pytest.approx(FASTEST))
     assert robot.send(c.ServoStart, velocity=0.5) == Done()
+
+
+def test_a_reset_ends_a_reduction_that_was_to_last_no_longer_than_some_time():
+    robot = Robot()
+    robot.send(c.SimulationInject, fault="reduced", seconds=1.0)
+    robot.tick()
+    robot.send(c.SimulationReset, q=Q2_)
+    robot.tick(600)
+    assert robot.states[-1].safety_mode == SafetyMode.NORMAL

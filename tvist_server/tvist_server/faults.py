@@ -58,8 +58,9 @@ class Faults:
             heapq.heappop(self._ends)[-1]()
 
     def clear(self) -> None:
-        """Let go of the arm."""
-        self._ends.clear()
+        """End all that last now, and let go of the arm."""
+        while self._ends:
+            heapq.heappop(self._ends)[-1]()
         self._push[:] = 0.0
         self._motion.cycle.arm.push(self._push)
 

@@ -23,6 +23,7 @@ from tvist_protocol.values import Payload
 from tvist_server.cycle import STILL
 from tvist_server.setup import paper_payload
 from tvist_server.trajectory import Limits
+from tvist_shaping.base import Filter
 from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.fixed import Fixed
@@ -138,9 +139,7 @@ class Named(Candidate):
 
     def stepper(self, task: Task) -> "Filtering":
         """The filter, reset."""
-        tvist = self.recipe.make(task.description, task.move.mass)
-        tvist.reset(task.move.start)
-        return Filtering(tvist.filter, lambda: tvist.delay)
+        return _from_rest(self.recipe.make(task.description, task.move.mass), task)
 
 
 @dataclass(frozen=True)
@@ -161,9 +160,14 @@ class Shaping(Candidate):
             estimator = self.recipe.estimator(task.description, task.move.mass, 1)
             there = estimator.estimate(np.array(task.move.target))
             f_d, zeta = float(there[0][0]), float(there[1][0])
-        tvist = TvistFilter(shaper(baseline.shaper), Fixed([f_d], [zeta]), joints=task.description.joints)
-        tvist.reset(task.move.start)
-        return Filtering(tvist.filter, lambda: tvist.delay)
+        joints = task.description.joints
+        return _from_rest(TvistFilter(shaper(baseline.shaper), Fixed([f_d], [zeta]), joints=joints), task)
+
+
+def _from_rest(tvist: Filter, task: Task) -> "Filtering":
+    """A filter at rest where a move starts."""
+    tvist.reset(task.move.start)
+    return Filtering(tvist.filter, lambda: tvist.delay)
 
 
 @dataclass(frozen=True)
