@@ -2,12 +2,13 @@
 
 ShapingError
 ├── ImpulseError          A and τ are no impulse train
-├── ShaperRangeError      f_d or ζ no shaper is defined for
+├── ParameterError        a parameter is out of its range
+│   ├── ShaperRangeError  f_d or ζ no shaper is defined for
+│   ├── DesignError       a parameter of a shaper's design is wrong
+│   └── EstimatorError    an estimator's parameter is wrong
 ├── UnknownShaperError    a name that is not in the catalogue
-├── DesignError           a parameter of a shaper's design is wrong
 ├── ConvergenceError      a design has no solution
 ├── DelayError            a delay the line does not hold
-├── EstimatorError        an estimator's parameter is wrong
 └── FilterError           shaper, estimator and delay line do not fit each other
 """
 
@@ -22,7 +23,23 @@ class ImpulseError(ShapingError):
     """Amplitudes and times that are no impulse train with unit sum."""
 
 
-class ShaperRangeError(ShapingError):
+class ParameterError(ShapingError):
+    """A parameter that is out of its range.
+
+    Attributes:
+        field: The parameter's name.
+        value: What was given.
+        limit: What is allowed, in words.
+    """
+
+    def __init__(self, field: str, value: object, limit: str) -> None:
+        super().__init__(f"{field} is {value!r}, but must be {limit}")
+        self.field = field
+        self.value = value
+        self.limit = limit
+
+
+class ShaperRangeError(ParameterError):
     """A mode no shaper is defined for.
 
     Attributes:
@@ -30,12 +47,6 @@ class ShaperRangeError(ShapingError):
         value: What was given, f_d in [Hz], zeta in [-].
         limit: The range it leaves, in words.
     """
-
-    def __init__(self, field: str, value: float, limit: str) -> None:
-        super().__init__(f"{field} is {value!r}, but must be {limit}")
-        self.field = field
-        self.value = value
-        self.limit = limit
 
 
 class UnknownShaperError(ShapingError):
@@ -55,20 +66,8 @@ class UnknownShaperError(ShapingError):
         self.nearest = nearest
 
 
-class DesignError(ShapingError):
-    """A parameter of a shaper's design is wrong.
-
-    Attributes:
-        field: The parameter's name.
-        value: What was given.
-        limit: What is allowed, in words.
-    """
-
-    def __init__(self, field: str, value: float, limit: str) -> None:
-        super().__init__(f"{field} is {value!r}, but must be {limit}")
-        self.field = field
-        self.value = value
-        self.limit = limit
+class DesignError(ParameterError):
+    """A parameter of a shaper's design is wrong."""
 
 
 class ConvergenceError(ShapingError):
@@ -89,20 +88,8 @@ class DelayError(ShapingError):
         self.limit = limit
 
 
-class EstimatorError(ShapingError):
-    """A parameter of an estimator is wrong.
-
-    Attributes:
-        field: The parameter's name.
-        value: What was given.
-        limit: What is allowed, in words.
-    """
-
-    def __init__(self, field: str, value: object, limit: str) -> None:
-        super().__init__(f"{field} is {value!r}, but must be {limit}")
-        self.field = field
-        self.value = value
-        self.limit = limit
+class EstimatorError(ParameterError):
+    """A parameter of an estimator is wrong."""
 
 
 class FilterError(ShapingError):
