@@ -32,6 +32,7 @@ from tvist_protocol.commands import (
     UnlockProtectiveStop,
 )
 from tvist_protocol.errors import RefusedError
+from tvist_protocol.io import Bank, SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.replies import Accepted, Done
 from tvist_protocol.values import Payload, ResetMode
 
@@ -163,9 +164,9 @@ class Arm:
 
     # ------------------------------------------------------------------ power and protective stops
 
-    async def power_on(self) -> None:
-        """Power the arm and release its brakes."""
-        await self.robot.request(PowerOn(token=self.token))
+    async def power_on(self, *, release_brakes: bool = True) -> None:
+        """Power the arm; without `release_brakes` the brakes of an arm that had no power go on holding it."""
+        await self.robot.request(PowerOn(token=self.token, release_brakes=release_brakes))
 
     async def power_off(self) -> None:
         """Stop what moves, then take the arm's power."""
@@ -220,7 +221,61 @@ class Arm:
             SetPayload(token=self.token, mass=believed.mass, com=believed.com, inertia=believed.inertia)
         )
 
+    async def set_tcp(self, offset: Iterable[float]) -> None:
+        """Say where the tool centre point is.
+
+        Args:
+            offset: In the flange frame: x y z [m] and rotation vector [rad].
+        """
+        x, y, z, rx, ry, rz = floats(offset)
+        await self.robot.request(SetTcp(token=self.token, offset=(x, y, z, rx, ry, rz)))
+
+    # ------------------------------------------------------------------ inputs, outputs, registers
+
+    async def set_digital_output(self, number: int, on: bool) -> None:
+        """Switch a digital output: 0–7 standard, 8–15 configurable, 16–17 tool."""
+        bit = 1 << number
+        await self.robot.request(
+            SetIo(token=self.token, digital_output_mask=bit, digital_outputs=bit if on else 0)
+        )
+
+    async def set_analog_output(self, number: int, share: float, *, voltage: bool = False) -> None:
+        """Set an analogue output.
+
+        Args:
+            number: 0 or 1.
+            share: Of its range [-].
+            voltage: Whether it gives 0 to 10 V; otherwise 4 to 20 mA.
+        """
+        bit = 1 << number
+        await self.robot.request(
+            SetIo(
+                token=self.token,
+                standard_analog_output_mask=bit,
+                standard_analog_output_type=bit if voltage else 0,
+                standard_analog_output_0=float(share),
+                standard_analog_output_1=float(share),
+            )
+        )
+
+    async def set_registers(self, bank: Bank, values: Iterable[float], first: int = 0) -> None:
+        """Write registers that stand in a row.
+
+        Args:
+            bank: Which: `input_int`, `output_double` …
+            values: Booleans, integers or numbers, as the bank has them.
+            first: Number of the first.
+        """
+        await self.robot.request(SetRegisters(token=self.token, bank=bank, values=tuple(values), first=first))
+
     # ------------------------------------------------------------------ simulation
+
+    async def set_digital_input(self, number: int, on: bool) -> None:
+        """Switch a digital input, as what is wired to it would: 0–7 standard, 8–15 configurable, 16–17 tool."""
+        bit = 1 << number
+        await self.robot.request(
+            SimulationSetInputs(token=self.token, digital_input_mask=bit, digital_inputs=bit if on else 0)
+        )
 
     async def reset(
         self,

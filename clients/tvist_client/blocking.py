@@ -22,6 +22,7 @@ from tvist_client.transports.base import Transport
 from tvist_client.transports.certificates import Folder
 from tvist_protocol.commands import Command, StepSetpoint
 from tvist_protocol.info import Clock, Info
+from tvist_protocol.io import Bank, Io
 from tvist_protocol.replies import Accepted, Done
 from tvist_protocol.stream import Event, State, Telemetry, Truth
 from tvist_protocol.values import Payload, ResetMode
@@ -169,9 +170,9 @@ class Arm:
         """Scale the speed of motions, as the slider of a teach pendant does."""
         self._portal.call(lambda: self._arm.set_speed(fraction))
 
-    def power_on(self) -> None:
+    def power_on(self, *, release_brakes: bool = True) -> None:
         """Power the arm and release its brakes."""
-        self._portal.call(self._arm.power_on)
+        self._portal.call(lambda: self._arm.power_on(release_brakes=release_brakes))
 
     def power_off(self) -> None:
         """Stop what moves, then take the arm's power."""
@@ -180,6 +181,26 @@ class Arm:
     def unlock_protective_stop(self) -> None:
         """Leave a protective stop, once the arm rests."""
         self._portal.call(self._arm.unlock_protective_stop)
+
+    def set_tcp(self, offset: Iterable[float]) -> None:
+        """Say where the tool centre point is."""
+        self._portal.call(lambda: self._arm.set_tcp(offset))
+
+    def set_digital_output(self, number: int, on: bool) -> None:
+        """Switch a digital output."""
+        self._portal.call(lambda: self._arm.set_digital_output(number, on))
+
+    def set_analog_output(self, number: int, share: float, *, voltage: bool = False) -> None:
+        """Set an analogue output."""
+        self._portal.call(lambda: self._arm.set_analog_output(number, share, voltage=voltage))
+
+    def set_registers(self, bank: Bank, values: Iterable[float], first: int = 0) -> None:
+        """Write registers that stand in a row."""
+        self._portal.call(lambda: self._arm.set_registers(bank, values, first))
+
+    def set_digital_input(self, number: int, on: bool) -> None:
+        """Switch a digital input, as what is wired to it would."""
+        self._portal.call(lambda: self._arm.set_digital_input(number, on))
 
     def set_shaper(self, name: str, modes: int = 1) -> None:
         """Choose the input shaper."""
@@ -313,6 +334,14 @@ class Robot:
     def on_telemetry(self, callback: Callable[[Telemetry], object]) -> Callable[[], None]:
         """As `on_state`, with the server's own figures."""
         return self._portal.subscription(lambda: self._robot.on_telemetry(callback))
+
+    def on_io(self, callback: Callable[[Io], object]) -> Callable[[], None]:
+        """As `on_state`, with inputs, outputs, registers and tool."""
+        return self._portal.subscription(lambda: self._robot.on_io(callback))
+
+    def io(self) -> Io:
+        """Inputs, outputs, registers and tool."""
+        return self._portal.call(self._robot.io)
 
     def request(self, command: Command, timeout_s: float = ANSWER_S) -> Accepted | Done:
         """Send any command."""

@@ -17,6 +17,7 @@ from tvist_client.transports.zenoh import ZenohTransport
 from tvist_protocol.codec import (
     decode_event,
     decode_info,
+    decode_io,
     decode_reply,
     decode_state,
     decode_telemetry,
@@ -26,6 +27,7 @@ from tvist_protocol.codec import (
 from tvist_protocol.commands import Command, ReleaseControl, Stop, TakeControl
 from tvist_protocol.errors import ProtocolError, RefusedError
 from tvist_protocol.info import Clock, Info
+from tvist_protocol.io import Io
 from tvist_protocol.modes import RuntimeState
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.stream import Event, State, Telemetry, Truth
@@ -59,6 +61,7 @@ class Robot:
         self._events: Feed[Event] = Feed(transport, "event", decode_event, once_a_tick=False)
         self._truths: Feed[Truth] = Feed(transport, "truth", decode_truth, once_a_tick=True)
         self._telemetries: Feed[Telemetry] = Feed(transport, "telemetry", decode_telemetry, once_a_tick=False)
+        self._ios: Feed[Io] = Feed(transport, "io", decode_io, once_a_tick=False)
         self.motions = Motions(self._until_ended)
         # Before any command is sent, since an event may come before the answer.
         self._events.listen(self.motions.on_event)
@@ -95,7 +98,7 @@ class Robot:
 
     async def close(self) -> None:
         """End the connection; iterators end too."""
-        for feed in (self._states, self._events, self._truths, self._telemetries):
+        for feed in (self._states, self._events, self._truths, self._telemetries, self._ios):
             feed.finish()
         self.motions.fail(NotConnectedError("the connection was closed"))
         await self._transport.close()
@@ -165,6 +168,19 @@ class Robot:
     def on_telemetry(self, callback: Callable[[Telemetry], object]) -> Callable[[], None]:
         """As `on_state`, with the server's own figures, once a second."""
         return self._telemetries.listen(callback)
+
+    def on_io(self, callback: Callable[[Io], object]) -> Callable[[], None]:
+        """As `on_state`, with inputs, outputs, registers and tool: at every change, and once a second."""
+        return self._ios.listen(callback)
+
+    async def io(self) -> Io:
+        """Inputs, outputs, registers and tool: the newest known, else the next that is told, within a second or so.
+
+        Raises:
+            AnswerTimeoutError: None came within `STATE_S`.
+        """
+        self._ios.subscribe()
+        return self._ios.latest or await self._ios.next(lambda _: True, STATE_S)
 
     # ------------------------------------------------------------------ commands
 
@@ -294,7 +310,7 @@ class Robot:
         return await self._states.next(lambda _: True, STATE_S)
 
     def _on_lost(self, error: NotConnectedError) -> None:
-        for feed in (self._states, self._events, self._truths, self._telemetries):
+        for feed in (self._states, self._events, self._truths, self._telemetries, self._ios):
             feed.fail(error)
         self.motions.fail(error)
 

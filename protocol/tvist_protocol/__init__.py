@@ -7,6 +7,7 @@ from tvist_protocol.codec import (
     decode_command,
     decode_event,
     decode_info,
+    decode_io,
     decode_reply,
     decode_setpoint,
     decode_state,
@@ -42,6 +43,7 @@ from tvist_protocol.commands import (
 )
 from tvist_protocol.errors import ProtocolError, RefusedError, TvistError
 from tvist_protocol.info import CalibrationInfo, Clock, Info, Limits
+from tvist_protocol.io import Bank, Io, SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import CODE_MEANINGS, Accepted, Code, Done, Refused, Reply
 from tvist_protocol.stream import EVENT_MEANINGS, Event, EventKind, State, Telemetry, Truth
@@ -53,6 +55,7 @@ __all__ = [
     "MAX_BYTES",
     "PROTOCOL_VERSION",
     "Accepted",
+    "Bank",
     "CalibrationInfo",
     "Clock",
     "Code",
@@ -62,6 +65,7 @@ __all__ = [
     "EventKind",
     "HandOver",
     "Info",
+    "Io",
     "KeepAlive",
     "Limits",
     "Message",
@@ -82,12 +86,16 @@ __all__ = [
     "ServoStart",
     "ServoStop",
     "SetEstimator",
+    "SetIo",
     "SetPayload",
+    "SetRegisters",
     "SetShaper",
     "SetSpeed",
+    "SetTcp",
     "Setpoint",
     "SimulationInject",
     "SimulationReset",
+    "SimulationSetInputs",
     "SimulationStep",
     "State",
     "StepSetpoint",
@@ -101,6 +109,7 @@ __all__ = [
     "decode_command",
     "decode_event",
     "decode_info",
+    "decode_io",
     "decode_reply",
     "decode_setpoint",
     "decode_state",

@@ -7,6 +7,7 @@ from msgspec import Struct
 
 from tvist_protocol.commands import Command, Setpoint
 from tvist_protocol.info import Info
+from tvist_protocol.io import Io
 from tvist_protocol.replies import Reply
 from tvist_protocol.stream import Event, State, Telemetry, Truth
 
@@ -36,7 +37,7 @@ class Channel:
 
 COMMANDS: tuple[type[Struct], ...] = get_args(Command)
 REPLIES: tuple[type[Struct], ...] = get_args(Reply)
-STREAMS: tuple[type[Struct], ...] = (State, Event, Truth, Telemetry)
+STREAMS: tuple[type[Struct], ...] = (State, Event, Truth, Telemetry, Io)
 MESSAGES: tuple[type[Struct], ...] = (*COMMANDS, Setpoint, *REPLIES, *STREAMS, Info)
 """Every message there is."""
 
@@ -72,6 +73,14 @@ CHANNELS = (
         by="server",
         messages=(Telemetry,),
         meaning="how the server is doing, 1 Hz",
+    ),
+    Channel(
+        name="io",
+        key="tvist/{robot}/io",
+        kind="put",
+        by="server",
+        messages=(Io,),
+        meaning="inputs, outputs, registers and tool: before the state of the tick that has a change, and 1 Hz",
     ),
     Channel(
         name="command",

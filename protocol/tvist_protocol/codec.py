@@ -13,10 +13,11 @@ from tvist_protocol.encodable import explain_unencodable
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.explain import FAULTS, explain_bytes, explain_refusal, explain_unknown_type
 from tvist_protocol.info import Info
+from tvist_protocol.io import Io
 from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import Event, State, Telemetry, Truth
 
-Message = Command | Setpoint | Reply | State | Event | Truth | Telemetry | Info
+Message = Command | Setpoint | Reply | State | Event | Truth | Telemetry | Io | Info
 
 MAX_BYTES = 256 * 1024
 """Largest message. The largest useful one, a step of 1000 set-points of 7 joints, has 1000·(18 + 67) bytes;
@@ -60,10 +61,11 @@ _STATE: _Reader[State] = _Reader(State)
 _EVENT: _Reader[Event] = _Reader(Event)
 _TRUTH: _Reader[Truth] = _Reader(Truth)
 _TELEMETRY: _Reader[Telemetry] = _Reader(Telemetry)
+_IO: _Reader[Io] = _Reader(Io)
 _INFO: _Reader[Info] = _Reader(Info)
 _READER_OF: dict[type[msgspec.Struct], _Reader[Any]] = {
     kind: reader
-    for reader in (_COMMAND, _SETPOINT, _REPLY, _STATE, _EVENT, _TRUTH, _TELEMETRY, _INFO)
+    for reader in (_COMMAND, _SETPOINT, _REPLY, _STATE, _EVENT, _TRUTH, _TELEMETRY, _IO, _INFO)
     for kind in reader.types.values()
 }
 
@@ -138,6 +140,11 @@ def decode_truth(data: bytes) -> Truth:
 def decode_telemetry(data: bytes) -> Telemetry:
     """The server's own figures."""
     return _TELEMETRY.read(data)
+
+
+def decode_io(data: bytes) -> Io:
+    """Inputs, outputs and registers."""
+    return _IO.read(data)
 
 
 def decode_info(data: bytes) -> Info:

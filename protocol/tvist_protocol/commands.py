@@ -8,7 +8,9 @@ from typing import Annotated, Any
 
 from msgspec import Meta, Struct
 
+from tvist_protocol.client_message import ClientMessage
 from tvist_protocol.errors import ProtocolError, short
+from tvist_protocol.io import SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.values import (
     PROTOCOL_VERSION,
     Acceleration,
@@ -37,12 +39,6 @@ from tvist_protocol.values import (
 
 CALIBRATION_DEPTH = 16
 """Levels of maps and lists a calibration may have: more than any needs, few enough to walk without care."""
-
-
-class ClientMessage(
-    Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="type", gc=False
-):
-    """Base of what a client sends: an unknown field is a mistake there, and refused."""
 
 
 class TakeControl(ClientMessage, frozen=True, kw_only=True, tag="take_control"):
@@ -202,6 +198,8 @@ class PowerOn(ClientMessage, frozen=True, kw_only=True, tag="power_on"):
 
     token: Token
     """Names the lease."""
+    release_brakes: bool = True
+    """False: an arm without power is only powered, and the brakes go on holding it."""
 
 
 class PowerOff(ClientMessage, frozen=True, kw_only=True, tag="power_off"):
@@ -285,12 +283,16 @@ Command = (
     | SetEstimator
     | SetPayload
     | SetSpeed
+    | SetIo
+    | SetRegisters
+    | SetTcp
     | PowerOn
     | PowerOff
     | UnlockProtectiveStop
     | SimulationReset
     | SimulationStep
     | SimulationInject
+    | SimulationSetInputs
 )
 
 

@@ -56,6 +56,11 @@ def telemetry(robot: str) -> str:
     return _key(robot, "telemetry")
 
 
+def io(robot: str) -> str:
+    """Key inputs, outputs and registers are put on when they change."""
+    return _key(robot, "io")
+
+
 def command(robot: str) -> str:
     """Key of the queryable that takes commands."""
     return _key(robot, "command")

@@ -80,6 +80,8 @@ class State(Struct, frozen=True, kw_only=True, tag_field="type", tag="state", gc
     """Latest impulse of the shaper [s]."""
     missed_ticks: int
     """Control periods that began too late, since the start."""
+    shaper_clipped: bool = False
+    """Whether the shaper cannot do here what it should: a delay is beyond what it holds, or more vibration is left."""
 
 
 class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc=False):

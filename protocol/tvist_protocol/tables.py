@@ -10,6 +10,7 @@ from tvist_protocol.channels import CHANNELS, COMMANDS, REPLIES, Channel, tag
 from tvist_protocol.commands import Setpoint, StepSetpoint
 from tvist_protocol.faults import FAULTS, Fault
 from tvist_protocol.info import CalibrationInfo, Info, Limits
+from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import CODE_MEANINGS
 from tvist_protocol.schema import components, field_docs
@@ -36,7 +37,7 @@ def tables() -> dict[str, str]:
         "parts": _messages((Payload, StepSetpoint)),
         "replies": _messages(REPLIES),
         "codes": _table(("code", "meaning"), ((f"`{code}`", text) for code, text in CODE_MEANINGS.items())),
-        "streams": _messages((State, Event, Truth, Telemetry)),
+        "streams": _messages((State, Event, Truth, Telemetry, Io)),
         "events": _table(("kind", "meaning"), ((f"`{kind}`", text) for kind, text in EVENT_MEANINGS.items())),
         "info": _messages((Info, Limits, CalibrationInfo)),
         "modes": _table(("field", "numbers"), map(_mode_row, (RobotMode, SafetyMode, RuntimeState))),

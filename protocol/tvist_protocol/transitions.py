@@ -1,6 +1,6 @@
 """What a robot can be doing, what leads from one to the other, and what is refused: one table.
 
-The server goes by it, the protocol's README draws it. A trigger is a command, or something that happens: those
+The server goes by it, the protocol's README draws it. A trigger is a command, or something else: those
 are named in `HAPPENINGS`. What a state has no row for is refused, or cannot happen there.
 """
 
@@ -80,6 +80,7 @@ class Control(StrEnum):
 
 
 HAPPENINGS: dict[str, str] = {
+    "power": "`power_on` with `release_brakes` false",
     "at_rest": "the shaped reference has come to rest",
     "interruption": "motion must end: the lease did, a set-point failed to come for 250 ms, something would meet",
     "protective_stop": "a drive's torque was beyond its limit for more than 10 ms, or the fault was injected",
@@ -102,6 +103,8 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition("release_control", (Control.HELD,), Control.FREE),
     Transition("lease_end", (Control.HELD,), Control.FREE),
     Transition("power_on", (_A.POWER_OFF, _A.IDLE, _A.REST), _A.REST),
+    Transition("power", (_A.POWER_OFF, _A.IDLE), _A.IDLE),
+    Transition("power", (_A.REST,), _A.REST),
     Transition("move_j", (_A.REST,), _A.MOVING),
     Transition("pause", (_A.MOVING, _A.PAUSED), _A.PAUSED),
     Transition("resume", (_A.PAUSED,), _A.MOVING),

@@ -31,7 +31,8 @@ class AimedFilter(SteadyFilter):
             self._start()
             return
         self.f_d, self.zeta = self.estimator.estimate(np.asarray(q, dtype=float))
-        self.clipped = not self.design.start(self.f_d, self.zeta, self._designed)
+        done = self.design.start(self.f_d, self.zeta, self._designed)
+        self.clipped = not done or self.estimator.clipped
         self._taps[:] = self._designed
         self._aimed = True
 

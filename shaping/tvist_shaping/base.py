@@ -24,7 +24,8 @@ class Filter(ABC):
         zeta: Damping ratios it works with [-], shape (modes,).
         excess: By what share the shaped acceleration may exceed the reference's, as far as it is known and kept
             small: who makes the reference can stay that much below a limit [-].
-        clipped: Whether it could not do what it should at the last tick: a delay was beyond what it holds.
+        clipped: Whether it could not do what it should at the last tick: a delay was beyond what it holds, or a mode
+            beyond what its estimator believes.
     """
 
     name: str

@@ -29,6 +29,8 @@ class TvistFilter(Filter):
         max_delay: Longest delay the filter keeps samples for [s].
         f_d: Damped frequencies of the last tick [Hz], shape (modes,).
         zeta: Damping ratios of the last tick [-], shape (modes,).
+        clipped: Whether one of them was held at the estimator's `f_d_min` or `zeta_max`. No delay is: the constructor
+            refuses what may be beyond max_delay.
         impulses: Impulses of the last tick.
     """
 
@@ -139,6 +141,7 @@ class TvistFilter(Filter):
     def _start(self) -> None:
         """Impulses for the modes at the last shaped reference: the z⁻¹ of Figure 8."""
         self.f_d, self.zeta = self.estimator.estimate(self._q_star)
+        self.clipped = self.estimator.clipped
         trains = [
             self.shaper.function(f, z) for f, z in zip(self.f_d.tolist(), self.zeta.tolist(), strict=True)
         ]

@@ -191,6 +191,10 @@ class ShortDesign(Design):
 class SteadyFilter(Filter):
     """Time-varying shaping with a constant mean delay.
 
+    An estimator may know modes as low as its `f_d_min`, and be far from them everywhere the arm goes. So a design is
+    not refused because it would be too short for these: where it is too short for the modes there are, `clipped` says
+    so at that tick, and no delay is longer than the line holds.
+
     Attributes:
         design: Makes the taps.
     """
@@ -246,7 +250,8 @@ class SteadyFilter(Filter):
 
     def _start(self) -> None:
         self.f_d, self.zeta = self.estimator.estimate(self._q_star)
-        self.clipped = not self.design.start(self.f_d, self.zeta, self._designed)
+        done = self.design.start(self.f_d, self.zeta, self._designed)
+        self.clipped = not done or self.estimator.clipped
         self._past[:] = self._designed
         self._sums[:] = self._designed * self._smooth
         self._taps[:] = self._designed
@@ -255,7 +260,8 @@ class SteadyFilter(Filter):
     def _weigh(self) -> None:
         if self._tick % EVERY == 0:
             self.f_d, self.zeta = self.estimator.estimate(self._q_star)
-            self.clipped = not self.design.go_on(self.f_d, self.zeta, EVERY * self.period, self._designed)
+            done = self.design.go_on(self.f_d, self.zeta, EVERY * self.period, self._designed)
+            self.clipped = not done or self.estimator.clipped
         self._tick += 1
         average(self._designed, self._past, self._sums, self._row, self._taps)
         self._row = (self._row + 1) % self._smooth

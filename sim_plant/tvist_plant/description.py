@@ -1,6 +1,8 @@
 """A robot as its file describes it: numbers with units, checked, nothing computed."""
 
+import math
 import tomllib
+from collections.abc import Collection
 from importlib import resources
 from pathlib import Path
 from typing import Annotated
@@ -17,6 +19,12 @@ Tensor = tuple[NotNegative, Number, Number, NotNegative, Number, NotNegative]
 """Symmetric 3x3: xx xy xz yy yz zz."""
 
 MAX_JOINTS = 7
+DISTURBANCES = ("friction", "gear", "noise")
+"""What no shaper can know: Coulomb friction, kinematic error of the gears, noise of the accelerometer."""
+
+
+QUIET_STEP = 2.0 * math.pi / 2**23
+"""Of an encoder with 23 bits a turn [rad]: more than an arm at rest moves while its drives settle."""
 
 
 class DescriptionError(ValueError):
@@ -137,6 +145,8 @@ class Sensors(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     accelerometer_noise: NotNegative = 0.0
     """rms per axis [m/s^2]."""
+    encoder_step: NotNegative = 0.0
+    """Joint angles are told anew once they have moved by this much [rad]."""
 
 
 class Body(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -186,14 +196,36 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
         """Number of joints."""
         return len(self.robot.joints)
 
+    def quiet(self) -> "RobotDescription":
+        """The same arm with sensors that say the same from tick to tick once it rests."""
+        return msgspec.structs.replace(
+            self, sensors=Sensors(accelerometer_noise=0.0, encoder_step=QUIET_STEP)
+        )
+
     def clean(self) -> "RobotDescription":
         """The same arm without noise, gear error and Coulomb friction (its linear equivalent stays)."""
-        replace = msgspec.structs.replace
-        return replace(
-            self,
-            drives=replace(self.drives, gear_error_amplitude=0.0, linear_friction=True),
-            sensors=replace(self.sensors, accelerometer_noise=0.0),
-        )
+        return self.disturbed_by(())
+
+    def disturbed_by(self, kept: Collection[str]) -> "RobotDescription":
+        """The same arm with some of its disturbances alone; for Coulomb friction its linear equivalent stays.
+
+        Args:
+            kept: Of `DISTURBANCES`.
+
+        Raises:
+            DescriptionError: There is no such disturbance.
+        """
+        for name in kept:
+            if name not in DISTURBANCES:
+                raise DescriptionError(f"disturbance is {name!r}: must be one of {', '.join(DISTURBANCES)}")
+        replace, drives, sensors = msgspec.structs.replace, self.drives, self.sensors
+        if "friction" not in kept:
+            drives = replace(drives, linear_friction=True)
+        if "gear" not in kept:
+            drives = replace(drives, gear_error_amplitude=0.0)
+        if "noise" not in kept:
+            sensors = replace(sensors, accelerometer_noise=0.0)
+        return replace(self, drives=drives, sensors=sensors)
 
 
 def robots() -> tuple[str, ...]:

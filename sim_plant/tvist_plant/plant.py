@@ -12,7 +12,7 @@ from tvist_plant.drives import DriveCommand, LinearPart, Nonlinear
 from tvist_plant.integrator import advance, balance
 from tvist_plant.model import FlexibleModel, Floats, flexible_model
 from tvist_plant.modes import Modes, modes
-from tvist_plant.sensors import Accelerometer, gear_phases
+from tvist_plant.sensors import Accelerometer, Encoders, gear_phases
 
 PERIOD = 0.002
 """Control period [s]."""
@@ -93,6 +93,7 @@ class Plant:
         n = description.joints
         self._phase = np.zeros(n)
         self._accelerometer = Accelerometer(description.sensors.accelerometer_noise, 0)
+        self._encoders = Encoders(description.sensors.encoder_step)
         self._command = np.zeros((3, n))
         self._external: Floats | None = None
 
@@ -132,6 +133,7 @@ class Plant:
         self._external = None
         self._phase = gear_phases(self.description.joints, seed)
         self._accelerometer = Accelerometer(self.description.sensors.accelerometer_noise, seed)
+        self._encoders = Encoders(self.description.sensors.encoder_step)
         self._command = np.array([command.q, command.qd, command.torque])
         self._settle(command)
         return self._measure()
@@ -215,7 +217,7 @@ class Plant:
         joints = self._flexible.joints
         self._specific_force = self._feel()
         return Measurement(
-            q=self._q[joints],
+            q=self._encoders.read(self._q[joints]),
             qd=self._qd[joints],
             moment=self._moment.copy(),
             accelerometer=self._accelerometer.read(self._specific_force),

@@ -1,4 +1,4 @@
-"""What the arm feels: a MEMS accelerometer in the flange."""
+"""What the arm feels: a MEMS accelerometer in the flange, encoders in its joints."""
 
 import numpy as np
 
@@ -29,6 +29,28 @@ class Accelerometer:
             self._drawn = iter(self._noise * self._random.standard_normal((512, 3)))
             sample = next(self._drawn)
         return np.asarray(specific_force + sample)
+
+
+class Encoders:
+    """Angles in steps: one is told anew once it has moved by a step.
+
+    That is hysteresis. Rounding would flicker where an angle rests between two steps.
+
+    Args:
+        step: [rad]; 0 tells everything.
+    """
+
+    def __init__(self, step: float) -> None:
+        self._step = step
+        self._told: Floats | None = None
+
+    def read(self, q: Floats) -> Floats:
+        """Angles as they are told, shape (n,) [rad]."""
+        if self._step == 0.0:
+            return q
+        told = q if self._told is None else np.where(np.abs(q - self._told) >= self._step, q, self._told)
+        self._told = told
+        return told
 
 
 def gear_phases(joints: int, seed: int) -> Floats:

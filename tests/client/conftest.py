@@ -211,7 +211,7 @@ class Served:
         self._network = Network([endpoint])
         gateway = self._network.gateway("ur5e", self, lockstep=robot.clock != "realtime", truth=True)
         for topic in ("state", "event", "truth"):
-            robot.subscribe(topic, lambda data, topic=topic: gateway.publish(topic, data))
+            robot.subscribe(topic, lambda data, topic=topic: gateway.publish(topic, None, data))
         self._thread.start()
 
     def request(self, data, reply):

@@ -144,6 +144,15 @@ def realtime():
 
 
 @pytest.fixture(scope="module")
+def doors():
+    """Address of a robot whose UR interfaces are open."""
+    pytest.importorskip("rtde_receive")
+    address = f"127.19.{os.getpid() % 200}.{os.getpid() // 200 % 200 + 1}"
+    with Served("--ur", "--ur-address", address):
+        yield address
+
+
+@pytest.fixture(scope="module")
 def story(tmp_path_factory):
     """What the tutorial's commands leave and say: its folder, and the words of each command."""
     folder = tmp_path_factory.mktemp("tutorial")
@@ -215,6 +224,8 @@ class TestSnippets:
         if "Robot.connect()" in text or ENDPOINT in text:
             endpoint = request.getfixturevalue("realtime").endpoint
             text = text.replace("Robot.connect()", f'Robot.connect("{endpoint}")').replace(ENDPOINT, endpoint)
+        if '"127.0.0.1"' in text:
+            text = text.replace("127.0.0.1", request.getfixturevalue("doors"))
         if "first.mcap" in text:
             folder = request.getfixturevalue("story")[0]
         script = tmp_path / "test_snippet.py"

@@ -215,6 +215,7 @@ class TestReport:
         assert told["delay_ms"] == pytest.approx({"median": 100.0, "max": 100.0})
         assert told["moves"][0]["still_after_ms"] == {"unshaped": 1200.0, "shaped": None}
         assert told["never_still"] == 3
+        assert told["peak_m_s2"] == pytest.approx({"median": 0.3, "p95": 0.48, "max": 0.5})
 
     def test_nothing_but_moves_without_vibration_is_no_percentage(self, ur5e, paper, move):
         told = report([Job(ur5e, move, Recipe("zv", paper))], [self.judged(0.1, 0.05)])
@@ -244,6 +245,13 @@ class TestMoves:
         longer = one.baselines[EQUAL_DURATION.name]
         assert longer.duration == pytest.approx(one.shaped.duration, abs=1.5 * PERIOD)
         assert longer.acceleration <= 1.0 + 1e-9
+
+    def test_baselines_for_frequencies_far_too_low_are_long_and_no_error(self, ur5e, paper, move):
+        recipe = Recipe("zv", paper, frequency_error=-0.9)
+        reference = point_to_point(np.array(move.start), np.array(move.target))
+        for baseline in baselines(recipe, ur5e, (5.0, 5.0)):
+            shaped = baseline.shaped(recipe, ur5e, move, reference, len(reference) + 20)
+            np.testing.assert_allclose(shaped[-1], move.target, atol=1e-9)
 
     @pytest.mark.slow
     def test_other_processes_give_the_same_figures(self, ur5e, paper):

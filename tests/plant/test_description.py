@@ -6,7 +6,14 @@ import msgspec
 import numpy as np
 import pytest
 
-from tvist_plant.description import DescriptionError, RobotDescription, is_real_body, load, robots
+from tvist_plant.description import (
+    DISTURBANCES,
+    DescriptionError,
+    RobotDescription,
+    is_real_body,
+    load,
+    robots,
+)
 from tvist_plant.plant import Plant
 
 from .arms import chain, hold
@@ -94,6 +101,18 @@ def test_a_body_of_points_is_real_and_one_with_a_too_large_moment_is_not():
     assert is_real_body((1.0, 0.0, 0.0, 1.0, 0.0, 2.0))  # a thin disc: the limit
     assert not is_real_body((1.0, 0.0, 0.0, 1.0, 0.0, 2.1))
     assert not is_real_body((1.0, 1.1, 0.0, 1.0, 0.0, 1.0))
+
+
+def test_disturbances_can_be_kept_one_by_one(ur5e):
+    assert ur5e.disturbed_by(DISTURBANCES) == ur5e
+    assert ur5e.disturbed_by(()) == ur5e.clean()
+    for name in DISTURBANCES:
+        alone = ur5e.disturbed_by([name])
+        assert alone.drives.linear_friction == (name != "friction")
+        assert (alone.drives.gear_error_amplitude > 0.0) == (name == "gear")
+        assert (alone.sensors.accelerometer_noise > 0.0) == (name == "noise")
+    with pytest.raises(DescriptionError, match=r"'wind'.*friction, gear, noise"):
+        ur5e.disturbed_by(["gear", "wind"])
 
 
 def test_clean_takes_away_what_is_not_linear(ur5e):

@@ -13,6 +13,7 @@ from tvist_protocol import (
     decode_command,
     decode_event,
     decode_info,
+    decode_io,
     decode_reply,
     decode_setpoint,
     decode_state,
@@ -35,6 +36,7 @@ DECODERS = (
         "truth": decode_truth,
         "telemetry": decode_telemetry,
         "info": decode_info,
+        "io": decode_io,
     }
 )
 

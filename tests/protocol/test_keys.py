@@ -5,7 +5,7 @@ import pytest
 from tvist_protocol import ProtocolError, keys
 from tvist_protocol.channels import CHANNELS
 
-LEAVES = ["state", "truth", "event", "telemetry", "command", "setpoint", "info", "alive"]
+LEAVES = ["state", "truth", "event", "telemetry", "command", "setpoint", "info", "alive", "io"]
 
 
 @pytest.mark.parametrize("leaf", LEAVES)

@@ -103,7 +103,7 @@ class TestAccess:
 
     @pytest.mark.parametrize("role", ["viewer", "operator"])
     def test_both_hear_what_the_robot_tells_and_nothing_that_clients_send(self, role):
-        streams = {f"tvist/ur5e/{topic}" for topic in ("state", "event", "telemetry", "truth")}
+        streams = {f"tvist/ur5e/{topic}" for topic in ("state", "event", "telemetry", "truth", "io")}
         assert self.granted(role, "egress", "put") == streams
         assert self.granted(role, "egress", "query") == set()
         assert self.granted(role, "ingress", "declare_subscriber") == streams

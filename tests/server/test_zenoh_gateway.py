@@ -188,7 +188,7 @@ def test_what_is_published_arrives_with_its_encoding(gateway, session):
     received = subscribe(session, "tvist/ur5e/*")
     replies(session, "tvist/ur5e/info")  # the subscription has passed
     for topic in ("state", "event", "telemetry", "truth"):  # truth is not told here
-        gateway.publish(topic, topic.encode())
+        gateway.publish(topic, None, topic.encode())
     samples = [received.get(timeout=WAIT) for _ in range(3)]
     assert {s.payload.to_string(): str(s.key_expr) for s in samples} == {
         topic: f"tvist/ur5e/{topic}" for topic in ("state", "event", "telemetry")
@@ -206,7 +206,7 @@ def test_in_lockstep_events_states_and_truth_keep_their_order(lockstep_gateway, 
     for tick in range(500):
         for topic in ("event", "state", "truth"):
             sent.append(f"{topic} {tick}")
-            lockstep_gateway.publish(topic, f"{topic} {tick}".encode())
+            lockstep_gateway.publish(topic, None, f"{topic} {tick}".encode())
     assert [received.get(timeout=WAIT).payload.to_string() for _ in sent] == sent
 
 
@@ -225,7 +225,7 @@ def test_close_ends_what_is_unanswered_and_a_late_reply_goes_nowhere(network, ga
     network.close()
     assert list(pending) == []
     desk.held[0]()
-    gateway.publish("state", b"nobody hears it")
+    gateway.publish("state", None, b"nobody hears it")
     network.close()
 
 
@@ -292,12 +292,12 @@ def test_a_reader_that_stops_loses_states_but_no_event_and_never_holds_up_the_pu
         reader.send_signal(signal.SIGSTOP)
         began = time.monotonic()
         for number in range(2000):
-            gateway.publish("state", bytes(9000))
+            gateway.publish("state", None, bytes(9000))
             if number % 10 == 0:
-                gateway.publish("event", bytes(100))
+                gateway.publish("event", None, bytes(100))
         assert time.monotonic() - began < 4.0  # BLOCK holds up a single put for 5 s
         reader.send_signal(signal.SIGCONT)
-        gateway.publish("event", b"last")
+        gateway.publish("event", None, b"last")
         counts = json.loads(reader.stdout.readline())
         assert counts["event"] == 201
         assert counts["state"] < 2000
@@ -314,7 +314,7 @@ class Desk:
     def client_seen(self, name): pass
     def client_gone(self, name): pass
 gateway = Network([sys.argv[1]]).gateway("ur5e", Desk(), lockstep=False, truth=False)
-gateway.publish("state", b"x")
+gateway.publish("state", None, b"x")
 print("end of main")
 """
 

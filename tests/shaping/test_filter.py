@@ -110,6 +110,29 @@ def test_the_modes_impulses_and_delay_of_the_last_tick_can_be_read():
     assert tvist.delay == both.duration == pytest.approx(0.5 / 6.7 + 0.5 / 15.0)
 
 
+def test_a_mode_that_its_estimator_does_not_believe_is_said_and_no_longer_when_it_does():
+    """The filter goes on with the held mode: it is inside what was checked when it was made."""
+
+    class Holds(Estimator):
+        modes, f_d_min, zeta_max = 1, 5.0, 0.3
+
+        def estimate(self, q):
+            self.clipped = bool(q[0] > 1.0)
+            return np.array([5.0 if self.clipped else 7.0]), np.array([0.1])
+
+    tvist = TvistFilter(shaper("zv"), Holds(), joints=1)
+    assert not tvist.clipped
+    tvist.reset([2.0])
+    assert tvist.clipped
+    said = []
+    for _ in range(60):
+        tvist.filter([0.0])
+        said.append(tvist.clipped)
+    assert said[0]
+    assert not said[-1]
+    assert not tvist.replace(estimator=Fixed([7.0], [0.1])).clipped
+
+
 def test_what_the_filter_returned_is_the_callers_own():
     tvist = TvistFilter(shaper("zv"), Fixed([10.0], [0.1]), joints=1)
     first = tvist.filter([1.0])

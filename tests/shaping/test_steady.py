@@ -5,6 +5,7 @@ import pytest
 from scipy.linalg import expm
 
 from tvist_shaping import SHAPERS, Estimator, Fade, FilterError, Fixed, ShapingError, TvistFilter, residual
+from tvist_shaping.aimed import AimedFilter
 from tvist_shaping.fir import FirDesign
 from tvist_shaping.impulses import Impulses
 from tvist_shaping.steady import ProductDesign, ShortDesign, SteadyFilter
@@ -249,6 +250,54 @@ def test_a_product_that_does_not_fit_is_said_to_be_clipped_and_no_longer_when_it
     assert not SteadyFilter(ProductDesign(0.085, modes=1), slow, joints=1).clipped
     back = short_of_mean.with_estimator(Fixed([7.0], [0.05]))
     assert not back.clipped
+
+
+class Falling(Arm):
+    """Modes far above what the estimator believes, and where q is large below: held there."""
+
+    f_d_min = 2.0
+
+    def estimate(self, q):
+        slow = bool(q[0] > 1.0)
+        self.clipped = slow
+        f_d = np.full(self.modes, self.f_d_min) if slow else np.array(F_D[: self.modes])
+        return f_d, np.array(ZETA[: self.modes])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_lowest_frequency_that_does_not_fit_is_refused_nobody_and_said_where_it_comes(kind):
+    """Half periods of three modes at 2 Hz are 0.75 s; the line holds 0.26 s, and 0.15 s."""
+    tvist = a_filter(kind, Falling(3 if kind == "product" else 4))
+    assert not tvist.clipped
+    reference = 2.0 * double_s(1.0)
+    said = []
+    for q in [*reference, *reference[::-1]]:
+        out = tvist.filter(q)
+        said.append(tvist.clipped)
+        assert np.isfinite(out).all()
+        assert tvist.delay <= H * (tvist.design.taps - 1)
+    assert said[len(reference) - 1]
+    assert not said[0]
+    assert not said[-1]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_mode_that_is_held_is_said_though_the_design_has_room_for_it(kind):
+    class Holds(Arm):
+        clipped = True
+
+    assert a_filter(kind, Holds(3 if kind == "product" else 4)).clipped
+    tvist = a_filter(kind, Holds(3 if kind == "product" else 4))
+    tvist.filter([0.1])
+    assert tvist.clipped
+
+
+def test_an_aimed_filter_says_of_the_end_it_is_told_whether_it_is_clipped():
+    tvist = AimedFilter(design("short"), Falling(4), joints=1)
+    tvist.aim([2.0])
+    assert tvist.clipped
+    tvist.aim([0.5])
+    assert not tvist.clipped
 
 
 def test_a_programme_that_would_have_to_be_longer_than_it_may_is_said_to_be_clipped():

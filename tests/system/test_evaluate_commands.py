@@ -48,6 +48,10 @@ class TestEvaluate:
         told = (
             tvist("evaluate", "--moves", moves, "--payload", 5, "--shaper", "zv", "--json").assert_done().json
         )
+        assert list(told["baselines"]) == [
+            "waiting", "equal_duration_double_s", "zv_frozen_at_end", "fixed_mzv", "fixed_ei2", "fixed_ei3"
+        ]  # fmt: skip
+        assert told["disturbances"] == ["friction", "gear", "noise"]
         assert len(told["moves"]) == 2
         for move in told["moves"]:
             assert {
@@ -66,12 +70,18 @@ class TestEvaluate:
         saved = tmp_path / "drawn.json"
         first = tvist(
             "evaluate", "--random", 2, "--seed", 5, "--payload", "uniform", "--clean", "--shaper", "auto",
-            "--save-moves", saved, "--figures", tmp_path / "figures", "--json",
+            "--no-baselines", "--save-moves", saved, "--figures", tmp_path / "figures", "--json",
         ).assert_done().json  # fmt: skip
-        again = (
-            tvist("evaluate", "--moves", saved, "--clean", "--shaper", "auto", "--json").assert_done().json
-        )
+        again = tvist(
+            "evaluate", "--moves", saved, "--disturbances", "none", "--shaper", "auto", "--no-baselines", "--json"
+        ).assert_done().json  # fmt: skip
         assert first["moves"] == again["moves"]
+        assert first["baselines"] == {}
+        assert (
+            (first["plant"], first["disturbances"])
+            == (again["plant"], again["disturbances"])
+            == ("clean", [])
+        )
         assert 0.0 < first["free_of_collision"] <= 1.0
         assert {path.name for path in (tmp_path / "figures").iterdir()} == {"moves.png", "one_move.png"}
 
@@ -79,7 +89,23 @@ class TestEvaluate:
     def test_words_are_for_people(self, moves):
         said = tvist("evaluate", "--moves", moves, "--payload", 5).assert_done()
         assert "unshaped m/s²" in said.out
+        assert "fixed_ei3" in said.out
         assert "carry something else" in said.err
+
+    def test_disturbances_act_one_by_one_and_the_targets_knower_is_a_shaper_like_any(self, moves):
+        told = {
+            name: tvist(
+                "evaluate", "--moves", moves, "--shaper", "auto-target", "--disturbances", name, "--no-baselines",
+                "--json",
+            ).assert_done().json
+            for name in ("none", "noise", "friction,gear")
+        }  # fmt: skip
+        assert [one["plant"] for one in told.values()] == [
+            "clean", "with noise alone", "with friction and gear alone"
+        ]  # fmt: skip
+        assert told["noise"]["moves"] == told["none"]["moves"]  # the truth has no noise
+        assert told["friction,gear"]["peak_m_s2"]["median"] > told["none"]["peak_m_s2"]["median"]
+        assert told["none"]["reduction_percent"]["min"] > 95.0
 
     @pytest.mark.parametrize(
         ("arguments", "words"),
@@ -93,6 +119,9 @@ class TestEvaluate:
             ({"random": 1, "calibration": "none.json"}, ("none.json",)),
             ({"random": 1, "shaper": "auto", "calibration": "ur5e_5kg"}, ("auto", "modes")),
             ({"random": 1, "frequency_error": -100}, ("frequency-error",)),
+            ({"random": 1, "disturbances": "gear,wind"}, ("wind", "friction, gear, noise")),
+            ({"random": 1, "disturbances": ""}, ("''", "friction, gear, noise")),
+            ({"random": 1, "disturbances": "gear", "clean": True}, ("--clean", "--disturbances")),
             ({"moves": Path("none.json")}, ("none.json",)),
         ],
     )

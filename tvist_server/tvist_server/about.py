@@ -15,7 +15,7 @@ VERSION = version("tvist")
 def info_of(controller: Controller) -> Info:
     """The robot, its limits and how it is set up now."""
     setup, limits, lease = controller.setup, controller.setup.description.limits, controller.session.lease
-    calibration = controller.source.calibration
+    calibration = controller.filters.source.calibration
     own = (setup.calibration.name,) if setup.calibration is not None else ()
     tvist = controller.cycle.tvist
     return Info(
@@ -40,14 +40,14 @@ def info_of(controller: Controller) -> Info:
         else CalibrationInfo(
             name=calibration.name,
             payload_mass=calibration.payload.mass,
-            fits_payload=fits(calibration, controller.declared, controller.source.name),
+            fits_payload=fits(calibration, controller.declared, controller.filters.source.name),
             seed=calibration.provenance.seed,
             f_d_range=calibration.provenance.measured_f_d_range,
             zeta_range=calibration.provenance.measured_zeta_range,
         ),
         shaper=tvist.name,
         modes=tvist.estimator.modes,
-        estimator=controller.source.name,
+        estimator=controller.filters.source.name,
         calibrations=sorted({*available(), *own}),
         shapers=shapers(),
         control=None if lease is None else lease.client,

@@ -1,6 +1,7 @@
 """How a robot is served: from the command line, or from a TOML file."""
 
 import dataclasses
+import ipaddress
 import tempfile
 import tomllib
 from pathlib import Path
@@ -17,6 +18,7 @@ from tvist_server import calibrations
 from tvist_server.fleet import members
 from tvist_server.initial import read_state
 from tvist_server.setup import Setup, paper_payload
+from tvist_server.ur_ports import Door, UrPorts
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 _INSTEAD = {
@@ -69,6 +71,14 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Folder for the last second before the simulated arm failed."""
     truth: bool = False
     """Tell what no robot can know, too."""
+    quiet: bool = False
+    """Sensors without noise, and angles in the steps of an encoder: at rest nothing changes from tick to tick."""
+    ur: bool = False
+    """Open UR's own interfaces, too."""
+    ur_address: str = "127.0.0.1"
+    """IP address they listen at; of several robots each has the next one."""
+    ur_ports: UrPorts = UrPorts()
+    """Ports of those that are not where UR has them; 0 keeps one shut."""
 
     def setups(self) -> list[Setup]:
         """The start of every robot's controller.
@@ -91,6 +101,27 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             dataclasses.replace(starts[member.robot], name=member.name, seed=self.seed + index)
             for index, member in enumerate(found)
         ]
+
+    def doors(self, number: int) -> tuple[str, dict[Door, int]]:
+        """Where UR's interfaces of a robot are: address, and port by door.
+
+        Args:
+            number: Of the robot, 0 the first.
+
+        Raises:
+            ConfigError: `ur_address` is none, or leaves no room for so many.
+        """
+        try:
+            address = ipaddress.ip_address(self.ur_address) + number
+        except ValueError as error:
+            raise ConfigError(
+                f"ur_address is {self.ur_address!r}: must be an IP address ({error})"
+            ) from error
+        if number and ipaddress.ip_address(self.ur_address).is_unspecified:
+            raise ConfigError(
+                f"ur_address is {self.ur_address}: several robots need an address of their own each"
+            )
+        return str(address), self.ur_ports.open()
 
     def setup(self) -> Setup:
         """The controller's start, of one robot.
@@ -115,6 +146,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             )
             if self.state is not None:
                 setup = read_state(self.state).on(setup)
+            if self.quiet:
+                setup = dataclasses.replace(setup, description=setup.description.quiet())
             setup.check()
         except ValueError as error:
             raise ConfigError(str(error)) from error

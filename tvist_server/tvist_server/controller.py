@@ -11,24 +11,23 @@ import numpy as np
 
 from tvist_plant.plant import PERIOD, PlantError
 from tvist_protocol import commands as c
+from tvist_protocol.io import Io, SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Accepted, Code, Done, Refused, Reply
 from tvist_protocol.stream import Event, EventKind, State, Truth
 from tvist_protocol.values import PROTOCOL_VERSION, Payload
-from tvist_server.calibrations import fits
-from tvist_server.choices import choose_filter, choose_source, make_estimator, wanted_modes
 from tvist_server.collision import CollisionModel
 from tvist_server.cycle import ControlCycle, Sample
 from tvist_server.faults import Faults
-from tvist_server.mode_source import ModeSource, modal_source
+from tvist_server.filters import Filters
 from tvist_server.motion import MotionControl
 from tvist_server.payload_monitor import PayloadMonitor
+from tvist_server.peripherals import Peripherals
 from tvist_server.refusal import RefusalError, check_body, check_joints, check_motion
 from tvist_server.reporting import Reporter
 from tvist_server.session import NoControlError, Session
 from tvist_server.setup import Setup, body
 from tvist_server.trajectory import Limits
-from tvist_shaping.base import Filter
 
 
 @dataclass
@@ -58,33 +57,27 @@ class Controller:
         self.tick_number = 0
         self.counters = Counters()
         self.declared = setup.payload
-        self.source = setup.source()
-        """Where the filter's modes come from."""
-        self._modal = modal_source(setup.description, setup.calibration)
+        self._events: list[Event] = []
         self.session = Session(timeouts=setup.clock == "realtime")
-        try:
-            self.source, tvist = self._choose(setup.shaper, self.source)
-        except RefusalError as error:
-            raise ValueError(str(error)) from error
+        self.filters = Filters(setup, self._emit)
         self.cycle = ControlCycle(
             setup.description,
-            tvist,
+            self.filters.first,
             q=np.array(setup.q, dtype=float),
             declared=body(setup.payload),
             carried=body(setup.carried or setup.payload),
             seed=setup.seed,
         )
-        if self._modal is not None:  # what it takes is compiled code, which lasts many ticks to load: now
-            self._choose("auto", self._modal)[1].filter(np.zeros(setup.description.joints))
+        self.filters.attach(self.cycle)
         self._reporter = Reporter(setup.description)
-        self._events: list[Event] = []
-        self._clipped = False
         self._seed = setup.seed
         collisions = CollisionModel(setup.description, body(setup.payload))
         self.motion = MotionControl(self.cycle, collisions, self._emit, setup.mode)
         self._faults = Faults(self.motion)
         self._payload_monitor = PayloadMonitor(setup.description, body(setup.payload))
-        self._warn_of_payload()
+        self.peripherals = Peripherals()
+        self._io_changed = True
+        self.filters.warn_of_payload(self.declared)
 
     @property
     def now(self) -> float:
@@ -149,7 +142,7 @@ class Controller:
             sample = self.motion.recover(error, self._seed)
             self._payload_monitor.reset()
         self._watch_payload(sample)
-        self._watch_filter()
+        self.filters.watch()
         self.tick_number += 1
         events, self._events = self._events, []
         state = self._reporter.state(
@@ -164,6 +157,13 @@ class Controller:
             missed_ticks=self.counters.missed_ticks,
         )
         return state, events
+
+    def changed_io(self) -> Io | None:
+        """Inputs, outputs and registers where they changed since this was asked last, before a tick; else None."""
+        if not self._io_changed:
+            return None
+        self._io_changed = False
+        return self.peripherals.io(self.tick_number + 1, self.declared, self.motion.wanted_speed)
 
     def truth(self) -> Truth:
         """What no robot can know, after a tick."""
@@ -194,15 +194,6 @@ class Controller:
             why = self._payload_monitor.update(sample.target, sample.fed_forward, sample.measured.moment)
             if why is not None:
                 self._emit("warning", code="payload_mismatch", why=why)
-
-    def _watch_filter(self) -> None:
-        """Say when the filter cannot do what it should, once until it can again."""
-        clipped = self.cycle.tvist.clipped
-        if clipped and not self._clipped:
-            name = self.cycle.tvist.name
-            why = f"{name} cannot do here what it should: a delay is beyond what it holds, or more is left"
-            self._emit("warning", code="out_of_range", why=why)
-        self._clipped = clipped
 
     def _lose_lease(self, why: str) -> None:
         self.session.release()
@@ -284,12 +275,46 @@ class Controller:
         """Scale the time of motions."""
         self._authorize(command.token)
         self.motion.set_speed(command.fraction)
+        self._io_changed = True
+        return Done()
+
+    def set_io(self, command: SetIo) -> Reply:
+        """Set outputs."""
+        self._authorize(command.token)
+        self.peripherals.set_outputs(command)
+        self._io_changed = True
+        return Done()
+
+    def set_registers(self, command: SetRegisters) -> Reply:
+        """Write registers; input registers anyone may."""
+        if command.token is not None:
+            self._authorize(command.token)
+        elif command.bank.startswith("output"):
+            why = f"token is missing: {command.bank} registers are the robot's own, and take control to write"
+            raise RefusalError("missing_field", "token", why)
+        self.peripherals.set_registers(command)
+        self._io_changed = True
+        return Done()
+
+    def set_tcp(self, command: SetTcp) -> Reply:
+        """Say where the tool centre point is."""
+        self._authorize(command.token)
+        self.peripherals.tcp_offset = command.offset
+        self._reporter.set_tcp(command.offset)
+        self._io_changed = True
+        return Done()
+
+    def simulation_set_inputs(self, command: SimulationSetInputs) -> Reply:
+        """Put signals on inputs."""
+        self._authorize(command.token)
+        self.peripherals.set_inputs(command)
+        self._io_changed = True
         return Done()
 
     def power_on(self, command: c.PowerOn) -> Reply:
-        """Power the arm and release its brakes."""
+        """Power the arm, and release its brakes where that is wanted."""
         self._authorize(command.token)
-        self.motion.power_on()
+        self.motion.power_on(release_brakes=command.release_brakes)
         self._payload_monitor.reset()
         return Done()
 
@@ -308,20 +333,13 @@ class Controller:
     def set_shaper(self, command: c.SetShaper) -> Reply:
         """Choose the shaper."""
         self._authorize(command.token)
-        self.source, tvist = self._choose(command.name, self.source, command.modes, where="name")
-        self._use(tvist)
+        self.filters.use(self.filters.choose(command.name, self.declared, command.modes, "name"))
         return Done()
 
     def set_estimator(self, command: c.SetEstimator) -> Reply:
         """Choose the estimator."""
         self._authorize(command.token)
-        source, present = choose_source(command, self.setup), self.cycle.tvist
-        where = "f_d" if source.calibration is None else "calibration"
-        estimator = make_estimator(source, present.estimator.modes, self.declared, where)
-        tvist = choose_filter(present.name, estimator, self.setup.description.joints, where=where)
-        self.source = source
-        self._use(tvist)
-        self._warn_of_payload()
+        self.filters.estimate(command, self.declared)
         return Done()
 
     def set_payload(self, command: c.SetPayload) -> Reply:
@@ -331,12 +349,10 @@ class Controller:
         check_body(payload, rated=self.setup.description.limits.payload)
         self.declared = payload
         self.cycle.declare(body(payload))
-        if self.source.knows_payload:
-            present = self.cycle.tvist
-            self.cycle.use(present.with_estimator(self.source.estimator(present.estimator.modes, payload)))
+        self.filters.declare(payload)
         self.motion.collisions.carry(body(payload))
         self._payload_monitor.declare(body(payload))
-        self._warn_of_payload()
+        self._io_changed = True
         return Done()
 
     def simulation_reset(self, command: c.SimulationReset) -> Reply:
@@ -347,16 +363,13 @@ class Controller:
             check_joints(command.q, description)
         if command.payload is not None:
             check_body(command.payload, "payload")
-        tvist, source = None, self.source
-        if command.shaper is not None:
-            source, tvist = self._choose(command.shaper, source)
+        chosen = None if command.shaper is None else self.filters.choose(command.shaper, self.declared)
         self.motion.abandon("simulation.reset")
         self._faults.clear()
         q = self.cycle.position if command.q is None else np.array(command.q, dtype=float)
         carried = None if command.payload is None else body(command.payload)
-        if tvist is not None:
-            self.source = source
-            self._use(tvist)
+        if chosen is not None:
+            self.filters.use(chosen)
         if command.seed is not None:
             self._seed = command.seed
         self.cycle.reset(q, carried=carried, seed=self._seed)
@@ -390,31 +403,6 @@ class Controller:
     def _authorize(self, token: str) -> None:
         self.session.renew(token, self.now)
 
-    def _choose(
-        self, name: str, source: ModeSource, modes: int = 1, *, where: str = "shaper"
-    ) -> tuple[ModeSource, Filter]:
-        """A filter by its name, with the estimator that was chosen, or the arm's own modal one where it takes that."""
-        wanted = wanted_modes(name, modes, where)
-        if wanted > source.most and self._modal is not None:
-            source = self._modal
-        estimator = make_estimator(source, wanted, self.declared, "modes" if modes > 1 else where)
-        return source, choose_filter(name, estimator, self.setup.description.joints, where=where)
-
-    def _use(self, tvist: Filter) -> None:
-        self.cycle.use(tvist)
-        self._emit("shaper_changed", why=f"{tvist.name} with estimator {self.source.name}")
-
-    def _warn_of_payload(self) -> None:
-        calibration = self.source.calibration
-        if calibration is not None and not fits(calibration, self.declared, self.source.name):
-            self._emit(
-                "warning",
-                code="payload_mismatch",
-                why=f"calibration {calibration.name!r} was made with "
-                f"{calibration.payload.mass:g} kg; {self.declared.mass:g} kg is declared: "
-                "frequencies will be off",
-            )
-
 
 _HANDLERS: dict[type, Callable[[Controller, Any], Reply]] = {
     c.TakeControl: Controller.take_control,
@@ -437,4 +425,8 @@ _HANDLERS: dict[type, Callable[[Controller, Any], Reply]] = {
     c.PowerOff: Controller.power_off,
     c.UnlockProtectiveStop: Controller.unlock_protective_stop,
     c.SimulationInject: Controller.simulation_inject,
+    SetIo: Controller.set_io,
+    SetRegisters: Controller.set_registers,
+    SetTcp: Controller.set_tcp,
+    SimulationSetInputs: Controller.simulation_set_inputs,
 }

@@ -10,6 +10,7 @@ from typing import Protocol
 from tvist_protocol.codec import decode_command, decode_setpoint, encode, refusal
 from tvist_protocol.commands import Setpoint, SimulationStep
 from tvist_protocol.errors import ProtocolError
+from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry, entry_of
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.stream import Event, State, Truth
@@ -30,6 +31,9 @@ class Sink(Protocol):
 
     def truth(self, truth: Truth) -> None:
         """What no robot can know, where that is told."""
+
+    def io(self, io: Io) -> None:
+        """Inputs, outputs and registers, where they changed; it comes before the state of its tick."""
 
     def journal(self, entry: Entry) -> None:
         """What reached the controller before the tick of that number."""
@@ -94,6 +98,9 @@ class Host:
 
     def tick(self) -> None:
         """One control period."""
+        io = self.controller.changed_io()
+        if io is not None:
+            self._sink.io(io)
         state, events = self.controller.tick()
         for event in events:
             self._sink.event(event)

@@ -163,6 +163,11 @@ class MotionControl:
         return self._speed if self._trajectory is None else self._trajectory.rate
 
     @property
+    def wanted_speed(self) -> float:
+        """What the speed was set to [-]."""
+        return self._speed
+
+    @property
     def runtime(self) -> RuntimeState:
         """Whether something moves."""
         state = _RUNTIME.get(self.activity, RuntimeState.STOPPED)
@@ -196,13 +201,16 @@ class MotionControl:
         if reduced and self._stream is not None and self._stream.limits.velocity > self._reduced_velocity:
             self.stop(None, "speed was reduced", "limit_velocity")
 
-    def power_on(self) -> None:
+    def power_on(self, *, release_brakes: bool = True) -> None:
         """Power the arm and release its brakes.
+
+        Args:
+            release_brakes: False: leave the brakes of an arm without power.
 
         Raises:
             RefusalError: It moves, or is in a protective stop.
         """
-        self._go("power_on")
+        self._go("power_on" if release_brakes else "power")
 
     def power_off(self) -> None:
         """Stop what moves, then take the power; the brakes hold the arm where it is."""

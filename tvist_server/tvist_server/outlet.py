@@ -11,9 +11,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from tvist_protocol.codec import encode
+from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, State, Telemetry, Truth
-from tvist_server.gateways.base import Gateway, Reply, Topic
+from tvist_server.gateways.base import Gateway, Message, Reply, Topic
 
 log = logging.getLogger(__name__)
 
@@ -22,12 +23,12 @@ MAX_WAITING = 2048
 PAUSE = 0.02
 """How long the controller waits at most, where it does, before it looks for room again [s]."""
 
-Message = State | Event | Truth | Telemetry
 TOPICS: Mapping[type[Message], Topic] = {
     State: "state",
     Event: "event",
     Truth: "truth",
     Telemetry: "telemetry",
+    Io: "io",
 }
 
 
@@ -63,6 +64,7 @@ class Outlet:
         self._queue: deque[Message | tuple[Reply, bytes]] = deque()
         self._room = threading.Event()
         self._last: State | None = None
+        self._io: Io | None = None
         self.dropped = 0
         """Messages of a tick that found no room."""
 
@@ -112,13 +114,20 @@ class Outlet:
             self._recorder.truth(truth)
         self._offer(truth)
 
+    def io(self, io: Io) -> None:
+        """Queue inputs, outputs and registers."""
+        self._io = io
+        self._offer(io)
+
     def journal(self, entry: Entry) -> None:
         """Record what reached the controller."""
         if self._recorder is not None:
             self._recorder.journal(entry)
 
     def telemetry(self, telemetry: Telemetry) -> None:
-        """Queue the server's own figures."""
+        """Queue the server's own figures, and tell inputs, outputs and registers again."""
+        if self._io is not None:
+            self._put(self._io)
         self._put(telemetry)
 
     def reply(self, reply: Reply, data: bytes) -> None:
@@ -130,7 +139,7 @@ class Outlet:
         if self._last is not None:
             self._put(self._last)
 
-    def _offer(self, message: State | Truth) -> None:
+    def _offer(self, message: State | Truth | Io) -> None:
         """Queue a message of every tick, where there is room."""
         while self._lossless and len(self._queue) >= MAX_WAITING:
             self._room.clear()
@@ -151,7 +160,7 @@ class Outlet:
             return
         topic, data = TOPICS[type(item)], encode(item)
         for gateway in self._gateways:
-            gateway.publish(topic, data)
+            gateway.publish(topic, item, data)
 
 
 def _nobody() -> None:

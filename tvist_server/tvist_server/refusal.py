@@ -17,6 +17,7 @@ _NOTHING_TO = {
     "servo_stop": "no stream is running: send servo_start first",
     "unlock_protective_stop": "there is no protective stop to unlock",
     "power_on": "the arm has its power",
+    "power": "the arm has its power",
 }
 
 

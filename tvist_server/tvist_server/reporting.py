@@ -63,7 +63,12 @@ class Reporter:
             estimated_zeta=tvist.zeta.tolist(),
             shaper_delay=tvist.delay,
             missed_ticks=missed_ticks,
+            shaper_clipped=tvist.clipped,
         )
+
+    def set_tcp(self, offset: tuple[float, ...]) -> None:
+        """Say where the tool centre point is in the flange frame: x y z [m] and rotation vector [rad]."""
+        self._kinematics.set_tool(offset)
 
     def truth(self, tick: int, arm: Plant) -> Truth:
         """What no robot can know of itself after a tick; its modes are computed now and then."""

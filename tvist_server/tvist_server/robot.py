@@ -75,6 +75,11 @@ class ServedRobot:
         """A client's liveliness token is gone."""
         self.driven.post(lambda: self._host.client_gone(name))
 
+    def holder(self) -> str | None:
+        """Client that has control; None: nobody."""
+        lease = self.controller.session.lease
+        return None if lease is None else lease.client
+
     def _post_reply(self, reply: Reply, answer: Callable[[], bytes]) -> None:
         self.driven.post(lambda: self.outlet.reply(reply, answer()))
 

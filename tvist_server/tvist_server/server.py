@@ -14,10 +14,12 @@ from tvist_server.clock import Clock, Lockstep, Realtime
 from tvist_server.config import ConfigError, ServeConfig
 from tvist_server.courier import Courier
 from tvist_server.fleet import recording_of
-from tvist_server.gateways.exposure import ExposureError, guarded
+from tvist_server.gateways.exposure import ExposureError, guarded, guarded_doors
 from tvist_server.gateways.network import Network
+from tvist_server.gateways.ur.doors import UrDoors
 from tvist_server.robot import ServedRobot
 from tvist_server.setup import Setup
+from tvist_server.ur_ports import Door
 
 LEAVE = 0.6
 """How long clients may take at the end to read what waits for them [s]."""
@@ -47,6 +49,7 @@ class Server:
         except ExposureError as error:
             raise ConfigError(str(error)) from error
         self.robots: list[ServedRobot] = []
+        self._doors: list[UrDoors] = []
         self.left = True
         """After `close`: whether the network is left. Zenoh may still wait for a client that has stopped reading."""
         try:
@@ -61,9 +64,13 @@ class Server:
             ]
             # In real time the clock sees to it that messages are handed on; in lockstep each message does.
             for number, robot in enumerate(self.robots):
+                if config.ur:
+                    self._doors.append(_doors(robot, config, number))
                 wake = self._couriers[number].wake if lockstep else None
-                robot.outlet.open([self._gateways[number]], wake)
+                robot.outlet.open([self._gateways[number], *self._doors[number : number + 1]], wake)
         except BaseException:  # a signal, too
+            for doors in self._doors:
+                doors.close()
             for robot in self.robots:
                 robot.discard_recording()
             raise
@@ -99,6 +106,8 @@ class Server:
         """Leave the network. A client that has stopped reading can hold this up for ten seconds."""
         for courier in self._couriers:
             courier.close()
+        for doors in self._doors:
+            doors.close()
         with contextlib.suppress(Exception):
             self._network.close()
 
@@ -111,13 +120,22 @@ class Server:
         ended = _on_signals(asyncio.get_running_loop())
         self.start()
         try:
+            for doors in self._doors:
+                await doors.open()
             ready()
             while not ended.is_set() and self.failure is None:
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(ended.wait(), 1.0)
                 self._tell_telemetry()
         finally:
+            for doors in self._doors:
+                await doors.shut()
             self.close()
+
+    @property
+    def ur(self) -> list[tuple[str, dict[Door, int]]]:
+        """Address and ports of each robot's UR interfaces; none where they are not open."""
+        return [(doors.address, doors.ports) for doors in self._doors]
 
     @property
     def failure(self) -> str | None:
@@ -156,6 +174,17 @@ def _robot(setup: Setup, config: ServeConfig, *, several: bool) -> ServedRobot:
         return ServedRobot(setup, path, Path(config.dump))
     except ValueError as error:
         raise ConfigError(str(error)) from error
+
+
+def _doors(robot: ServedRobot, config: ServeConfig, number: int) -> UrDoors:
+    address, ports = config.doors(number)
+    try:
+        guarded_doors(address, insecure=config.insecure)
+    except ExposureError as error:
+        raise ConfigError(str(error)) from error
+    return UrDoors(
+        robot, robot.setup.description, robot.setup.name, address, ports, lockstep=config.clock != "realtime"
+    )
 
 
 def _drivers(config: ServeConfig, robots: Sequence[ServedRobot]) -> tuple[list[Courier], list[Clock]]:

@@ -6,7 +6,7 @@ from typing import Literal
 
 from tvist_client.errors import NotConnectedError
 
-Topic = Literal["state", "event", "truth", "telemetry"]
+Topic = Literal["state", "event", "truth", "telemetry", "io"]
 """What a robot puts without being asked."""
 
 

@@ -25,6 +25,7 @@ KEYS: Mapping[Topic, Callable[[str], str]] = {
     "event": keys.event,
     "truth": keys.truth,
     "telemetry": keys.telemetry,
+    "io": keys.io,
 }
 FIND_S = 1.0
 """How long a robot may take to show itself once there is a link [s]; it takes some milliseconds."""

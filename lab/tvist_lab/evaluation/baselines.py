@@ -1,5 +1,6 @@
 """What any shaper has to be compared with: waiting (the unshaped motion), and these."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +15,12 @@ from tvist_plant.description import RobotDescription
 from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.filter import TvistFilter
+from tvist_shaping.taps import mean_delay
 
 CONFIGURATIONS = 150
 """Over which the range of the lowest mode is looked for."""
+SEARCHED = 2000
+"""Over which the longest mean delay is looked for: what exceeds it would exceed the limits of a motion, too."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,10 @@ class Baseline:
         if f_d is None or zeta is None:
             there = recipe.estimator(description, move.mass, 1).estimate(target)
             f_d, zeta = float(there[0][0]), float(there[1][0])
-        tvist = TvistFilter(shaper(self.shaper), Fixed([f_d], [zeta]), joints=len(start))
+        made = shaper(self.shaper)
+        # However low a wrong estimate is.
+        longest = max(1.0, 1.01 * made.duration_periods / f_d)
+        tvist = TvistFilter(made, Fixed([f_d], [zeta]), joints=len(start), max_delay=longest)
         tvist.reset(start)
         return shape(tvist.filter, reference)[0]
 
@@ -85,11 +92,34 @@ def workspace_range(
     recipe: Recipe, description: RobotDescription, masses: tuple[float, float]
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Least and largest damped frequency [Hz] and damping ratio [-] of the lowest mode, as estimated."""
-    found = []
-    for mass in sorted(set(masses)):
-        estimator = recipe.estimator(description, mass, 1)
-        for q in WORKSPACE.spread(CONFIGURATIONS, description.joints, seed=0):
-            f_d, zeta = estimator.estimate(q)
-            found.append((float(f_d[0]), float(zeta[0])))
+    found = [
+        (f_d[0], zeta[0]) for f_d, zeta in _over_workspace(recipe, description, masses, 1, CONFIGURATIONS)
+    ]
     low, high = np.min(found, axis=0), np.max(found, axis=0)
     return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
+
+
+def longest_mean_delay(
+    recipe: Recipe, description: RobotDescription, masses: tuple[float, float], modes: int
+) -> float:
+    """Of the product of the modes' zero-vibration shapers, anywhere in the workspace and with any payload [s].
+
+    Args:
+        recipe: Says where estimates come from.
+        description: The robot.
+        masses: Least and largest payload [kg].
+        modes: Whose shapers they are.
+    """
+    return max(
+        mean_delay(f_d, zeta) for f_d, zeta in _over_workspace(recipe, description, masses, modes, SEARCHED)
+    )
+
+
+def _over_workspace(
+    recipe: Recipe, description: RobotDescription, masses: tuple[float, float], modes: int, count: int
+) -> Iterator[tuple[Floats, Floats]]:
+    """Damped frequencies [Hz] and damping ratios [-] of the lowest modes, with the least payload and the largest."""
+    for mass in sorted(set(masses)):
+        estimator = recipe.estimator(description, mass, modes)
+        for q in WORKSPACE.spread(count, description.joints, seed=0):
+            yield estimator.estimate(q)

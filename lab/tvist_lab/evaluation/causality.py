@@ -1,10 +1,15 @@
-"""Does a shaper know what is to come? Two references that differ only after a tick must give equal outputs up to it."""
+"""Does a shaper know what is to come? Two references that differ only after a tick must give equal outputs up to it.
+
+A candidate that is told the target of a move beforehand is told the same one with every reference: it may know where
+the move was to end, and must know no more of the way there than the others.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 
-from tvist_lab.evaluation.candidates import Candidate, ShaperFaultError, Stepper, Task
+from tvist_lab.evaluation.candidates import Candidate, Task
+from tvist_lab.evaluation.running import ShaperFaultError, Stepper
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
 
@@ -29,7 +34,7 @@ def check_causal(candidate: Candidate, task: Task) -> None:
     for place in PLACES:
         tick = int(place * len(task.reference))
         for sign in (1.0, -1.0):
-            other = _outputs(candidate, _elsewhere(task, tick, sign))
+            other = _outputs(candidate, _elsewhere(candidate, task, tick, sign))
             assert other is not None
             apart = np.flatnonzero((first[: tick + 1] != other[: tick + 1]).any(axis=1))
             if apart.size:
@@ -48,9 +53,10 @@ def _outputs(candidate: Candidate, task: Task) -> Floats | None:
     return None if stepper is None else np.array([stepper.step(sample) for sample in task.reference])
 
 
-def _elsewhere(task: Task, tick: int, sign: float) -> Task:
-    """The same up to a tick, then off on a parabola; nothing else tells of the first target either."""
+def _elsewhere(candidate: Candidate, task: Task, tick: int, sign: float) -> Task:
+    """The same up to a tick, then off on a parabola; only a candidate that is told the target has the first one."""
     reference = task.reference.copy()
     late = PERIOD * np.arange(1, len(reference) - tick)
     reference[tick + 1 :] += sign * 0.5 * ELSEWHERE * late[:, None] ** 2
-    return replace(task, reference=reference, move=replace(task.move, target=tuple(reference[-1].tolist())))
+    told = task.move.target if candidate.told_target else tuple(reference[-1].tolist())
+    return replace(task, reference=reference, move=replace(task.move, target=told))

@@ -28,6 +28,8 @@ WORTH = 0.2
 """An unshaped peak below this is no vibration to reduce: the move is listed, but not in the percentages [m/s²]."""
 RESAMPLED = 2000
 """Bootstrap samples of an interval."""
+AT_ONCE = 8
+"""Motions that a process makes before it answers, and twice as many are too few to start another."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,11 @@ class Job:
     """To be run beside it."""
     seed: int = 0
     """Of gear errors."""
+
+    @property
+    def motions(self) -> int:
+        """How many it takes: unshaped, shaped, and one a baseline."""
+        return 2 + len(self.baselines)
 
 
 @dataclass(frozen=True)
@@ -99,7 +106,8 @@ def judge(job: Job) -> Judged:
 
 def evaluate(jobs: Sequence[Job]) -> Iterator[Judged]:
     """All jobs in order, each as soon as it is done, on all cores."""
-    return spread(judge, jobs)
+    motions = max((job.motions for job in jobs), default=1)
+    return spread(judge, jobs, few=2 * AT_ONCE // motions, chunk=max(AT_ONCE // motions, 1))
 
 
 def measured(recording: Recording) -> Made:
@@ -200,6 +208,9 @@ def _summary(pairs: list[tuple[Judged, Made]]) -> dict[str, Any]:
         if made.still_after is not None
     ]
     return {
+        "peak_m_s2": _of(
+            np.array([made.peak for one, made in pairs if one.counts]), median=50, p95=95, max=100
+        ),
         "reduction_percent": _of(reductions, median=50, p5=5, min=0),
         "reduction_percent_interval": {
             name: interval(reductions, share) for name, share in (("median", 50), ("p5", 5))

@@ -43,8 +43,7 @@ seed {
     }
 
 Bold: it keeps the limits, and no other that does is better in both *still* and *ring*. All are medians over moves,
-arms and payload errors, but the peaks and *bend*, which are the largest. `zv_frozen_at_end` and the double S have to
-know the target in advance: they are nothing for a stream.
+arms and payload errors, but the peaks and *bend*, which are the largest.{_told(ranked)}
 
 ![Time until still against what rings](../images/pareto.png)
 
@@ -82,6 +81,18 @@ What rings in m/s², median.
 |---|---|
 {chr(10).join(f"| {name} | {label} |" for name, label in result["arms"].items())}
 """
+
+
+def _told(ranked: Sequence[dict[str, Any]]) -> str:
+    """A sentence on those that know the target of a move."""
+    names = [f"`{row['name']}`" for row in ranked if row["told_target"]]
+    if not names:
+        return ""
+    return f"""
+
+Told before each move begins where it will end, and checked for causality given that: {", ".join(names)}. In a stream,
+where nobody knows the end, the double S and what is frozen are not to be had, and `auto-target` goes by where the arm
+is, as `auto` does."""
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -29,6 +29,9 @@ class Mistaken(Estimator):
     def __init__(self, right: Estimator, error: float) -> None:
         self._right, self._factor = right, 1.0 + error
 
+    def __repr__(self) -> str:
+        return f"{self._right!r} with frequencies times {self._factor:g}"
+
     @property
     def modes(self) -> int:
         """As many as the other's."""
@@ -47,6 +50,7 @@ class Mistaken(Estimator):
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
         """Modes at a configuration; see `Estimator.estimate`."""
         f_d, zeta = self._right.estimate(q)
+        self.clipped = self._right.clipped
         return self._factor * f_d, zeta
 
 

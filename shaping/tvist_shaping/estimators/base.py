@@ -6,7 +6,14 @@ from tvist_shaping._types import Floats
 
 
 class Estimator(ABC):
-    """Damped frequency and damping ratio of each mode as functions of q, sec. 3.3 of the paper."""
+    """Damped frequency and damping ratio of each mode as functions of q, sec. 3.3 of the paper.
+
+    Attributes:
+        clipped: Whether a mode of the last estimate was beyond `f_d_min` or `zeta_max`, and held there: then the arm
+            has another one. An estimator whose bounds are those of its modes never is.
+    """
+
+    clipped: bool = False
 
     @property
     @abstractmethod

@@ -292,7 +292,6 @@ class Modal(Estimator):
     """
 
     drivetrain: Drivetrain
-    clipped: bool
 
     def __init__(
         self,

@@ -2,7 +2,9 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import err, number, out, print_json, progress, say, table
@@ -31,15 +33,18 @@ def evaluate(
     seed: int = 0,
     wrists: bool = False,
     clean: bool = False,
+    disturbances: str | None = None,
     frequency_error: float = 0.0,
-    baselines: bool = False,
+    baselines: Annotated[bool, Parameter(negative="--no-baselines")] = True,
     save_moves: Path | None = None,
     figures: Path | None = None,
     json: bool = False,
 ) -> None:
     """Make moves unshaped and shaped, as fast as they compute, and say what shaping does to the vibration after them.
 
-    The moves come from a file or are drawn at random. The controller knows the payload.
+    The moves come from a file or are drawn at random. The controller knows the payload. Beside the shaper stands what
+    it has to be compared with: waiting, a slower motion of the same duration, ZV frozen at the target, and fixed MZV,
+    EI2 and EI3 for the whole workspace.
 
     Args:
         moves: JSON file: a list of maps with start and target, an angle a joint, and payload in kg if one has its own.
@@ -47,15 +52,17 @@ def evaluate(
             of collision.
         payload: Mass of the paper's disc in kg, carried and declared; uniform: another one for each move, 0 to what the
             arm is rated for [5].
-        shaper: Name of a shaper, or of a filter for several modes: auto, short.
+        shaper: Name of a shaper, or of a filter for several modes: auto, short, or auto-target, which is told the
+            target of each move.
         modes: That a shaper of the catalogue acts on; more than one takes a modal calibration.
         calibration: Calibration that comes with the package, or path of one.
         robot: Robot that comes with the package, or path of a robot file.
         seed: Of random moves, payloads and gear errors.
         wrists: Let random moves turn the two outer joints of the wrist.
         clean: Without nonlinear friction, gear errors and noise.
+        disturbances: Which of these there are, with commas between: friction, gear, noise, or none [all].
         frequency_error: Percent by which every frequency is taken too high.
-        baselines: Run what a shaper has to be compared with, too: six times the work.
+        baselines: Run what the shaper has to be compared with, too: three and a half times the work.
         save_moves: File for the moves with their payloads.
         figures: Folder for figures.
         json: Print one JSON object.
@@ -70,7 +77,7 @@ def evaluate(
     masses = _masses(payload, description)
     known = _calibration(calibration, shaper, modes, description)
     chosen, share = _moves(moves, random, seed, masses, description, wrists=wrists)
-    plant = description.clean() if clean else description
+    plant, kept = _disturbed(description, disturbances, clean=clean)
     recipe, others = _recipe(shaper, modes, known, plant, frequency_error, masses, baselines=baselines)
     jobs = [
         Job(plant, move, recipe, others, seed=_arm_seed(seed, place)) for place, move in enumerate(chosen)
@@ -81,10 +88,10 @@ def evaluate(
             from tvist_lab.evaluation.moves import write_moves
 
             write_moves(save_moves, chosen)
-        with progress(len(jobs), "moves") as bar:
-            for one in run(jobs):
+        with progress(sum(job.motions for job in jobs), "motions") as bar:
+            for job, one in zip(jobs, run(jobs), strict=True):
                 judged.append(one)
-                bar(1, None)
+                bar(job.motions, None)
         if figures is not None:
             _draw(jobs, judged, figures)
     from tvist_lab.evaluation.moves import collisions
@@ -93,12 +100,15 @@ def evaluate(
     result = {
         "shaper": shaper,
         "calibration": None if known is None else known.name,
-        "plant": "clean" if clean else "as described",
+        "plant": _named(kept),
+        "disturbances": list(kept),
         "seed": seed,
         "free_of_collision": share,
         **report(jobs, judged),
     }
     result["notes"] = _notes(result, met, known, chosen, share)
+    if baselines and not others:
+        result["notes"].append("no baselines: they take a calibration of this arm")
     if json:
         print_json(result)
     else:
@@ -116,6 +126,30 @@ def _check(moves: Path | None, random: int | None, seed: int, modes: int, freque
         raise Failure(f"modes is {modes}: must be 1 to 6", code=2)
     if not -90.0 <= frequency_error <= 900.0:
         raise Failure(f"frequency-error is {frequency_error:g} %: must be -90 to 900 %", code=2)
+
+
+def _disturbed(
+    description: "RobotDescription", wanted: str | None, *, clean: bool
+) -> tuple["RobotDescription", tuple[str, ...]]:
+    """The arm with the disturbances that are wanted, and their names."""
+    from tvist_plant.description import DISTURBANCES, DescriptionError
+
+    if clean and wanted is not None:
+        raise Failure("give either --clean or --disturbances", code=2)
+    if wanted is None:
+        wanted = "none" if clean else ",".join(DISTURBANCES)
+    names = [] if wanted == "none" else [name.strip() for name in wanted.split(",")]
+    with told(DescriptionError, code=2):
+        return description.disturbed_by(names), tuple(name for name in DISTURBANCES if name in names)
+
+
+def _named(kept: tuple[str, ...]) -> str:
+    """What the arm is called that has these disturbances."""
+    from tvist_plant.description import DISTURBANCES
+
+    if kept == DISTURBANCES:
+        return "as described"
+    return f"with {' and '.join(kept)} alone" if kept else "clean"
 
 
 def _masses(payload: str | None, description: "RobotDescription") -> tuple[float, float]:
@@ -196,7 +230,8 @@ def _recipe(
     recipe = Recipe(shaper, known, 0.01 * frequency_error, modes)
     with told(RecipeError, RefusalError, ShapingError, code=2):
         recipe.make(description, masses[1])
-        return recipe, every(recipe, description, masses) if baselines else ()
+        # Where nothing is known of an arm, there is nothing to design a baseline for.
+        return recipe, every(recipe, description, masses) if baselines and known is not None else ()
 
 
 def _arm_seed(seed: int, place: int) -> int:
@@ -293,6 +328,10 @@ def _print(result: dict[str, Any]) -> None:
         out.print(
             f"95 % intervals (bootstrap): median {median[0]:.1f} to {median[1]:.1f} %, p5 {p5[0]:.1f} to {p5[1]:.1f} %"
         )
+    peaks = [(name, way["peak_m_s2"]) for name, way in list(ways.items())[:2]]
+    if median is not None:
+        said = (f"{name} {number(peak['median'])} (p95 {number(peak['p95'])})" for name, peak in peaks)
+        out.print(f"peaks in m/s², median: {', '.join(said)}")
     out.print("¹ last time |α| exceeds 0.1 m/s², median, from the stop of the unshaped reference")
     for note in result["notes"]:
         say(note)

@@ -35,6 +35,10 @@ def serve(
     record: str | None = None,
     dump: str | None = None,
     truth: bool = False,
+    quiet: bool = False,
+    ur: bool = False,
+    ur_address: str | None = None,
+    ur_port: list[str] | None = None,
     config: str | None = None,
 ) -> None:
     """Run a robot on the network, or several, until Control+C.
@@ -58,6 +62,11 @@ def serve(
         record: MCAP file to record into; of several robots each has its own, FILE-NAME.mcap.
         dump: Folder for the last second before the simulated arm failed [the system's for temporary files].
         truth: Tell what no robot can know, on tvist/NAME/truth and in the recording.
+        quiet: Sensors without noise and angles in an encoder's steps, for clients that wait until nothing changes.
+        ur: Open UR's own interfaces, too: RTDE, real-time client, dashboard, primary and secondary.
+        ur_address: IP address they listen at; of several robots each has the next one [127.0.0.1].
+        ur_port: Move one, repeatable: rtde=31004; dashboard=off keeps it shut. Others: primary, secondary, realtime,
+            and primary_read_only, secondary_read_only, realtime_read_only.
         config: TOML file with any of these; the command line goes before it.
     """
     given: dict[str, Any] = {
@@ -65,7 +74,9 @@ def serve(
         "insecure": insecure or None, "payload": payload, "shaper": shaper,
         "calibration": calibration, "clock": clock, "speed": speed,
         "realtime_priority": realtime_priority or None, "start": start, "state": state, "seed": seed,
-        "record": record, "dump": dump, "truth": truth or None,
+        "record": record, "dump": dump, "truth": truth or None, "quiet": quiet or None,
+        "ur": (ur or ur_address is not None or ur_port is not None) or None, "ur_address": ur_address,
+        "ur_ports": None if ur_port is None else dict(map(_ur_port, ur_port)),
     }  # fmt: skip
     began = time.monotonic()
     from tvist_plant.plant import is_compiled
@@ -93,6 +104,9 @@ def serve(
             f"clock {checked.clock}; ready after {took:.1f} s. Control+C ends it."
         )
 
+    for address, ports in server.ur:
+        listed = ", ".join(f"{door} {port}" for door, port in ports.items())
+        say(f"UR's interfaces are open on {address}: {listed}")
     whom = "this robot" if len(server.robots) == 1 else "these robots"
     for endpoint in checked.listen if checked.insecure else ():
         say(f"anybody who reaches {endpoint} can move {whom}")
@@ -110,6 +124,14 @@ def serve(
     if not server.left:
         # Zenoh would wait for ten seconds, for a client that has stopped reading. All that is ours is closed.
         os._exit(0)
+
+
+def _ur_port(text: str) -> tuple[str, int]:
+    """Door and port of DOOR=PORT; whether there is such a door the configuration says."""
+    door, equals, port = text.partition("=")
+    if not equals or not (port == "off" or (port.isascii() and port.isdigit() and len(port) < 9)):
+        raise Failure(f"ur-port is {text!r}: must be DOOR=PORT such as rtde=31004, or DOOR=off", code=2)
+    return door, 0 if port == "off" else int(port)
 
 
 def _introduction(setups: Sequence["Setup"]) -> str:

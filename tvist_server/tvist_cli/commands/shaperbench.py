@@ -49,6 +49,7 @@ def shaperbench(
         markdown: File for a page with the tables.
         json: Print one JSON object.
     """
+    from tvist_lab.evaluation import curves, leaderboard
     from tvist_lab.evaluation import shaperbench as bench
     from tvist_lab.evaluation.arms import ARMS
     from tvist_plant.description import load
@@ -66,7 +67,7 @@ def shaperbench(
     sound = [one for one, fault in zip(standing, faults, strict=True) if fault is None]
     jobs, bends = (
         bench.jobs(description, sound, drawn, seed, quick=quick),
-        bench.bends(description, sound, drawn),
+        curves.bends(description, sound, drawn),
     )
     done, bent = [], []
     with progress(len(jobs) + len(bends), "motions") as bar:
@@ -74,7 +75,7 @@ def shaperbench(
             done.append(scores)
             bar(1, None)
         for path in bends:
-            bent.append((path, bench.bend(path)))
+            bent.append((path, curves.bend(path)))
             bar(1, None)
     result = {
         "command": _command(shaper, against, count, seed, calibration, quick=quick),
@@ -83,7 +84,7 @@ def shaperbench(
         "payload_errors": list(bench.PAYLOAD_ERRORS),
         "arms": {arm.name: arm.label for arm in ARMS},
         "calibration": known.name,
-        **bench.leaderboard(standing, faults, jobs, done, bent),
+        **leaderboard.leaderboard(standing, faults, jobs, done, bent),
     }
     _write(result, output, figures, markdown)
     if json:
@@ -114,9 +115,9 @@ def _calibration(name: str | None) -> "Calibration":
 
 
 def _candidates(shaper: Path | None, against: list[str] | None, known: "Calibration") -> "list[Candidate]":
-    from tvist_lab.evaluation.candidates import CandidateError, load_shaper
+    from tvist_lab.evaluation.foreign import CandidateError, load_shaper
     from tvist_lab.evaluation.recipes import RecipeError
-    from tvist_lab.evaluation.shaperbench import candidates
+    from tvist_lab.evaluation.standing import candidates
     from tvist_plant.description import load
 
     with told(CandidateError, RecipeError, code=2):
@@ -180,6 +181,9 @@ def _print(result: dict[str, Any]) -> None:
         "peaks are the largest; bend: distance from a path round a corner; µs: of a tick with its estimates, here.",
         markup=False,
     )
+    told = [row["name"] for row in result["shapers"] if row["ranked"] and row["told_target"]]
+    if told:
+        say(f"told before each move where it will end: {', '.join(told)}")
     for row in result["shapers"]:
         if not row["ranked"]:
             say(f"{row['name']} ({row['label']}) is not ranked: it {row['fault']}")

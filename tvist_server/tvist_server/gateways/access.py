@@ -14,7 +14,7 @@ from tvist_protocol import keys
 Role = Literal["operator", "viewer"]
 """An operator moves the robot and sees what it does; a viewer sees."""
 
-ROBOT_PUTS = (keys.state, keys.event, keys.telemetry, keys.truth)
+ROBOT_PUTS = (keys.state, keys.event, keys.telemetry, keys.truth, keys.io)
 """Topics everybody with a role may read, and nobody but the robot may put."""
 
 

@@ -4,8 +4,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Literal, Protocol
 
-Topic = Literal["state", "event", "truth", "telemetry"]
+from tvist_protocol.io import Io
+from tvist_protocol.stream import Event, State, Telemetry, Truth
+
+Topic = Literal["state", "event", "truth", "telemetry", "io"]
 """What is put without being asked for."""
+Message = State | Event | Truth | Telemetry | Io
 Reply = Callable[[bytes], None]
 """Takes the encoded answer, once, from any thread."""
 
@@ -32,6 +36,9 @@ class Desk(Protocol):
     def client_gone(self, name: str) -> None:
         """Note that a client's liveliness token is gone."""
 
+    def holder(self) -> str | None:
+        """Client that has control; None: nobody."""
+
 
 class Gateway(ABC):
     """One way in and out."""
@@ -40,8 +47,8 @@ class Gateway(ABC):
     """Set-points that never reached the desk: put on a key with a wildcard, or too large."""
 
     @abstractmethod
-    def publish(self, topic: Topic, payload: bytes) -> None:
-        """Put an encoded message. Called from one thread; raises nothing for the network's sake."""
+    def publish(self, topic: Topic, message: Message, payload: bytes) -> None:
+        """Put a message, which is there encoded, too. Called from one thread; raises nothing for the network's sake."""
 
     @abstractmethod
     def close(self) -> None:

@@ -11,6 +11,7 @@ Both sides show a certificate (mutual TLS); the common name of the client's deci
 """
 
 import contextlib
+import ipaddress
 import ssl
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -71,6 +72,23 @@ def guarded(
             "`tvist keys`) and listen on tls/…, or --insecure to let anybody there move the robot"
         )
     return list(listen), dict(LIMITS) if exposed else {}
+
+
+def guarded_doors(address: str, *, insecure: bool) -> None:
+    """Refuse to open UR's interfaces, which know no certificates, where others reach them unasked.
+
+    Args:
+        address: IP address they listen at.
+        insecure: Whether anybody may do anything.
+
+    Raises:
+        ExposureError: Others could.
+    """
+    if not insecure and not ipaddress.ip_address(address).is_loopback:
+        raise ExposureError(
+            f"ur_address is {address}, which others than this machine can reach, and UR's interfaces ask nobody who "
+            "he is: add --insecure to let anybody there move the robot"
+        )
 
 
 def roles_in(folder: Path) -> dict[str, Role]:

@@ -4,13 +4,14 @@ from collections.abc import Callable
 from typing import Literal
 
 from tvist_protocol.codec import encode
+from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.controller import Controller
 from tvist_server.host import Host
 from tvist_server.setup import Setup
 
-Topic = Literal["state", "event", "truth", "telemetry"]
+Topic = Literal["state", "event", "truth", "telemetry", "io"]
 
 
 class LoopbackHost:
@@ -57,11 +58,15 @@ class LoopbackHost:
         """Hand on what no robot can know."""
         self._put("truth", truth)
 
+    def io(self, io: Io) -> None:
+        """Hand on inputs, outputs and registers."""
+        self._put("io", io)
+
     def journal(self, entry: Entry) -> None:
         """Keep an entry."""
         self.entries.append(entry)
 
-    def _put(self, topic: Topic, message: State | Event | Truth) -> None:
+    def _put(self, topic: Topic, message: State | Event | Truth | Io) -> None:
         callbacks = self._callbacks.get(topic)
         if callbacks:
             data = encode(message)

@@ -14,7 +14,7 @@ from zenoh.handlers import Callback
 from tvist_protocol import keys
 from tvist_protocol.codec import MAX_BYTES, encode
 from tvist_protocol.replies import Refused
-from tvist_server.gateways.base import Desk, Gateway, Reply, Topic
+from tvist_server.gateways.base import Desk, Gateway, Message, Reply, Topic
 from tvist_server.gateways.replies import ENCODING, Answers
 
 
@@ -58,7 +58,7 @@ class ZenohGateway(Gateway):
         # Last, since it says that everything else is there.
         self._alive = session.liveliness().declare_token(keys.alive(robot))
 
-    def publish(self, topic: Topic, payload: bytes) -> None:
+    def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  it is encoded
         """Put an encoded message; one of a topic that is not served goes nowhere."""
         publisher = self._publishers.get(topic)
         if publisher is not None and not self._closed:
@@ -156,6 +156,7 @@ def _publishers(
         "state": declare(keys.state(robot), every_tick),
         "event": declare(keys.event(robot), event),
         "telemetry": declare(keys.telemetry(robot), zenoh.Priority.DATA),
+        "io": declare(keys.io(robot), event),
     }
     if truth:
         publishers["truth"] = declare(keys.truth(robot), every_tick)

@@ -1,0 +1,74 @@
+"""Curved paths: how far a shaper leaves the way it was asked to go."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tvist_lab.evaluation.candidates import Candidate, Longer, Task
+from tvist_lab.evaluation.line import round_a_corner
+from tvist_lab.evaluation.moves import Move
+from tvist_lab.evaluation.running import ShaperFaultError
+from tvist_lab.recordings import Floats
+from tvist_plant.description import RobotDescription
+
+CORNERS = 5
+"""Curved paths."""
+
+
+@dataclass(frozen=True)
+class Bend:
+    """A curved path by one candidate."""
+
+    description: RobotDescription
+    candidate: Candidate
+    corner: tuple[Move, Move]
+    """The second goes on where the first ends."""
+
+
+def bends(
+    description: RobotDescription, candidates: Sequence[Candidate], moves: Sequence[Move]
+) -> list[Bend]:
+    """Every candidate that shapes references, on each of a few moves that go on to where the next one starts."""
+    paths = [
+        (first, replace(second, start=first.target, target=second.start, mass=first.mass))
+        for first, second in zip(moves[:CORNERS], [*moves[1:], moves[0]], strict=False)
+    ]
+    return [
+        Bend(description, candidate, path)
+        for candidate in candidates
+        if not isinstance(candidate, Longer)
+        for path in paths
+    ]
+
+
+def bend(job: Bend) -> float | None:
+    """How far a candidate leaves a curved path [rad]; None where it cannot be ranked."""
+    first, second = job.corner
+    start, corner, target = (np.array(q) for q in (first.start, first.target, second.target))
+    reference = round_a_corner(start, corner, target)
+    whole = Move(first.start, second.target, first.mass)
+    try:
+        return path_error(reference, job.candidate.shaped(Task(job.description, whole, reference)).q)
+    except ShaperFaultError:
+        return None
+
+
+def path_error(path: Floats, q: Floats) -> float:
+    """Largest distance of points from a path in joint space, whatever the time [rad].
+
+    Args:
+        path: Its corners, shape (T, n) [rad].
+        q: Points, shape (T', n) [rad].
+    """
+    start, way = path[:-1], np.diff(path, axis=0)
+    moving = np.linalg.norm(way, axis=1) > 0.0
+    start, way = start[moving], way[moving]
+    square = np.sum(way**2, axis=1)
+    largest = 0.0
+    for point in q[::4]:
+        share = np.clip(np.sum((point - start) * way, axis=1) / square, 0.0, 1.0)
+        nearest = np.min(np.sum((start + share[:, None] * way - point) ** 2, axis=1))
+        largest = max(largest, float(nearest))
+    return math.sqrt(largest)

@@ -1,0 +1,139 @@
+"""The bench's leaderboard: rows from scores."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tvist_lab.evaluation.arms import ARMS
+from tvist_lab.evaluation.candidates import Candidate
+from tvist_lab.evaluation.curves import Bend
+from tvist_lab.evaluation.evaluate import WORTH
+from tvist_lab.evaluation.moves import Move
+from tvist_lab.evaluation.shaperbench import PAYLOAD_ERRORS, Job, Score, Scores
+from tvist_lab.recordings import Floats
+
+KEPT = 1.003
+"""A peak below this times its limit keeps it [-]."""
+
+
+def leaderboard(
+    candidates: Sequence[Candidate],
+    faults: Sequence[str | None],
+    jobs: Sequence[Job],
+    done: Sequence[Scores],
+    bent: Sequence[tuple[Bend, float | None]],
+) -> dict[str, Any]:
+    """Rows, the earliest still first; those that cannot be ranked at the end.
+
+    Args:
+        candidates: The first is waiting.
+        faults: One a candidate, of `inspect`.
+        jobs: Of those without a fault.
+        done: What came of them.
+        bent: Curved paths and what came of them.
+    """
+    by_candidate: dict[str, list[tuple[Job, Scores]]] = {one.name: [] for one in candidates}
+    for job, scores in zip(jobs, done, strict=True):
+        by_candidate[job.candidate.name].append((job, scores))
+    basis = {
+        (job.move, score.error, score.arm): score
+        for job, scores in by_candidate[candidates[0].name]
+        for score in scores.scores
+    }
+    rows = []
+    for candidate, known in zip(candidates, faults, strict=True):
+        mine = by_candidate[candidate.name]
+        fault = known or next(
+            (
+                f"{scores.fault} (payload error {100 * job.error:+.0f} %)"
+                for job, scores in mine
+                if scores.fault
+            ),
+            None,
+        )
+        row: dict[str, Any] = {
+            "name": candidate.name,
+            "label": candidate.label,
+            "told_target": candidate.told_target,
+            "ranked": fault is None,
+        }
+        if fault is not None:
+            rows.append(row | {"fault": fault})
+            continue
+        errors = [error for job, error in bent if job.candidate is candidate and error is not None]
+        rows.append(row | _row(mine, basis, errors))
+    ranked = sorted((row for row in rows if row["ranked"]), key=_place)
+    for place, row in enumerate(ranked, 1):
+        row["place"] = place
+        row["pareto"] = row["keeps_limits"] and not any(
+            _beats(other, row) for other in ranked if other["keeps_limits"]
+        )
+    return {"shapers": [*ranked, *(row for row in rows if not row["ranked"])]}
+
+
+def _place(row: dict[str, Any]) -> tuple[float, float]:
+    """Settling, then residual; what is never still comes last."""
+    still = row["time_until_still_ms"]["median"]
+    return (math.inf if still is None else still, row["residual_m_s2"]["median"])
+
+
+def _beats(other: dict[str, Any], row: dict[str, Any]) -> bool:
+    """Whether another is better in settling or residual and worse in neither."""
+    ours, theirs = _place(row), _place(other)
+    return theirs != ours and theirs[0] <= ours[0] and theirs[1] <= ours[1]
+
+
+def _row(
+    mine: list[tuple[Job, Scores]], basis: dict[tuple[Move, float, int], Score], bent: list[float]
+) -> dict[str, Any]:
+    pairs = [
+        (score, basis[job.move, score.error, score.arm]) for job, scores in mine for score in scores.scores
+    ]
+    costs = [scores.cost for _, scores in mine if scores.cost is not None]
+    accelerations = [scores.acceleration for _, scores in mine]
+    velocities = [scores.velocity for _, scores in mine]
+    delays = [1e3 * scores.delay for _, scores in mine]
+    return {
+        **_summary(pairs),
+        "delay_ms": {"median": round(float(np.median(delays)), 6), "max": round(max(delays), 6)},
+        "peak_acceleration_ratio": {"median": float(np.median(accelerations)), "max": max(accelerations)},
+        "peak_velocity_ratio": {"median": float(np.median(velocities)), "max": max(velocities)},
+        "keeps_limits": max(*accelerations, *velocities) <= KEPT,
+        "path_error_mrad": 1e3 * max(bent) if bent else None,
+        "cost_us": 1e6 * float(np.median(costs)) if costs else None,
+        "by_arm": {
+            arm.name: _summary([pair for pair in pairs if pair[0].arm == number])
+            for number, arm in enumerate(ARMS)
+            if any(pair[0].arm == number for pair in pairs)
+        },
+        "by_payload_error": {
+            f"{100 * error:+.0f} %": _summary([pair for pair in pairs if pair[0].error == error])
+            for error in PAYLOAD_ERRORS
+            if any(pair[0].error == error for pair in pairs)
+        },
+    }
+
+
+def _summary(pairs: list[tuple[Score, Score]]) -> dict[str, Any]:
+    """Of scores, each with that of waiting on the same arm, move and payload."""
+    still = np.array([1e3 * score.still for score, _ in pairs])
+    worth = [100.0 * (1.0 - a.residual / b.residual) for a, b in pairs if b.residual >= WORTH]
+    return {
+        "time_until_still_ms": {name: _time(still, share) for name, share in (("median", 50), ("p90", 90))},
+        "never_still": int(np.isinf(still).sum()),
+        "residual_m_s2": _percentiles([score.residual for score, _ in pairs], median=50, p90=90),
+        "reduction_percent": _percentiles(worth, median=50, p5=5) if worth else {"median": None, "p5": None},
+        "in_motion_ratio": float(np.median([a.in_motion / b.in_motion for a, b in pairs])),
+    }
+
+
+def _percentiles(values: Sequence[float], **shares: float) -> dict[str, float]:
+    return {name: float(np.percentile(values, share)) for name, share in shares.items()}
+
+
+def _time(values: Floats, share: float) -> float | None:
+    """Percentile of times of which some may be endless; None where it is."""
+    found = float(np.percentile(values, share, method="higher"))
+    return round(found, 6) if math.isfinite(found) else None

@@ -1,0 +1,69 @@
+"""Who stands on the bench."""
+
+from collections.abc import Sequence
+
+from tvist_lab.evaluation.baselines import baselines, longest_mean_delay
+from tvist_lab.evaluation.candidates import Candidate, Held, Longer, Named, Shaping
+from tvist_lab.evaluation.foreign import FromFile
+from tvist_lab.evaluation.recipes import Recipe
+from tvist_lab.evaluation.shaperbench import PAYLOAD_ERRORS
+from tvist_plant.description import RobotDescription
+from tvist_protocol.calibration import Calibration
+
+OWN = (
+    ("zv", 1, "TVIST-ZV, lowest mode"),
+    ("zv", 3, "TVIST-ZV, three modes"),
+    ("zvd", 1, "TVIST-ZVD, lowest mode"),
+    ("ei", 1, "TVIST-EI, lowest mode"),
+    ("auto", 1, "constant mean delay, auto"),
+    ("short", 1, "constant mean delay, short"),
+    ("auto-target", 1, "constant mean delay, told where a move ends"),
+)
+"""Our shapers: name, modes, what they are."""
+PRODUCT_MODES = 3
+"""Whose zero-vibration shapers the product is of."""
+
+
+def candidates(
+    description: RobotDescription,
+    calibration: Calibration,
+    file: str | None,
+    against: Sequence[str] | None,
+) -> list[Candidate]:
+    """Who stands on the bench.
+
+    Args:
+        description: The robot.
+        calibration: With a modal model; all estimates are its.
+        file: Path of a person's own shaper.
+        against: Names of those to run beside waiting, which all are compared with; None: all.
+
+    Raises:
+        KeyError: There is none of a name.
+    """
+    waiting = Named(Recipe("none", calibration), "none", "waiting, unshaped")
+    recipe = Recipe("zv", calibration)
+    own = [
+        Named(Recipe(name, calibration, modes=modes), name if modes == 1 else f"{name}_{modes}_modes", label)
+        for name, modes, label in OWN
+    ]
+    last = next(one for one in own if one.name == "auto")
+    ranged = baselines(recipe, description, (0.0, description.limits.payload))
+    fixed = [Shaping(recipe, one, one.name, one.label) for one in ranged if one.shaper is not None]
+    longer = [
+        Longer(one, f"double_s_as_{one.name}", f"double S as long as {one.name}") for one in (own[0], last)
+    ]
+    every: list[Candidate] = [waiting, *longer, *fixed, *own, _product(recipe, description)]
+    if against is not None:
+        by_name = {one.name: one for one in every}
+        every = [waiting, *(by_name[name] for name in against if name != waiting.name)]
+    if file is not None:
+        every.append(FromFile(file, recipe, "file", file))
+    return every
+
+
+def _product(recipe: Recipe, description: RobotDescription) -> Held:
+    """Held back to the longest mean delay that it has anywhere, with any payload that the bench declares."""
+    most = (1.0 + max(PAYLOAD_ERRORS)) * description.limits.payload
+    delay = longest_mean_delay(recipe, description, (0.0, most), PRODUCT_MODES)
+    return Held(recipe, delay, PRODUCT_MODES, "product", "constant mean delay, product of three ZV")

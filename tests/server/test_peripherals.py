@@ -1,0 +1,186 @@
+"""Inputs, outputs, registers and the tool centre point: what is set is told, and nothing else changes."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tvist_protocol.commands import PowerOn, SimulationReset
+from tvist_protocol.io import BITS, NUMBERS, SetIo, SetRegisters, SetTcp, SimulationSetInputs
+from tvist_protocol.modes import RobotMode
+from tvist_protocol.replies import Done, Refused
+from tvist_server.peripherals import Peripherals
+from tvist_server.setup import paper_payload
+
+from .robots import Q1, UR5E, Robot
+
+BITS18 = st.integers(0, 2**18 - 1)
+
+
+def told(peripherals: Peripherals):
+    return peripherals.io(1, paper_payload(UR5E), 1.0)
+
+
+@given(st.lists(st.tuples(BITS18, BITS18), max_size=8))
+def test_a_mask_decides_which_digital_outputs_change(steps):
+    peripherals, bits = Peripherals(), [False] * 18
+    for mask, values in steps:
+        peripherals.set_outputs(SetIo(token="", digital_output_mask=mask, digital_outputs=values))
+        peripherals.set_inputs(SimulationSetInputs(token="", digital_input_mask=mask, digital_inputs=values))
+        bits = [bool(values >> k & 1) if mask >> k & 1 else bits[k] for k in range(18)]
+    expected = sum(on << k for k, on in enumerate(bits))
+    assert told(peripherals).actual_digital_output_bits == expected
+    assert told(peripherals).actual_digital_input_bits == expected
+
+
+@given(st.integers(0, 3), st.integers(0, 3), st.floats(0, 1), st.floats(0, 1))
+def test_an_analog_output_is_a_share_of_its_range(mask, kind, first, second):
+    peripherals = Peripherals()
+    peripherals.set_outputs(
+        SetIo(
+            token="",
+            standard_analog_output_mask=mask,
+            standard_analog_output_type=kind,
+            standard_analog_output_0=first,
+            standard_analog_output_1=second,
+        )
+    )
+    io = told(peripherals)
+    for number, share in enumerate((first, second)):
+        chosen = mask >> number & 1
+        voltage = bool(chosen and kind >> number & 1)
+        assert bool(io.analog_io_types >> (2 + number) & 1) == voltage
+        expected = 10.0 * share * chosen if voltage else 0.004 + 0.016 * share * chosen
+        assert io.standard_analog_output[number] == pytest.approx(expected, abs=1e-15)
+
+
+@given(
+    st.sampled_from(["input_bit", "output_bit"]),
+    st.lists(
+        st.tuples(st.integers(0, BITS - 1), st.lists(st.booleans(), min_size=1, max_size=40)), max_size=5
+    ),
+)
+def test_bits_stand_in_words_of_32(bank, writes):
+    peripherals, bits = Peripherals(), [False] * BITS
+    for first, values in writes:
+        fitting = values[: BITS - first]
+        peripherals.set_registers(SetRegisters(bank=bank, first=first, values=tuple(fitting)))
+        bits[first : first + len(fitting)] = fitting
+    words = [sum(bits[32 * w + k] << k for k in range(32)) for w in range(4)]
+    assert getattr(told(peripherals), f"{bank}_register") == words
+    other = "output_bit" if bank == "input_bit" else "input_bit"
+    assert getattr(told(peripherals), f"{other}_register") == [0] * 4
+
+
+def test_what_was_told_does_not_change_afterwards():
+    peripherals = Peripherals()
+    before = told(peripherals)
+    peripherals.set_registers(SetRegisters(bank="input_int", values=(7,)))
+    assert before.input_int_register == [0] * NUMBERS
+    assert told(peripherals).input_int_register[0] == 7
+
+
+@pytest.mark.parametrize(
+    ("bank", "first", "values", "where"),
+    [
+        ("input_int", 47, (1, 2), "values"),
+        ("input_bit", 100, (True,) * 29, "values"),
+        ("input_double", 48, (1.0,), "values"),
+        ("input_int", 0, (1, 1.5), "values[1]"),
+        ("input_int", 0, (2**31,), "values[0]"),
+        ("input_int", 0, (True,), "values[0]"),
+        ("input_bit", 0, (True, 1), "values[1]"),
+        ("input_double", 0, (False,), "values[0]"),
+    ],
+)
+def test_what_a_register_cannot_hold_is_refused_and_changes_nothing(bank, first, values, where):
+    robot = Robot()
+    reply = robot.send(SetRegisters, bank=bank, first=first, values=values)
+    assert isinstance(reply, Refused)
+    assert (reply.code, reply.where) == ("out_of_range", where)
+    robot.tick()
+    io = robot.controller.peripherals.io(1, robot.controller.declared, 1.0)
+    assert not any(any(getattr(io, name)) for name in io.__struct_fields__ if name.endswith("register"))
+
+
+def test_input_registers_take_no_control_and_output_registers_do():
+    robot = Robot()
+    assert robot.send(SetRegisters, bank="input_double", values=(1.5,), token=None) == Done()
+    refused = robot.send(SetRegisters, bank="output_double", values=(1.5,), token=None)
+    assert (refused.code, refused.where) == ("missing_field", "token")
+    assert robot.send(SetRegisters, bank="output_double", values=(2,)) == Done()
+    stale = robot.send(SetRegisters, bank="input_double", values=(2.5,), token="no")
+    assert stale.code == "stale_token"
+    io = robot.controller.changed_io()
+    assert (io.input_double_register[0], io.output_double_register[0]) == (1.5, 2.0)
+    assert type(io.output_double_register[0]) is float
+
+
+def test_it_is_told_once_for_each_tick_with_a_change():
+    robot = Robot()
+    assert robot.controller.changed_io().tick == 1  # as it begins
+    robot.tick(3)
+    assert robot.controller.changed_io() is None
+    robot.send(SetIo, digital_output_mask=1, digital_outputs=1)
+    robot.send(SetIo, digital_output_mask=2, digital_outputs=2)
+    io = robot.controller.changed_io()
+    assert (io.tick, io.actual_digital_output_bits) == (4, 3)
+    assert robot.controller.changed_io() is None
+
+
+def test_the_tool_centre_point_moves_the_pose_and_nothing_else():
+    plain, tool = Robot(), Robot()
+    offset = (0.03, -0.02, 0.15, 0.3, -0.2, 0.1)
+    assert tool.send(SetTcp, offset=offset) == Done()
+    for robot in (plain, tool):
+        robot.tick()
+    flange, moved = (robot.states[-1] for robot in (plain, tool))
+    same = set(flange.__struct_fields__) - {"actual_TCP_pose", "actual_TCP_speed"}
+    assert all(getattr(flange, name) == getattr(moved, name) for name in same)
+    placed = _placement(flange.actual_TCP_pose) * _placement(offset)
+    assert np.allclose(placed.homogeneous, _placement(moved.actual_TCP_pose).homogeneous, atol=1e-12)
+
+
+def test_the_speed_of_the_tool_centre_point_is_the_derivative_of_its_pose():
+    from tvist_protocol.commands import MoveJ
+
+    robot = Robot()
+    robot.send(SetTcp, offset=(0.1, 0.0, 0.2, 0.0, 0.5, 0.0))
+    robot.send(MoveJ, q=tuple(UR5E.poses["Q2"]))
+    robot.tick(400)
+    poses, speeds = robot.column("actual_TCP_pose"), robot.column("actual_TCP_speed")
+    differences = (poses[2:, :3] - poses[:-2, :3]) / 0.004
+    assert np.abs(speeds[:, :3]).max() > 0.3
+    assert np.abs(differences - speeds[1:-1, :3]).max() < 2e-3
+
+
+def test_power_without_brakes_leaves_the_arm_idle():
+    robot = Robot()
+    robot.send(SimulationReset, mode="POWER_OFF")
+    assert robot.send(PowerOn, release_brakes=False) == Done()
+    assert robot.tick().robot_mode == RobotMode.IDLE
+    assert robot.send(PowerOn, release_brakes=False) == Done()
+    assert robot.tick().robot_mode == RobotMode.IDLE
+    assert robot.send(PowerOn) == Done()
+    assert robot.tick().robot_mode == RobotMode.RUNNING
+    assert robot.send(PowerOn, release_brakes=False) == Done()
+    assert robot.tick().robot_mode == RobotMode.RUNNING
+
+
+def test_a_quiet_arm_at_rest_says_the_same_from_tick_to_tick():
+    robot = Robot(UR5E.quiet())
+    from tvist_protocol.commands import MoveJ
+
+    robot.send(MoveJ, q=tuple(Q1 + 0.3))
+    robot.until_rest()
+    robot.tick(2500)
+    robot.states.clear()
+    robot.tick(500)
+    assert (robot.column("actual_q") == robot.column("actual_q")[0]).all()
+    assert np.ptp(robot.column("actual_tool_accelerometer"), axis=0).max() < 1e-6
+    assert np.ptp(robot.column("target_q"), axis=0).max() == 0.0
+
+
+def _placement(pose):
+    return pin.SE3(pin.exp3(np.array(pose[3:])), np.array(pose[:3]))

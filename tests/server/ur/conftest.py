@@ -1,0 +1,149 @@
+"""What the tests of UR's doors share: a control that records, and snapshots of a real controller."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import pytest
+
+from tvist_plant.description import load
+from tvist_protocol import commands as c
+from tvist_protocol.io import Io
+from tvist_protocol.replies import Done, Refused
+from tvist_protocol.values import Payload
+from tvist_server.controller import Controller
+from tvist_server.instruments.snapshot import Instruments
+from tvist_server.setup import Setup, paper_payload
+
+UR5E = load("ur5e")
+TOKEN = "the-token"
+
+
+class FakeControl:
+    """Stands for the way to the controller.
+
+    Commands are recorded in `commands` and answered at once with `reply`; `refuse(code, why)` makes them refused,
+    `wait()` keeps the answers back until `answer()`.
+    """
+
+    def __init__(self):
+        self.commands = []
+        self.reply = Done()
+        self.held_by_other = False
+        self._waiting = None
+
+    def change(self, command, then):
+        self.ask(command(TOKEN), then)
+
+    def ask(self, command, then):
+        self.commands.append(command)
+        if self._waiting is None:
+            then(self.reply)
+        else:
+            self._waiting.append(then)
+
+    def refuse(self, code="no_control", why="another client has control: 'a'", where="", limit=None):
+        self.reply = Refused(code=code, where=where, why=why, limit=limit)
+
+    def wait(self):
+        self._waiting = []
+
+    def answer(self, reply=None):
+        """Give every answer that is due; to one that asks again in it, too."""
+        waiting, self._waiting = self._waiting, None
+        for then in waiting:
+            then(reply or self.reply)
+
+    def of(self, kind):
+        """The recorded commands of one kind."""
+        return [command for command in self.commands if isinstance(command, kind)]
+
+
+def io(**changes) -> Io:
+    """Everything off, the paper's payload declared."""
+    values = {
+        "tick": 0,
+        "actual_digital_input_bits": 0,
+        "actual_digital_output_bits": 0,
+        "standard_analog_input": [0.0, 0.0],
+        "standard_analog_output": [0.0, 0.0],
+        "analog_io_types": 0,
+        "tool_analog_input": [0.0, 0.0],
+        "input_bit_register": [0] * 4,
+        "input_int_register": [0] * 48,
+        "input_double_register": [0.0] * 48,
+        "output_bit_register": [0] * 4,
+        "output_int_register": [0] * 48,
+        "output_double_register": [0.0] * 48,
+        "tcp_offset": [0.0] * 6,
+        "payload": paper_payload(UR5E),
+        "target_speed_fraction": 1.0,
+    }
+    return Io(**(values | changes))
+
+
+class Robot:
+    """A controller in lockstep, and instruments that read each of its ticks."""
+
+    def __init__(self, description=UR5E, *, io_changes=None, **setup):
+        start = {"q": description.poses.get("Q1"), "payload": paper_payload(description), "calibration": None}
+        self.controller = Controller(
+            Setup(**({"description": description, "clock": "lockstep"} | start | setup))
+        )
+        self.token = self.controller.receive(c.TakeControl(client="a")).token
+        self.instruments = Instruments(description)
+        declared: Payload = self.controller.declared
+        self.io = io(**({"payload": declared} | (io_changes or {})))
+
+    def send(self, kind, **fields):
+        return self.controller.receive(kind(token=self.token, **fields))
+
+    def tick(self, count=1):
+        """The snapshot of the last of so many ticks; each is read."""
+        for _ in range(count):
+            state, self.events = self.controller.tick()
+            snapshot = self.instruments.snapshot(state, self.io)
+        return snapshot
+
+
+@pytest.fixture
+def control() -> FakeControl:
+    return FakeControl()
+
+
+@pytest.fixture
+def sent() -> list[bytes]:
+    """What a session sent: pass `sent.append` as its `send`."""
+    return []
+
+
+@pytest.fixture(scope="session")
+def ur5e() -> Callable[..., Robot]:
+    """Makes robots."""
+    return Robot
+
+
+@pytest.fixture(scope="session")
+def snapshots():
+    """A hundred snapshots of consecutive ticks of one that moves."""
+    robot = Robot()
+    robot.send(c.MoveJ, q=tuple(UR5E.poses["Q3"]))
+    return [robot.tick() for _ in range(100)]
+
+
+@pytest.fixture
+def snapshot(snapshots):
+    return snapshots[-1]
+
+
+@pytest.fixture
+def robot(snapshots) -> SimpleNamespace:
+    """What all doors of a robot share, as far as no door is tested."""
+    told = []
+    return SimpleNamespace(
+        description=UR5E,
+        name="ur5e",
+        serial="20245500001",
+        latest=snapshots[-1],
+        tell=told.append,
+        told=told,
+    )

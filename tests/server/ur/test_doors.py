@@ -1,0 +1,239 @@
+"""The doors' sockets: who comes in, who is slow, who has gone."""
+
+import asyncio
+import contextlib
+import struct
+
+import pytest
+from tests.server.robots import UR5E, Robot
+
+from tvist_protocol import commands as c
+from tvist_protocol.codec import decode_command, encode
+from tvist_protocol.commands import TakeControl
+from tvist_server.gateways.base import GatewayError
+from tvist_server.gateways.ur import doors as module
+from tvist_server.gateways.ur.doors import UrDoors
+from tvist_server.host import Host
+from tvist_server.ur_ports import UrPorts
+
+EVERYWHERE = dict.fromkeys(UrPorts().open(), 0)
+"""A port that is free, for each."""
+
+
+class Desk:
+    """A controller in the loop's own thread; `tick` lets time pass."""
+
+    def __init__(self):
+        self.controller = Robot().controller
+        self.controller.session.release()
+        self.host = Host(self.controller, self)
+        self.doors = None
+        self.writers = []
+
+    def request(self, data, reply):
+        self.last = decode_command(data)
+        reply(self.host.request(data))
+
+    def client_seen(self, name):
+        self.host.client_seen(name)
+
+    def client_gone(self, name):
+        self.host.client_gone(name)
+
+    def holder(self):
+        lease = self.controller.session.lease
+        return None if lease is None else lease.client
+
+    def state(self, state):
+        self.doors.publish("state", state, b"")
+
+    def event(self, event):
+        self.doors.publish("event", event, b"")
+
+    def io(self, io):
+        self.doors.publish("io", io, b"")
+
+    def journal(self, entry): ...
+
+    async def tick(self, count=1):
+        for _ in range(count):
+            self.host.tick()
+            await asyncio.sleep(0)
+
+
+@pytest.fixture
+async def desk():
+    desk = Desk()
+    desk.doors = UrDoors(desk, UR5E, "ur5e", "127.0.0.1", EVERYWHERE)
+    await desk.doors.open()
+    yield desk
+    for writer in desk.writers:
+        writer.close()
+        with contextlib.suppress(ConnectionError):
+            await writer.wait_closed()
+    await desk.doors.shut()
+    await until(lambda: not desk.doors._connections)
+    desk.doors.close()
+
+
+async def connect(desk, door):
+    reader, writer = await asyncio.open_connection("127.0.0.1", desk.doors.ports[door])
+    desk.writers.append(writer)
+    return reader, writer
+
+
+async def until(condition):
+    """Give the loop its turns until something is so."""
+    async with asyncio.timeout(10):
+        while not condition():  # noqa: ASYNC110  what changes belongs to the loop
+            await asyncio.sleep(0)
+
+
+async def lines(reader, writer, *sent):
+    answers = []
+    for line in sent:
+        writer.write(line.encode() + b"\n")
+        answers.append((await reader.readline()).decode().strip())
+    return answers
+
+
+async def test_every_door_speaks_its_language(desk):
+    await desk.tick()
+    reader, writer = await connect(desk, "dashboard")
+    assert (await reader.readline()).startswith(b"Connected")
+    assert await lines(reader, writer, "robotmode") == ["Robotmode: RUNNING"]
+    for door in ("primary", "secondary", "primary_read_only", "secondary_read_only"):
+        reader, _ = await connect(desk, door)
+        head = await reader.readexactly(5)
+        assert head[4] == 20
+    for door in ("realtime", "realtime_read_only"):
+        before = len(desk.doors._connections)
+        reader, _ = await connect(desk, door)
+        await until(lambda before=before: len(desk.doors._connections) > before)
+        await desk.tick()
+        package = await reader.readexactly(1220)
+        assert struct.unpack_from(">id", package) == (1220, 40.0 + desk.controller.now)
+    reader, writer = await connect(desk, "rtde")
+    writer.write(struct.pack(">HBH", 5, ord("V"), 2))
+    assert await reader.readexactly(4) == struct.pack(">HBB", 4, ord("V"), 1)
+
+
+async def test_a_client_that_stops_reading_loses_samples_and_nobody_else_does(desk):
+    await desk.tick()
+    quick, _ = await connect(desk, "realtime")
+    _, slow = await connect(desk, "realtime")
+    slow.transport.pause_reading()
+    await until(lambda: len(desk.doors._connections) == 2)
+    stamps, ticks = [], 1500
+
+    async def read():
+        while len(stamps) < ticks:
+            package = await quick.readexactly(1220)
+            stamps.append(struct.unpack_from(">id", package)[1])
+
+    reading = asyncio.create_task(read())
+    for _ in range(ticks):
+        await desk.tick()
+        count = len(stamps)
+        await until(lambda count=count: len(stamps) > count)
+    await reading
+    first = desk.controller.tick_number - ticks + 1
+    assert stamps == [40.0 + tick * 0.002 for tick in range(first, first + ticks)]
+    dropped = sorted(connection.dropped for connection in desk.doors._connections)
+    assert dropped[0] == 0
+    # What the system holds of packages of 1220 bytes, on both sides, and one that waits.
+    assert dropped[1] > 0
+
+
+async def test_a_door_takes_control_and_gives_it_back(desk):
+    await desk.tick()
+    reader, writer = await connect(desk, "dashboard")
+    await reader.readline()
+    assert await lines(reader, writer, "is in remote control", "power off") == ["true", "Powering off"]
+    assert desk.holder() == "ur-127.0.0.1"
+    writer.close()
+    await until(lambda: desk.holder() is None)
+
+
+async def test_a_door_declines_in_its_own_way_where_somebody_else_has_control(desk):
+    await desk.tick()
+    desk.host.request(encode(TakeControl(client="anna")))
+    reader, writer = await connect(desk, "dashboard")
+    await reader.readline()
+    answers = await lines(reader, writer, "is in remote control", "power off", "robotmode")
+    assert answers[0] == "false"
+    assert answers[1].startswith("Failed to execute: power off")
+    assert answers[2] == "Robotmode: RUNNING"
+    assert desk.holder() == "anna"
+
+
+async def test_a_fault_of_ours_ends_one_connection_and_no_other(desk, monkeypatch, caplog):
+    await desk.tick()
+    (broken, _), (whole, _) = [await connect(desk, "realtime") for _ in range(2)]
+    await until(lambda: len(desk.doors._connections) == 2)
+    first = next(iter(desk.doors._connections))
+    monkeypatch.setattr(first.session, "sample", lambda _: 1 / 0)
+    await desk.tick(3)
+    await until(lambda: len(desk.doors._connections) == 1)
+    got = []
+    for reader in (broken, whole):
+        try:
+            got.append(await asyncio.wait_for(reader.readexactly(3 * 1220), 10))
+        except asyncio.IncompleteReadError as error:
+            got.append(error.partial)
+    assert {len(data) for data in got} == {0, 3 * 1220}
+    assert "failed" in caplog.text
+
+
+@pytest.fixture
+def few(monkeypatch):
+    monkeypatch.setattr(module, "MOST_CONNECTIONS", 2)
+
+
+async def test_more_than_so_many_are_turned_away(few, desk):
+    await desk.tick()
+    for _ in range(2):
+        reader, _ = await connect(desk, "dashboard")
+        await reader.readline()
+    reader, _ = await connect(desk, "dashboard")
+    with pytest.raises((ConnectionError, asyncio.IncompleteReadError)):
+        await reader.readexactly(1)
+
+
+async def test_a_port_in_use_is_said_with_what_to_do(desk):
+    ports = {"rtde": desk.doors.ports["rtde"]}
+    with pytest.raises(GatewayError, match=rf"port {ports['rtde']} for rtde: .*--ur-port"):
+        UrDoors(desk, UR5E, "ur5e", "127.0.0.1", ports)
+    with pytest.raises(GatewayError, match="no such address"):
+        UrDoors(desk, UR5E, "ur5e", "203.0.113.7", {"rtde": 0})
+
+
+async def test_events_reach_the_clients_of_the_primary_interface(desk):
+    await desk.tick()
+    reader, _ = await connect(desk, "primary")
+    await reader.readexactly(5)
+    token = desk.controller.receive(c.TakeControl(client="a")).token
+    desk.controller.receive(c.SimulationInject(token=token, fault="protective_stop"))
+    await desk.tick(60)
+    data = await asyncio.wait_for(reader.read(100_000), 10)
+    assert struct.pack(">ii", 209, 0) in data
+
+
+async def test_in_lockstep_nothing_is_dropped():
+    desk = Desk()
+    desk.doors = UrDoors(desk, UR5E, "ur5e", "127.0.0.1", {"realtime": 0}, lockstep=True)
+    await desk.doors.open()
+    await desk.tick()
+    reader, writer = await connect(desk, "realtime")
+    await until(lambda: desk.doors._connections)
+    ticks, first = 1000, desk.controller.tick_number + 1
+    writer.transport.pause_reading()
+    await asyncio.to_thread(lambda: [desk.host.tick() for _ in range(ticks)])
+    writer.transport.resume_reading()
+    packages = [await reader.readexactly(1220) for _ in range(ticks)]
+    stamps = [struct.unpack_from(">id", package)[1] for package in packages]
+    assert stamps == [40.0 + tick * 0.002 for tick in range(first, first + ticks)]
+    writer.close()
+    await desk.doors.shut()
+    await until(lambda: not desk.doors._connections)
+    desk.doors.close()

@@ -1,0 +1,44 @@
+"""The page about the doors says what they do."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tvist_server.gateways.ur.dashboard.commands import COMMANDS
+from tvist_server.gateways.ur.primary.packages import robot_state
+from tvist_server.gateways.ur.realtime import LAYOUT
+
+from .decoders import parts, split
+
+PAGE = (Path(__file__).parents[3] / "docs/reference/ur-doors.md").read_text(encoding="utf-8")
+ROWS = [
+    [cell.strip() for cell in line.strip("|").split("|")] for line in PAGE.splitlines() if line[:1] == "|"
+]
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.keyword)
+def test_every_dashboard_command_has_a_row(command):
+    rows = [
+        row
+        for row in ROWS
+        if re.match(rf"`{re.escape(command.keyword)}( [\w.]+)?`$", row[0]) and len(row) == 4
+    ]
+    wanted = 2 if command.keyword == "load" else 1  # of an installation, too
+    assert 1 <= len(rows) <= wanted
+
+
+def test_parts_of_the_robot_state_have_the_lengths_that_are_said(snapshot, robot):
+    ((_, body),) = split(robot_state(robot.description, snapshot, playing=False, paused=False))
+    said = {row[0]: row[1] for row in ROWS if len(row) == 5 and row[0].isdecimal()}
+    assert said == {str(number): str(5 + len(part)) for number, part in parts(body)}
+
+
+def test_the_real_time_packages_layout_is_the_one_that_is_sent():
+    begin = ROWS.index(["doubles", "value"]) + 2
+    wanted, at = [], 0
+    for name, count in LAYOUT:
+        span = str(at) if count == 1 else f"{at}–{at + count - 1}"
+        wanted.append([span, "reserved, 0" if name is None else f"`{name}`"])
+        at += count
+    assert ROWS[begin:] == wanted

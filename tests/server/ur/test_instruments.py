@@ -1,0 +1,307 @@
+"""Values of UR's interfaces are believable: computed ones agree with what they are computed from."""
+
+import math
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from tests.plant.arms import chain
+from tests.server.robots import UR5E, cut
+
+from tvist_plant.model import FLANGE, rigid_model
+from tvist_protocol import commands as c
+from tvist_protocol.values import Payload
+from tvist_server.instruments.snapshot import Snapshot
+from tvist_server.setup import body, paper_payload
+
+from .rtde_client import OUTPUT_TYPES
+
+ELBOW_UP = (0.3, -1.3, 1.6, -1.9, -1.4, 0.2)
+"""A posture far from singular ones."""
+NOTHING = Payload(mass=0.0, com=(0.0, 0.0, 0.0), inertia=(0.0,) * 6)
+OFFSET = [0.03, -0.05, 0.15, 0.2, -0.4, 0.7]
+PERIOD = 0.002
+
+
+def ratio(values, others):
+    return np.array(values) / np.array(others)
+
+
+@pytest.mark.parametrize("joints", range(1, 8))
+def test_every_output_variable_is_there_and_finite_for_robots_of_any_size(ur5e, joints):
+    description = chain(7) if joints == 7 else UR5E if joints == 6 else cut(joints)
+    robot = ur5e(description, q=(0.4,) * joints if joints == 7 else description.poses["Q1"])
+    robot.send(c.MoveJ, q=tuple(0.9 * angle for angle in robot.controller.setup.q))
+    for _ in range(3):
+        snapshot = robot.tick(20)
+        for name, kind in OUTPUT_TYPES.items():
+            value = getattr(snapshot, name)
+            numbers = value if isinstance(value, list) else [value]
+            assert all(map(math.isfinite, numbers)), name
+            length = {"VECTOR3": 3, "VECTOR6": 6}.get(kind[:7])
+            if length is None:
+                assert len(numbers) == 1, name
+            else:
+                assert len(numbers) in {joints, length}, name
+
+
+@pytest.mark.parametrize("mode", ["IDLE", "POWER_OFF"])
+def test_every_output_variable_is_finite_in_other_modes_too(ur5e, mode):
+    snapshot = ur5e(mode=mode).tick(5)
+    for name in OUTPUT_TYPES:
+        value = getattr(snapshot, name)
+        assert all(map(math.isfinite, value if isinstance(value, list) else [value])), name
+
+
+def test_what_there_is_not_is_an_attribute_error(snapshot):
+    for name in ("input_int_register_48", "output_bit_register_128", "input_int_register_01", "actual_qdd"):
+        with pytest.raises(AttributeError, match=name):
+            getattr(snapshot, name)
+
+
+def test_registers_are_those_of_io(ur5e):
+    changes = {
+        "input_int_register": list(range(48)),
+        "output_double_register": [k / 7 for k in range(48)],
+        "input_bit_register": [5, 1 << 31, 1 << 2, 1],
+    }
+    snapshot = ur5e(io_changes=changes).tick()
+    assert snapshot.input_int_register_47 == 47
+    assert snapshot.output_double_register_12 == 12 / 7
+    assert (snapshot.input_bit_registers0_to_31, snapshot.input_bit_registers32_to_63) == (5, 1 << 31)
+    assert [k for k in range(64, 128) if getattr(snapshot, f"input_bit_register_{k}")] == [66, 96]
+
+
+def test_what_the_state_carries_is_passed_on(ur5e):
+    snapshot = ur5e().tick(7)
+    for name in snapshot.state.__struct_fields__:
+        if hasattr(Snapshot, name) and name != "timestamp":
+            assert getattr(snapshot, name) == getattr(snapshot.state, name), name
+    assert snapshot.timestamp == 40.0 + snapshot.state.timestamp
+
+
+class TestElectricity:
+    def test_currents_are_proportional_to_moments(self, snapshots):
+        targets, actuals = set(), set()
+        for snapshot in snapshots[:: len(snapshots) // 9]:
+            targets.add(tuple(ratio(snapshot.target_moment, snapshot.target_current)[1:3].round(9)))
+            actuals.add(tuple(ratio(snapshot.actual_moment, snapshot.actual_current)[1:3].round(9)))
+        assert targets == actuals
+        assert len(targets) == 1
+
+    def test_currents_of_gravity_are_those_that_were_seen(self, ur5e):
+        """At the start posture of UR's simulator, without payload: 2.14, 1.49 and 0.23 A."""
+        start = (-1.6007, -1.7271, -2.203, -0.808, 1.5951, -0.031)
+        current = ur5e(q=start, payload=NOTHING).tick().target_current
+        assert np.abs(current[1:4]) == pytest.approx([2.14, 1.49, 0.23], rel=0.02)
+
+    def test_brakes_hold_the_arm_without_current(self, ur5e):
+        for mode, voltage in (("IDLE", 48.0), ("POWER_OFF", 0.0)):
+            snapshot = ur5e(mode=mode).tick(3)
+            assert snapshot.actual_current == snapshot.target_current == [0.0] * 6
+            assert snapshot.actual_TCP_force == [0.0] * 6
+            assert snapshot.actual_joint_voltage == [voltage] * 6
+            assert snapshot.actual_robot_voltage == voltage
+            assert snapshot.joint_mode == [255 if mode == "IDLE" else 239] * 6
+            assert snapshot.robot_status_bits == (mode == "IDLE")
+
+    def test_the_robot_takes_more_current_as_it_speeds_up(self, snapshots):
+        rest, moving = snapshots[0], snapshots[-1]
+        assert moving.actual_robot_current > rest.actual_robot_current > 0.0
+
+    def test_energy_is_the_integral_of_power(self, snapshots):
+        steps = np.diff([snapshot.actual_robot_energy_consumed for snapshot in snapshots])
+        power = [48.0 * snapshot.actual_robot_current for snapshot in snapshots]
+        assert steps == pytest.approx(np.array(power[1:]) * PERIOD)
+
+    def test_braking_gives_energy_back(self, ur5e):
+        robot = ur5e()
+        robot.send(c.MoveJ, q=(1.5, -3.14, 0.0, -1.57, 0.0, 0.0), velocity=3.0, acceleration=10.0)
+        before = robot.tick(50).actual_robot_braking_energy_dissipated
+        assert before == 0.0
+        after = robot.tick(600).actual_robot_braking_energy_dissipated
+        assert after > 0.0
+
+
+class TestTemperatures:
+    def held(self, ur5e, seconds, step=5.0):
+        """Temperatures of a robot that holds its payload out, looked at now and then."""
+        robot = ur5e()
+        state = robot.tick().state
+        for time in np.arange(step, seconds + step, step):
+            later = type(state)(**{**struct(state), "tick": round(time / PERIOD)})
+            yield robot.instruments.snapshot(later, robot.io).joint_temperatures
+
+    def test_they_start_at_25_degrees(self, ur5e):
+        assert ur5e().tick().joint_temperatures == pytest.approx([25.0] * 6, abs=0.01)
+
+    def test_they_rise_with_load_and_come_to_rest_without_turning_back(self, ur5e):
+        curve = np.array(list(self.held(ur5e, 10 * 1200.0)))
+        assert np.diff(curve, axis=0).min() >= 0.0
+        assert np.abs(curve[-1] - curve[-2]).max() < 0.01
+        base, shoulder, elbow = curve[-1][:3]
+        assert 80.0 > shoulder > elbow > base > 25.0
+
+    def test_they_fall_without_power(self, ur5e):
+        robot = ur5e()
+        state = robot.tick().state
+        warm = robot.instruments.snapshot(type(state)(**{**struct(state), "tick": 500_000}), robot.io)
+        off = type(state)(**{**struct(state), "tick": 10_000_000, "robot_mode": 3})
+        cold = robot.instruments.snapshot(off, robot.io)
+        assert min(warm.joint_temperatures) > 27.0
+        assert cold.joint_temperatures == pytest.approx([25.0] * 6, abs=0.1)
+
+    def test_one_long_step_is_the_same_as_many_short_ones(self, ur5e):
+        (once,) = self.held(ur5e, 600.0, step=600.0)
+        *_, often = self.held(ur5e, 600.0, step=1.0)
+        assert once == pytest.approx(often, rel=1e-9)
+
+    def test_a_tick_that_is_read_twice_counts_once(self, ur5e):
+        robot = ur5e()
+        snapshot = robot.tick(10)
+        again = robot.instruments.snapshot(snapshot.state, robot.io)
+        assert again.joint_temperatures == snapshot.joint_temperatures
+        assert again.actual_robot_energy_consumed == snapshot.actual_robot_energy_consumed
+
+
+def struct(state):
+    return {name: getattr(state, name) for name in state.__struct_fields__}
+
+
+class TestMotion:
+    def test_momentum_is_that_of_the_centre_of_mass(self, ur5e):
+        robot = ur5e(q=ELBOW_UP)
+        robot.send(c.MoveJ, q=(1.5, -0.8, 1.0, -1.0, 0.5, 1.0))
+        model = rigid_model(UR5E, body(paper_payload(UR5E)))
+        data = model.createData()
+        mass = sum(inertia.mass for inertia in model.inertias)
+        for _ in range(5):
+            snapshot = robot.tick(60)
+            q, qd = np.array(snapshot.actual_q), np.array(snapshot.actual_qd)
+            step = 1e-6
+            moved = pin.centerOfMass(model, data, q + step * qd) - pin.centerOfMass(
+                model, data, q - step * qd
+            )
+            assert snapshot.actual_momentum == pytest.approx(
+                mass * np.linalg.norm(moved) / (2 * step), rel=1e-6
+            )
+            assert snapshot.actual_momentum > 0.1
+
+    def test_the_targets_speed_and_acceleration_are_differences_of_its_pose(self, ur5e):
+        robot = ur5e(q=ELBOW_UP, shaper="none", io_changes={"tcp_offset": OFFSET})
+        robot.send(c.MoveJ, q=(1.5, -0.8, 1.0, -1.0, 0.5, 1.0))
+        robot.tick(100)
+        snapshots = [robot.tick() for _ in range(40)]
+        positions = np.array([s.target_TCP_pose[:3] for s in snapshots])
+        speeds = np.array([s.target_TCP_speed[:3] for s in snapshots])
+        accelerations = np.array([s.target_TCP_acceleration[:3] for s in snapshots])
+        assert (positions[2:] - positions[:-2]) / (2 * PERIOD) == pytest.approx(speeds[1:-1], abs=1e-4)
+        assert (speeds[2:] - speeds[:-2]) / (2 * PERIOD) == pytest.approx(accelerations[1:-1], abs=2e-2)
+
+    def test_the_targets_turning_is_the_difference_of_its_orientation(self, ur5e):
+        robot = ur5e(q=ELBOW_UP, shaper="none", io_changes={"tcp_offset": OFFSET})
+        robot.send(c.MoveJ, q=(1.5, -0.8, 1.0, -1.0, 0.5, 1.0))
+        before, middle, after = (robot.tick(n) for n in (200, 1, 1))
+        first, last = (pin.exp3(np.array(s.target_TCP_pose[3:])) for s in (before, after))
+        assert pin.log3(last @ first.T) / (2 * PERIOD) == pytest.approx(middle.target_TCP_speed[3:], abs=1e-4)
+        turned = np.array(after.target_TCP_speed[3:]) - np.array(before.target_TCP_speed[3:])
+        assert turned / (2 * PERIOD) == pytest.approx(middle.target_TCP_acceleration[3:], abs=2e-2)
+
+    def test_the_offset_carries_the_flange_to_the_tool(self, ur5e):
+        bare = ur5e(q=ELBOW_UP).tick()
+        tool = ur5e(q=ELBOW_UP, io_changes={"tcp_offset": OFFSET}).tick()
+        assert bare.target_TCP_pose == pytest.approx(bare.actual_TCP_pose, abs=1e-2)
+        flange, tcp, offset = (
+            pin.SE3(pin.exp3(np.array(pose[3:])), np.array(pose[:3]))
+            for pose in (bare.target_TCP_pose, tool.target_TCP_pose, OFFSET)
+        )
+        assert (flange * offset).isApprox(tcp, 1e-12)
+
+    def test_measured_acceleration_follows_the_targets(self, ur5e):
+        robot = ur5e(UR5E.clean(), q=ELBOW_UP)
+        assert np.abs(robot.tick().actual_TCP_acceleration).max() < 0.02
+        robot.send(c.MoveJ, q=(1.5, -0.8, 1.0, -1.0, 0.5, 1.0))
+        robot.tick(100)
+        both = [
+            (s.actual_TCP_acceleration[:3], s.target_TCP_acceleration[:3]) for s in map(robot.tick, [1] * 200)
+        ]
+        felt, wanted = np.array(both).transpose(1, 0, 2)
+        assert np.abs(wanted).max() > 0.5
+        assert np.abs(felt - wanted).mean() < 0.2 * np.abs(wanted).max()
+
+    def test_the_elbow_is_where_the_upper_arm_ends(self, ur5e):
+        robot = ur5e(q=ELBOW_UP)
+        position = np.array(robot.tick().elbow_position)
+        shoulder = np.array([0.0, 0.0, UR5E.kinematics.d[0]])
+        assert np.linalg.norm(position - shoulder) == pytest.approx(-UR5E.kinematics.a[1])
+        robot.send(c.MoveJ, q=(1.5, -0.8, 1.0, -1.0, 0.5, 1.0))
+        before, middle, after = (robot.tick(n) for n in (200, 1, 1))
+        moved = np.array(after.elbow_position) - np.array(before.elbow_position)
+        assert moved / (2 * PERIOD) == pytest.approx(middle.elbow_velocity, abs=1e-3)
+        assert np.linalg.norm(middle.elbow_velocity) > 0.05
+
+    def test_the_base_bears_the_weight_of_what_moves(self, ur5e):
+        x, y, z, *_ = ur5e(q=ELBOW_UP).tick().target_base_wrench
+        weight = 9.81 * (sum(UR5E.links.mass) + UR5E.payload.mass)
+        assert (x, y, z) == pytest.approx((0.0, 0.0, -weight), abs=1e-9)
+
+
+class TestForce:
+    def test_it_is_nothing_where_the_arm_carries_what_was_declared(self, ur5e):
+        for q in (ELBOW_UP, UR5E.poses["Q1"], UR5E.poses["Q3"]):
+            snapshot = ur5e(q=q).tick(5)
+            assert snapshot.tcp_force_scalar < 1.5
+            assert snapshot.collision_detection_ratio < 0.01
+
+    @pytest.mark.parametrize("offset", [[0.0] * 6, OFFSET])
+    def test_it_is_the_weight_of_a_mass_that_was_not_declared(self, ur5e, offset):
+        extra = Payload(mass=1.0, com=(0.0, 0.0, 0.0), inertia=(0.0,) * 6)
+        robot = ur5e(q=ELBOW_UP, payload=NOTHING, carried=extra, io_changes={"tcp_offset": offset})
+        snapshot = robot.tick(5)
+        x, y, z, *torque = snapshot.actual_TCP_force
+        assert (x, y, z) == pytest.approx((0.0, 0.0, -9.81), abs=0.3)
+        flange = pin.SE3(pin.exp3(np.array(snapshot.actual_TCP_pose[3:])), np.zeros(3))
+        lever = -(flange.rotation @ np.array(offset[:3]))
+        assert torque == pytest.approx(np.cross(lever, (0.0, 0.0, -9.81)), abs=0.1)
+        assert snapshot.tcp_force_scalar == pytest.approx(9.81, abs=0.3)
+        assert snapshot.wrench_calc_from_currents == snapshot.actual_TCP_force
+
+    def test_it_is_finite_and_bounded_in_every_posture(self, ur5e):
+        """Near singular postures too, where a plain inverse of the Jacobian goes beyond all bounds."""
+        extra = Payload(mass=1.0, com=(0.0, 0.0, 0.0), inertia=(0.0,) * 6)
+        for tilt in (0.0, 1e-9, 1e-4, 1e-2, 0.1):
+            q = (0.3, -1.3, 1.6, -1.9, tilt, 0.2)
+            assert ur5e(q=q, payload=NOTHING, carried=extra).tick(3).tcp_force_scalar < 30.0
+
+    def test_the_sensor_at_the_flange_feels_all_that_hangs_on_it(self, ur5e):
+        for declared in (5.0, 2.0):
+            payload, carried = paper_payload(UR5E, declared), paper_payload(UR5E, 5.0)
+            wrench = np.array(ur5e(q=ELBOW_UP, payload=payload, carried=carried).tick(5).ft_raw_wrench)
+            assert np.linalg.norm(wrench[:3]) == pytest.approx(5.0 * 9.81, rel=0.02)
+
+    def test_inertia_is_told_in_the_order_of_the_interface(self, ur5e):
+        payload = Payload(mass=2.0, com=(0.01, 0.02, 0.03), inertia=(0.02, 0.001, 0.002, 0.03, 0.003, 0.04))
+        snapshot = ur5e(q=ELBOW_UP, payload=payload).tick()
+        assert snapshot.payload == 2.0
+        assert snapshot.payload_cog == [0.01, 0.02, 0.03]
+        assert snapshot.payload_inertia == [0.02, 0.03, 0.04, 0.001, 0.002, 0.003]
+
+    def test_another_payload_counts_at_once(self, ur5e):
+        robot = ur5e(q=ELBOW_UP)
+        robot.send(c.MoveJ, q=(1.5, -0.8, 1.0, -1.0, 0.5, 1.0))
+        robot.tick(200)
+        state = robot.tick().state
+        heavy = robot.instruments.snapshot(state, robot.io)
+        light = robot.instruments.snapshot(state, type(robot.io)(**{**struct(robot.io), "payload": NOTHING}))
+        assert light.actual_momentum < heavy.actual_momentum
+        assert heavy.actual_momentum == robot.instruments.snapshot(state, robot.io).actual_momentum
+
+
+def test_the_models_flange_is_the_tools(ur5e):
+    """With no offset the target's pose is plain kinematics, to the last bit."""
+    snapshot = ur5e(q=ELBOW_UP).tick()
+    model = rigid_model(UR5E, body(NOTHING))
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, np.array(snapshot.target_q))
+    placement = data.oMf[model.getFrameId(FLANGE)]
+    assert snapshot.target_TCP_pose == placement.translation.tolist() + pin.log3(placement.rotation).tolist()

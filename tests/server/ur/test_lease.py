@@ -1,0 +1,145 @@
+"""Control for clients that know no lease: one for each host, taken with the first command, given back at the end."""
+
+from collections import deque
+
+from tests.server.robots import Robot
+
+from tvist_protocol import commands as c
+from tvist_protocol.codec import decode_command, encode
+from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
+
+
+class Desk:
+    """A controller whose replies come when `answer` is called; other clients reach it directly."""
+
+    def __init__(self):
+        self.controller = Robot().controller
+        self.controller.session.release()
+        self.kinds = []
+        self._due = deque()
+
+    def request(self, data, reply):
+        self._due.append((decode_command(data), reply))
+
+    def answer(self):
+        while self._due:
+            command, reply = self._due.popleft()
+            self.kinds.append(type(command).__name__)
+            reply(encode(self.controller.receive(command)))
+
+    def client_seen(self, name):
+        self.controller.client_seen(name)
+
+    def client_gone(self, name):
+        self.controller.client_gone(name)
+
+    def holder(self):
+        lease = self.controller.session.lease
+        return None if lease is None else lease.client
+
+    def take(self, client):
+        return self.controller.receive(c.TakeControl(client=client))
+
+
+def lease(desk, host="127.0.0.1"):
+    return HostLease(desk, host, lambda action: action())
+
+
+def slow(fraction):
+    return lambda token: c.SetSpeed(token=token, fraction=fraction)
+
+
+def test_control_is_taken_with_the_first_change_and_given_back_with_the_last_connection():
+    desk, replies = Desk(), []
+    host = lease(desk)
+    first, second, watcher = (ConnectionControl(host) for _ in range(3))
+    watcher.ask(c.Stop(), replies.append)
+    desk.answer()
+    assert desk.holder() is None
+    for connection in (first, first, second):
+        connection.change(slow(0.5), replies.append)
+    desk.answer()
+    assert replies == [Done()] * 4
+    assert desk.kinds.count("TakeControl") == 1
+    assert desk.holder() == "ur-127.0.0.1"
+    watcher.leave()
+    first.leave()
+    desk.answer()
+    assert desk.holder() == "ur-127.0.0.1"
+    second.leave()
+    desk.answer()
+    assert desk.holder() is None
+
+
+def test_commands_sent_while_control_is_being_taken_go_in_their_order():
+    desk, replies = Desk(), []
+    host = lease(desk)
+    connection = ConnectionControl(host)
+    for fraction in (0.1, 0.2, 0.3):
+        connection.change(slow(fraction), replies.append)
+    desk.answer()
+    assert desk.kinds == ["TakeControl", "SetSpeed", "SetSpeed", "SetSpeed"]
+    assert desk.controller.motion.wanted_speed == 0.3
+
+
+def test_where_somebody_else_has_control_the_refusal_comes_back_each_time():
+    desk, replies = Desk(), []
+    connection = ConnectionControl(lease(desk))
+    token = desk.take("anna").token
+    assert connection.held_by_other
+    for _ in range(2):
+        connection.change(slow(0.5), replies.append)
+        desk.answer()
+    assert [(reply.code, "anna" in reply.why) for reply in replies] == [("no_control", True)] * 2
+    desk.controller.receive(c.ReleaseControl(token=token))
+    assert not connection.held_by_other
+    connection.change(slow(0.5), replies.append)
+    desk.answer()
+    assert replies[-1] == Done()
+
+
+def test_another_host_is_somebody_else():
+    desk, replies = Desk(), []
+    here, there = (ConnectionControl(lease(desk, host)) for host in ("127.0.0.1", "10.0.0.2"))
+    here.change(slow(0.5), replies.append)
+    desk.answer()
+    there.change(slow(0.5), replies.append)
+    desk.answer()
+    assert replies[0] == Done()
+    assert isinstance(replies[1], Refused)
+    assert (there.held_by_other, here.held_by_other) == (True, False)
+
+
+def test_control_that_was_lost_is_taken_again():
+    desk, replies = Desk(), []
+    connection = ConnectionControl(lease(desk))
+    connection.change(slow(0.5), replies.append)
+    desk.answer()
+    desk.controller.session.release()
+    connection.change(slow(0.4), replies.append)
+    desk.answer()
+    assert replies == [Done(), Done()]
+    assert desk.kinds == ["TakeControl", "SetSpeed", "SetSpeed", "TakeControl", "SetSpeed"]
+    assert desk.controller.motion.wanted_speed == 0.4
+
+
+def test_control_that_comes_when_everybody_has_gone_is_given_back():
+    desk = Desk()
+    connection = ConnectionControl(lease(desk))
+    connection.change(slow(0.5), lambda reply: None)  # noqa: ARG005
+    connection.leave()
+    desk.answer()
+    assert desk.holder() is None
+    assert isinstance(desk.take("anna"), Accepted)
+
+
+def test_a_lease_is_kept_alive_while_there_is_one():
+    desk = Desk()
+    host = lease(desk)
+    host.keep_alive()
+    ConnectionControl(host).change(slow(0.5), lambda reply: None)  # noqa: ARG005
+    desk.answer()
+    host.keep_alive()
+    desk.answer()
+    assert desk.kinds == ["TakeControl", "SetSpeed", "KeepAlive"]

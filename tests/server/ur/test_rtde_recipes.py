@@ -1,0 +1,196 @@
+"""RTDE's variables: names, types, values, and packages of them."""
+
+import math
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tvist_server.gateways.ur.rtde.inputs import INPUTS
+from tvist_server.gateways.ur.rtde.outputs import OUTPUTS
+from tvist_server.gateways.ur.rtde.recipes import Encoded, InputRecipe, OutputRecipe, split
+from tvist_server.gateways.ur.rtde.table import page
+from tvist_server.gateways.ur.rtde.wire import Wire
+
+from . import rtde_client as client
+
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "rtde-variables.md"
+names_of_outputs = st.lists(st.sampled_from(sorted(client.OUTPUT_TYPES)), min_size=1, max_size=60)
+names_of_inputs = st.lists(st.sampled_from(sorted(client.INPUT_TYPES)), min_size=1, max_size=60)
+NUMBERS = {
+    "BOOL": st.booleans(),
+    "UINT8": st.integers(0, 255),
+    "UINT32": st.integers(0, 2**32 - 1),
+    "INT32": st.integers(-(2**31), 2**31 - 1),
+    "DOUBLE": st.floats(allow_nan=False),
+    "VECTOR6D": st.tuples(*[st.floats(allow_nan=False)] * 6),
+}
+
+BANKS = {
+    f"{side}_{kind}_register": NUMBERS[word]
+    for side in ("input", "output")
+    for kind, word in (("bit", "UINT32"), ("int", "INT32"), ("double", "DOUBLE"))
+}
+
+
+@pytest.fixture(scope="module")
+def ur5e_at_rest(ur5e):
+    return ur5e()
+
+
+@st.composite
+def sent_inputs(draw):
+    """Names of a recipe without repetition, and a value for each."""
+    names = draw(st.lists(st.sampled_from(sorted(client.INPUT_TYPES)), min_size=1, max_size=40, unique=True))
+    return names, [draw(NUMBERS[client.INPUT_TYPES[name]]) for name in names]
+
+
+def test_the_outputs_and_their_types_are_the_published_ones():
+    assert {name: wire.name for name, wire in OUTPUTS.items()} == client.OUTPUT_TYPES
+
+
+def test_the_inputs_and_their_types_are_the_published_ones():
+    assert {name: wire.name for name, wire in INPUTS.items()} == client.INPUT_TYPES
+
+
+@pytest.mark.parametrize("wire", Wire, ids=lambda wire: wire.name)
+def test_a_type_has_the_size_that_its_word_says(wire):
+    assert wire.size == struct.calcsize(">" + client.WORD[wire.name])
+    assert wire.length == len(client.WORD[wire.name])
+
+
+@given(names_of_outputs)
+def test_a_package_holds_the_values_of_the_snapshot(snapshots, names):
+    snapshot = snapshots[17]
+    recipe = OutputRecipe(tuple(names))
+    assert recipe.valid
+    assert recipe.words == [client.OUTPUT_TYPES[name] for name in names]
+    found = client.decoded(recipe.package(snapshot, b"\x01"), names)
+    for name, value in found.items():
+        assert value == getattr(snapshot, name), name
+    bare = client.decoded(recipe.package(snapshot, b""), names, version=1)
+    assert bare == found
+
+
+def test_the_longest_list_of_names_there_is_fits(snapshot):
+    """Every variable at once: the list is longer than the 2048 bytes that are documented."""
+    names = sorted(client.OUTPUT_TYPES)
+    assert len(",".join(names)) > 9000
+    found = client.decoded(OutputRecipe(tuple(names)).package(snapshot, b"\x01"), names)
+    assert found["timestamp"] == snapshot.timestamp
+    assert all(math.isfinite(value) for value in found.values() if not isinstance(value, list))
+
+
+def test_equal_recipes_share_one_package(snapshots):
+    names = ("timestamp", "actual_q")
+    first, second = (OutputRecipe(names).package(snapshots[3], b"\x01") for _ in range(2))
+    assert first is second
+    assert OutputRecipe(names).package(snapshots[4], b"\x01") != first
+
+
+def test_recipes_that_differ_share_what_they_have_in_common(snapshots):
+    OutputRecipe(("timestamp", "actual_q")).package(snapshots[6], b"\x01")
+    before = Encoded.of(snapshots[6])["actual_q"]
+    OutputRecipe(("actual_q", "actual_qd")).package(snapshots[6], b"\x01")
+    assert Encoded.of(snapshots[6])["actual_q"] is before
+
+
+@given(st.lists(st.dictionaries(st.sampled_from(sorted(BANKS)), st.integers(0, 47)), max_size=6), st.data())
+def test_registers_are_those_of_the_tick_however_they_change(ur5e_at_rest, changes, data):
+    robot, registers = ur5e_at_rest, [name for name in client.OUTPUT_TYPES if "_register" in name]
+    names = data.draw(st.lists(st.sampled_from(registers), min_size=1, max_size=20))
+    recipe, present = (
+        OutputRecipe(tuple(names)),
+        {name: getattr(robot.io, name) for name in robot.io.__struct_fields__},
+    )
+    for change in changes:
+        for bank, place in change.items():
+            values = list(present[bank])
+            values[place % len(values)] = data.draw(BANKS[bank])
+            present[bank] = values
+        robot.io = type(robot.io)(**present)
+        snapshot = robot.tick()
+        found = client.decoded(recipe.package(snapshot, b"\x01"), names)
+        assert found == {name: getattr(snapshot, name) for name in names}
+
+
+@pytest.mark.parametrize("joints", [1, 3, 6, 7])
+def test_vectors_have_six_entries_whatever_the_arm_has(joints):
+    values = [0.5 + k for k in range(joints)]
+    six = struct.unpack(">6d", Wire.VECTOR6D.encode(values))
+    assert list(six) == (values + [0.0] * 6)[:6]
+    whole = struct.unpack(">6i", Wire.VECTOR6INT32.encode([253] * joints))
+    assert list(whole) == ([253] * joints + [0] * 6)[:6]
+
+
+@pytest.mark.parametrize("names", [(), ("",), ("nonsense",), ("actual_q", "actual_qdd"), ("actual_Q",)])
+def test_what_is_not_there_is_not_found(names):
+    recipe = OutputRecipe(names)
+    assert not recipe.valid
+    assert [word == "NOT_FOUND" for word in recipe.words] == [
+        name not in client.OUTPUT_TYPES for name in names
+    ]
+
+
+def test_a_recipe_beyond_the_largest_package_is_not_valid():
+    assert OutputRecipe(("actual_q",) * 1365).valid
+    assert not OutputRecipe(("actual_q",) * 1366).valid
+
+
+@given(sent_inputs())
+def test_input_values_come_out_as_they_were_sent(sent):
+    names, values = sent
+    ((_, payload),) = client.packages(client.data(1, names, values))
+    assert InputRecipe(tuple(names)).values(payload[1:]) == dict(zip(names, values, strict=True))
+
+
+@given(sent_inputs(), st.integers(0, 400), st.binary(max_size=60))
+def test_of_a_package_of_the_wrong_size_the_whole_variables_count(sent, kept, extra):
+    names, values = sent
+    ((_, payload),) = client.packages(client.data(1, names, values))
+    recipe = InputRecipe(tuple(names))
+    assert recipe.values(payload[1:] + extra) == recipe.values(payload[1:])
+    left, whole = kept, {}
+    for name, value in zip(names, values, strict=True):
+        left -= struct.calcsize(">" + client.WORD[client.INPUT_TYPES[name]])
+        if left < 0:
+            break
+        whole[name] = value
+    assert recipe.values(payload[1 : 1 + kept]) == whole
+
+
+@given(st.lists(st.text(st.characters(codec="ascii", exclude_characters=","), min_size=1), max_size=20))
+def test_names_are_split_at_commas_with_or_without_one_at_the_end(names):
+    text = ",".join(names).encode()
+    assert split(text) == tuple(name.strip() for name in names)
+    if names:
+        assert split(text + b",") == split(text)
+
+
+@given(st.binary(max_size=300))
+def test_any_bytes_are_names_of_some_kind(data):
+    assert all(isinstance(name, str) for name in split(data))
+
+
+def test_the_page_of_variables_is_up_to_date():
+    assert PAGE.read_text(encoding="utf-8") == page(), (
+        f"run `python -m tvist_server.gateways.ur.rtde.table > {PAGE.relative_to(PAGE.parents[2])}`"
+    )
+
+
+def test_the_page_names_every_variable():
+    text = page()
+    for name in (*client.OUTPUT_TYPES, *client.INPUT_TYPES):
+        if "_register" not in name:
+            assert f"| `{name}` |" in text
+
+
+def test_the_page_prints_itself():
+    printed = subprocess.run(
+        [sys.executable, "-m", "tvist_server.gateways.ur.rtde.table"], capture_output=True, check=True
+    ).stdout
+    assert printed.decode() == page()

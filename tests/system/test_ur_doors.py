@@ -1,0 +1,72 @@
+"""UR's interfaces of served robots, over real sockets and processes."""
+
+import os
+import socket
+import subprocess
+import sys
+
+import pytest
+from tests.conformance.served import Served
+
+
+def address(last):
+    """An address of this machine that other runs do not have."""
+    return f"127.20.{os.getpid() % 250}.{last}"
+
+
+def asked(host, *lines, port=29999):
+    """What the dashboard answers, after its greeting."""
+    with socket.create_connection((host, port), 10) as stream, stream.makefile("rw", newline="\n") as talk:
+        assert talk.readline().startswith("Connected")
+        said = []
+        for line in lines:
+            talk.write(f"{line}\n")
+            talk.flush()
+            said.append(talk.readline().strip())
+        return said
+
+
+def test_each_of_several_robots_has_doors_of_its_own():
+    with Served("--robots", "ur5e*2", "--ur", "--ur-address", address(1), name=None) as served:
+        first, second = (asked(address(last), "get serial number", "power off") for last in (1, 2))
+        assert first[0] != second[0]
+        assert first[1] == second[1] == "Powering off"
+        assert served.end()[0] == 0
+
+
+def test_a_client_at_a_door_does_not_keep_the_robot_from_ending():
+    with Served("--ur", "--ur-address", address(9)) as served:
+        with socket.create_connection((address(9), 30003), 10) as stream:
+            assert len(stream.recv(1220, socket.MSG_WAITALL)) == 1220
+            code, took = served.end()
+        assert code == 0
+        assert took < 5.0
+
+
+def test_without_the_option_nothing_listens():
+    with Served() as served, pytest.raises(ConnectionError):
+        socket.create_connection(("127.0.0.1", 29999), 1).close()
+    assert "30004" not in served.said
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "named"),
+    [
+        (["--ur-port", "rtde"], 2, "DOOR=PORT"),
+        (["--ur-port", "rtde=x"], 2, "DOOR=PORT"),
+        (["--ur-port", "rtdee=30004"], 2, "rtdee"),
+        (["--ur-address", "192.168.0.1"], 2, "--insecure"),
+        (["--ur-address", "203.0.113.7", "--insecure"], 1, "no such address"),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_sentence(options, code, named):
+    ended = subprocess.run(
+        [sys.executable, "-m", "tvist_cli", "serve", "--listen", "tcp/127.0.0.1:0", *options],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert ended.returncode == code, ended.stderr
+    assert named in ended.stderr
+    assert "Traceback" not in ended.stderr

@@ -1,0 +1,125 @@
+"""One client of the dashboard."""
+
+from collections import deque
+from collections.abc import Callable
+from typing import Final
+
+from tvist_protocol.modes import RuntimeState
+from tvist_server.gateways.ur.base import Control, Send, Session
+from tvist_server.gateways.ur.dashboard.commands import QUIT, Request, find
+from tvist_server.gateways.ur.dashboard.lines import Lines
+from tvist_server.gateways.ur.robot import UrRobot
+from tvist_server.instruments.snapshot import Snapshot
+
+GREETING: Final = "Connected: Universal Robots Dashboard Server"
+MOST_WAITING: Final = 1000
+"""Lines that may wait for the answer to an earlier one."""
+TOO_MANY: Final = f"could not understand: more than {MOST_WAITING} commands wait to be carried out"
+PATIENCE: Final = 2500
+"""Ticks in which what was stopped has to come to rest."""
+ECHO: Final = 200
+"""Characters that are repeated of a line that makes no sense."""
+
+
+class DashboardSession(Session):
+    """Carries out a client's commands one after the other: the next begins when the last one was answered.
+
+    Args:
+        robot: The robot.
+        control: The way to its controller.
+        send: To the client.
+    """
+
+    def __init__(self, robot: UrRobot, control: Control, send: Send) -> None:
+        self._robot = robot
+        self._control = control
+        self._send = send
+        self._lines = Lines()
+        self._waiting: deque[str] = deque()
+        self._declined = 0
+        """Lines behind those, that were too many."""
+        self._asked = 0
+        """Commands begun."""
+        self._answered = 0
+        """Of them, answered."""
+        self._working = False
+        self._rested: Callable[[bool], None] | None = None
+        """What waits until the arm rests."""
+        self._last = 0
+        """Tick at which it waits no longer."""
+
+    def opened(self) -> None:
+        """Greet."""
+        self._say(GREETING)
+
+    def receive(self, data: bytes) -> None:
+        """Take commands."""
+        if self.over:
+            return
+        for line in self._lines.feed(data):
+            if self._declined or len(self._waiting) >= MOST_WAITING:
+                self._declined += 1
+            else:
+                self._waiting.append(line)
+            self._work()
+
+    def sample(self, snapshot: Snapshot) -> bytes:
+        """Go on with a command that waited for the arm to rest."""
+        rested = self._rested
+        if rested is not None:
+            still = snapshot.runtime_state == RuntimeState.STOPPED
+            if still or snapshot.state.tick >= self._last:
+                self._rested = None
+                rested(still)
+        return b""
+
+    def closed(self) -> None:
+        """Forget what waits."""
+        self.over, self._rested = True, None
+        self._robot.programs.left(self._control)
+
+    def _work(self) -> None:
+        """Carry out what waits, until a command has to wait for its answer."""
+        if self._working:
+            return
+        self._working = True
+        while self._asked == self._answered and not self.over:
+            if self._waiting:
+                self._do(self._waiting.popleft())
+            elif self._declined:
+                self._declined -= 1
+                self._say(TOO_MANY)
+            else:
+                break
+        self._working = False
+
+    def _do(self, line: str) -> None:
+        self._asked += 1
+        number = self._asked
+
+        def answer(text: str) -> None:
+            if number == self._answered + 1 and not self.over:
+                self._answered = number
+                self._say(text)
+                self.over = found is not None and found[0].keyword == QUIT
+                self._work()
+
+        found = find(line)
+        if found is None:
+            answer(f"could not understand: '{line[:ECHO]}'")
+        else:
+            command, argument = found
+            keyword = command.keyword
+            command.carry_out(Request(self._robot, self._control, keyword, argument, answer, self._at_rest))
+
+    def _at_rest(self, moves: bool, then: Callable[[bool], None]) -> None:
+        """As `AtRest` says: a program that was stopped may be played as soon as that is answered."""
+        latest = self._robot.latest
+        if latest is None or (latest.runtime_state == RuntimeState.STOPPED and not moves):
+            then(True)
+        else:
+            self._rested, self._last = then, latest.state.tick + PATIENCE
+
+    def _say(self, text: str) -> None:
+        plain = "".join([letter if letter.isprintable() else "?" for letter in text])
+        self._send(plain.encode() + b"\n")

@@ -1,0 +1,231 @@
+"""The doors of one robot: a listening socket each, and everybody who came in."""
+
+import asyncio
+import contextlib
+import errno
+import logging
+import socket
+import threading
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from tvist_plant.description import RobotDescription
+from tvist_protocol.io import Io
+from tvist_protocol.stream import Event, State
+from tvist_server.gateways.base import Desk, Gateway, GatewayError, Message, Topic
+from tvist_server.gateways.ur.base import Send, Session
+from tvist_server.gateways.ur.connection import Connection
+from tvist_server.gateways.ur.dashboard.session import DashboardSession
+from tvist_server.gateways.ur.lease import ALIVE, ConnectionControl, HostLease
+from tvist_server.gateways.ur.primary.session import PrimarySession
+from tvist_server.gateways.ur.realtime import RealtimeSession
+from tvist_server.gateways.ur.robot import UrRobot
+from tvist_server.gateways.ur.rtde.session import RtdeSession
+from tvist_server.instruments.snapshot import Instruments
+from tvist_server.ur_ports import Door
+
+log = logging.getLogger(__name__)
+
+MOST_CONNECTIONS = 256
+"""At all doors of a robot together."""
+SEND_BUFFER = 32_768
+"""What the system holds for a client [bytes]: a tenth of a second of samples; more would only be older."""
+MOST_PENDING = 250
+"""States that may wait for this thread: half a second."""
+PAUSE = 0.02
+"""Time between two looks for room, in lockstep [s]."""
+
+
+class UrDoors(Gateway):
+    """A robot's doors. They are bound at once, and open with `open`.
+
+    Args:
+        desk: The robot.
+        description: What it is.
+        name: On the network.
+        address: IP address to listen at.
+        ports: Port by door; a door without one stays shut.
+        lockstep: Whether a client lets time pass: then no state may be lost.
+
+    Raises:
+        GatewayError: A port cannot be listened on.
+    """
+
+    def __init__(
+        self,
+        desk: Desk,
+        description: RobotDescription,
+        name: str,
+        address: str,
+        ports: Mapping[Door, int],
+        *,
+        lockstep: bool = False,
+    ) -> None:
+        self.setpoints_refused = 0
+        self.address = address
+        self._desk = desk
+        self.robot = UrRobot(description, name, self._tell)
+        self._instruments = Instruments(description)
+        self._io: Io | None = None
+        self._connections: set[Connection] = set()
+        self._leases: dict[str, HostLease] = {}
+        self._lockstep = lockstep
+        # Each is counted by one thread alone.
+        self._handed, self._taken = 0, 0
+        self._room = threading.Event()
+        self.dropped = 0
+        """States that found too many waiting."""
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._servers: list[asyncio.Server] = []
+        self._alive: asyncio.Task[None] | None = None
+        self._sockets: dict[Door, socket.socket] = {}
+        try:
+            for door, port in ports.items():
+                self._sockets[door] = _listen(address, port, door)
+        except BaseException:
+            self._close_sockets()
+            raise
+
+    @property
+    def ports(self) -> dict[Door, int]:
+        """Port by door, as they are."""
+        return {door: bound.getsockname()[1] for door, bound in self._sockets.items()}
+
+    async def open(self) -> None:
+        """Let clients in; they are served by the running loop."""
+        self._loop = asyncio.get_running_loop()
+        for door, bound in self._sockets.items():
+            self._servers.append(
+                await self._loop.create_server(
+                    partial(
+                        Connection,
+                        partial(_session, door, self.robot),
+                        self._lease,
+                        self._connections,
+                        MOST_CONNECTIONS,
+                        lossless=self._lockstep,
+                    ),
+                    sock=bound,
+                )
+            )
+        self._alive = asyncio.create_task(self._keep_alive())
+
+    def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  not MessagePack here
+        """Hand a message over to the doors' thread."""
+        if self._loop is None:  # nobody is in
+            if isinstance(message, Io):
+                self._io = message
+        elif isinstance(message, State):
+            if self._has_room():
+                self._handed += 1
+                self._soon(lambda: self._on_state(message))
+            else:
+                self.dropped += 1
+        elif isinstance(message, Io):
+            self._soon(lambda: setattr(self, "_io", message))
+        elif isinstance(message, Event):
+            self._soon(lambda: self._on_event(message))
+
+    def _has_room(self) -> bool:
+        """Whether one more state may wait; in lockstep there is room in the end."""
+        while self._handed - self._taken >= MOST_PENDING:
+            if not self._lockstep or self._loop is None:
+                return False
+            self._room.clear()
+            self._room.wait(PAUSE)
+        return True
+
+    async def shut(self) -> None:
+        """Let nobody in any more, and everybody out."""
+        if self._alive is not None:
+            self._alive.cancel()
+        for server in self._servers:
+            server.close()
+        for connection in tuple(self._connections):
+            connection.close()
+        await asyncio.sleep(0)
+
+    def close(self) -> None:
+        """Listen no more. A second call does nothing."""
+        self._loop = None
+        self._close_sockets()
+
+    # ------------------------------------------------------------------ in the doors' thread
+
+    def _on_state(self, state: State) -> None:
+        self._taken += 1
+        self._room.set()
+        if self._io is not None:
+            snapshot = self.robot.latest = self._instruments.snapshot(state, self._io)
+            for connection in tuple(self._connections):
+                connection.sample(snapshot)
+
+    def _on_event(self, event: Event) -> None:
+        self.robot.programs.event(event)
+        for connection in tuple(self._connections):
+            connection.event(event)
+
+    def _tell(self, message: bytes) -> None:
+        for connection in tuple(self._connections):
+            if isinstance(connection.session, PrimarySession):
+                connection.send(message)
+
+    def _lease(self, host: str) -> HostLease:
+        if host not in self._leases:
+            self._leases[host] = HostLease(self._desk, host, self._soon)
+        return self._leases[host]
+
+    def _soon(self, action: Callable[[], None]) -> None:
+        loop = self._loop
+        if loop is not None:
+            with contextlib.suppress(RuntimeError):  # it is closed: all ends
+                loop.call_soon_threadsafe(action)
+
+    async def _keep_alive(self) -> None:
+        while True:
+            await asyncio.sleep(ALIVE)
+            for lease in self._leases.values():
+                lease.keep_alive()
+
+    def _close_sockets(self) -> None:
+        for bound in self._sockets.values():
+            bound.close()
+        self._sockets.clear()
+
+
+def _session(door: Door, robot: UrRobot, control: ConnectionControl, send: Send) -> Session:
+    match door:
+        case "dashboard":
+            return DashboardSession(robot, control, send)
+        case "rtde":
+            return RtdeSession(robot, control, send)
+        case "realtime" | "realtime_read_only":
+            return RealtimeSession(robot, control, send, read_only=door == "realtime_read_only")
+        case _:
+            return PrimarySession(robot, control, send, read_only=door.endswith("read_only"))
+
+
+def _listen(address: str, port: int, door: Door) -> socket.socket:
+    family = socket.AF_INET6 if ":" in address else socket.AF_INET
+    bound = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        bound.setsockopt(
+            socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER
+        )  # those of its clients have it, too
+        bound.bind((address, port))
+        bound.listen(32)
+    except OSError as error:
+        bound.close()
+        raise GatewayError(f"cannot listen on {address} port {port} for {door}: {_reason(error)}") from error
+    bound.setblocking(False)
+    return bound
+
+
+def _reason(error: OSError) -> str:
+    reasons = {
+        errno.EADDRINUSE: "the port is in use: stop what has it, or move the door with --ur-port",
+        errno.EADDRNOTAVAIL: "this machine has no such address; 127.0.0.1 to 127.255.255.254 are its own",
+        errno.EACCES: "that is not permitted: take a port above 1023",
+    }
+    return reasons.get(error.errno or 0, error.strerror or str(error))

@@ -1,0 +1,135 @@
+"""Control for clients that know no lease: the doors take it for a host with its first command that changes something.
+
+All connections of a host share it, since a client opens several, one for commands, one for inputs, one to listen.
+It is given back when the last of them that used it is closed.
+"""
+
+from collections.abc import Callable
+
+from tvist_protocol.codec import decode_reply, encode
+from tvist_protocol.commands import Command, KeepAlive, ReleaseControl, TakeControl
+from tvist_protocol.replies import Accepted, Refused, Reply
+from tvist_server.gateways.base import Desk
+from tvist_server.gateways.ur.base import Control, Then
+
+LEASE = 3600.0
+"""How long it lasts without a sign of life [s]; there is one every `ALIVE`."""
+ALIVE = 10.0
+"""[s]."""
+_LOST = {"no_control", "stale_token"}
+_NO_TOKEN = ""
+
+Soon = Callable[[Callable[[], None]], None]
+"""Has something done in the doors' thread; from any thread."""
+
+
+class HostLease:
+    """Control for the clients of one host.
+
+    Args:
+        desk: The robot.
+        host: Address of the host.
+        soon: Back into the doors' thread.
+    """
+
+    def __init__(self, desk: Desk, host: str, soon: Soon) -> None:
+        self.client = f"ur-{host}"
+        """Under which the lease is held."""
+        self._desk = desk
+        self._soon = soon
+        self._token = _NO_TOKEN
+        self._waiting: list[tuple[Callable[[str], Command], Then]] = []
+        self._taking = False
+        self._users: set[object] = set()
+
+    def change(self, connection: object, command: Callable[[str], Command], then: Then) -> None:
+        """Send a command that needs control, on behalf of a connection."""
+        self._users.add(connection)
+        if self._token == _NO_TOKEN:
+            self._wait(command, then)
+            return
+
+        def again(reply: Reply) -> None:
+            # The lease was lost since: somebody else's power, or a reset. It may be free again.
+            if isinstance(reply, Refused) and reply.code in _LOST and reply.where == "token":
+                self._token = _NO_TOKEN
+                self._wait(command, then)
+            else:
+                then(reply)
+
+        self.ask(command(self._token), again)
+
+    def ask(self, command: Command, then: Then) -> None:
+        """Send a command as it is."""
+        self._desk.request(encode(command), lambda data: self._soon(lambda: then(decode_reply(data))))
+
+    def leave(self, connection: object) -> None:
+        """A connection is closed; with the last one that used it control is given back."""
+        self._users.discard(connection)
+        if not self._users and self._token != _NO_TOKEN:
+            self.ask(ReleaseControl(token=self._token), _nothing)
+            self._desk.client_gone(self.client)
+            self._token = _NO_TOKEN
+
+    def keep_alive(self) -> None:
+        """Renew the lease, where there is one."""
+        if self._token != _NO_TOKEN:
+            self.ask(KeepAlive(token=self._token), _nothing)
+
+    @property
+    def held_by_other(self) -> bool:
+        """Whether somebody else has control."""
+        return self._desk.holder() not in {None, self.client}
+
+    def _wait(self, command: Callable[[str], Command], then: Then) -> None:
+        """Send a command once there is control."""
+        self._waiting.append((command, then))
+        if not self._taking:
+            self._taking = True
+            self._desk.client_seen(self.client)
+            self.ask(TakeControl(client=self.client, lease_s=LEASE), self._taken)
+
+    def _taken(self, reply: Reply) -> None:
+        self._taking = False
+        waiting, self._waiting = self._waiting, []
+        if isinstance(reply, Accepted) and reply.token is not None:
+            self._token = reply.token
+            for command, then in waiting:
+                self.ask(command(self._token), then)
+            if not self._users:  # they went meanwhile
+                self.leave(None)
+        else:
+            for _, then in waiting:
+                then(reply)
+
+
+class ConnectionControl(Control):
+    """One connection's way to the controller.
+
+    Args:
+        lease: Of its host.
+    """
+
+    def __init__(self, lease: HostLease) -> None:
+        self._lease = lease
+
+    def change(self, command: Callable[[str], Command], then: Then) -> None:
+        """Send a command that needs control."""
+        self._lease.change(self, command, then)
+
+    def ask(self, command: Command, then: Then) -> None:
+        """Send a command that needs none."""
+        self._lease.ask(command, then)
+
+    @property
+    def held_by_other(self) -> bool:
+        """Whether somebody else has control."""
+        return self._lease.held_by_other
+
+    def leave(self) -> None:
+        """The connection is closed."""
+        self._lease.leave(self)
+
+
+def _nothing(reply: Reply) -> None:
+    """Nobody waits for it."""

@@ -1,0 +1,66 @@
+"""Power, brakes and protective stops, as the dashboard and the primary interface ask for them."""
+
+from collections.abc import Callable
+
+from tvist_protocol.commands import Command, PowerOff, PowerOn, UnlockProtectiveStop
+from tvist_protocol.modes import RobotMode, SafetyMode
+from tvist_protocol.replies import Refused, Reply
+from tvist_server.gateways.ur.base import Control
+from tvist_server.gateways.ur.robot import UrRobot
+
+Outcome = Callable[[Refused | None], None]
+"""Takes the refusal, or None where it is as it was asked for."""
+
+
+def power_on(robot: UrRobot, control: Control, outcome: Outcome) -> None:
+    """Power an arm that has none; the brakes go on holding it."""
+    there = (RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING)
+    _change(
+        control,
+        lambda token: PowerOn(token=token, release_brakes=False),
+        outcome,
+        lambda: robot.latest is not None and robot.latest.robot_mode in there,
+    )
+
+
+def release_brakes(robot: UrRobot, control: Control, outcome: Outcome) -> None:
+    """Make the arm ready to move, from wherever it is."""
+    _change(
+        control,
+        lambda token: PowerOn(token=token),
+        outcome,
+        lambda: robot.latest is not None and robot.latest.robot_mode == RobotMode.RUNNING,
+    )
+
+
+def power_off(robot: UrRobot, control: Control, outcome: Outcome) -> None:
+    """Take the arm's power, once it stands; no program survives it."""
+
+    def off(refused: Refused | None) -> None:
+        if refused is None:
+            robot.programs.interrupt()
+        outcome(refused)
+
+    _change(control, lambda token: PowerOff(token=token), off, lambda: False)
+
+
+def unlock(robot: UrRobot, control: Control, outcome: Outcome) -> None:
+    """Leave a protective stop; where there is none, nothing is left to do."""
+    _change(
+        control,
+        lambda token: UnlockProtectiveStop(token=token),
+        outcome,
+        lambda: robot.latest is not None and robot.latest.safety_mode != SafetyMode.PROTECTIVE_STOP,
+    )
+
+
+def _change(
+    control: Control, command: Callable[[str], Command], outcome: Outcome, there: Callable[[], bool]
+) -> None:
+    """Ask for a change; a robot that refuses it since it is already so has nothing against it."""
+
+    def then(reply: Reply) -> None:
+        refused = reply if isinstance(reply, Refused) else None
+        outcome(None if refused is not None and refused.code == "wrong_mode" and there() else refused)
+
+    control.change(command, then)

@@ -1,0 +1,111 @@
+"""Robot messages: packages of type 20, which tell that something happened.
+
+int32 length, uint8 20, uint64 time [µs], uint8 source, uint8 kind, body; big-endian.
+"""
+
+from enum import IntEnum
+from struct import Struct
+from typing import Final
+
+from tvist_server.instruments.snapshot import Snapshot
+
+ROBOT_MESSAGE: Final = 20
+SOURCE: Final = 254
+"""-2: of no joint and no board."""
+LONGEST: Final = 1000
+"""Bytes of a text: some clients take packages of more than 2000 for garbage."""
+
+PROTECTIVE_STOP: Final = 209
+READ_ONLY: Final = 210
+"""Codes of error messages."""
+
+_HEADER = Struct(">iBQBB")
+_ERROR = Struct(">iiiII")
+_SAFETY = Struct(">iiBII")
+_PLACE = Struct(">ii")
+_KEY = Struct(">iiB")
+_POPUP = Struct(">IB???B")
+_VERSION = Struct(">BBii")
+
+
+class Kind(IntEnum):
+    """Kinds of robot messages."""
+
+    TEXT = 0
+    POPUP = 2
+    VERSION = 3
+    SAFETY_MODE = 5
+    ERROR_CODE = 6
+    KEY = 7
+    RUNTIME_EXCEPTION = 10
+
+
+class Level(IntEnum):
+    """How bad an error is."""
+
+    DEBUG = 0
+    INFO = 1
+    WARNING = 2
+    VIOLATION = 3
+    FAULT = 4
+    CRITICAL = 5
+
+
+def stamp(snapshot: Snapshot | None) -> int:
+    """Time of a tick as packages say it; 0 before the first [µs]."""
+    return 0 if snapshot is None else round(1e6 * snapshot.timestamp)
+
+
+def version(major: int, minor: int, bugfix: int, build: int, date: str) -> bytes:
+    """What runs on the controller: the first message a client gets."""
+    name = b"URControl"
+    body = bytes([len(name)]) + name + _VERSION.pack(major, minor, bugfix, build) + _text(date)
+    return _message(0, Kind.VERSION, body)
+
+
+def text(time: int, what: str) -> bytes:
+    """A line for the log."""
+    return _message(time, Kind.TEXT, _text(what))
+
+
+def key(time: int, title: str, what: str) -> bytes:
+    """A program has started or stopped: `PROGRAM_XXX_STARTED` or `PROGRAM_XXX_STOPPED`, and its name."""
+    head = _text(title, 255)
+    return _message(time, Kind.KEY, _KEY.pack(0, 0, len(head)) + head + _text(what))
+
+
+def runtime_exception(time: int, line: int, column: int, what: str) -> bytes:
+    """A program cannot go on, or cannot begin.
+
+    Args:
+        time: [µs].
+        line: Where, 1 the first.
+        column: Where in it, 1 the first.
+        what: Why.
+    """
+    return _message(time, Kind.RUNTIME_EXCEPTION, _PLACE.pack(line, column) + _text(what))
+
+
+def error_code(time: int, code: int, argument: int, level: Level, what: str) -> bytes:
+    """An error by its number, without data."""
+    return _message(time, Kind.ERROR_CODE, _ERROR.pack(code, argument, level, 0, 0) + _text(what))
+
+
+def safety_mode(time: int, mode: int) -> bytes:
+    """The safety mode has changed to this, RTDE's number."""
+    return _message(time, Kind.SAFETY_MODE, _SAFETY.pack(0, 0, mode & 0xFF, 0, 0))
+
+
+def popup(time: int, title: str, what: str) -> bytes:
+    """A window for the person at the robot, that waits for no answer."""
+    head = _text(title, 255)
+    return _message(time, Kind.POPUP, _POPUP.pack(0, 0, False, False, False, len(head)) + head + _text(what))
+
+
+def _message(time: int, kind: Kind, body: bytes) -> bytes:
+    return _HEADER.pack(_HEADER.size + len(body), ROBOT_MESSAGE, time, SOURCE, kind) + body
+
+
+def _text(what: str, most: int = LONGEST) -> bytes:
+    """UTF-8, cut between two characters."""
+    return what.encode(errors="replace")[:most].decode(errors="ignore").encode()

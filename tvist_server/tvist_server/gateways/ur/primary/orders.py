@@ -1,0 +1,78 @@
+"""What a client of the primary, secondary or real-time interface wants done."""
+
+from collections.abc import Callable
+from typing import Final
+
+from tvist_protocol.replies import Refused
+from tvist_server.gateways.ur import power
+from tvist_server.gateways.ur.base import Control
+from tvist_server.gateways.ur.primary import messages
+from tvist_server.gateways.ur.primary.messages import Level
+from tvist_server.gateways.ur.primary.scripts import LONGEST, Unit
+from tvist_server.gateways.ur.robot import UrRobot
+
+NOT_RUN: Final = "program_not_run: this controller does not run URScript programs yet"
+TOO_LONG: Final = f"program_too_long: it has more than {LONGEST} bytes and was thrown away"
+READ_ONLY: Final = (
+    "this interface is read-only: somebody else controls the robot, or the port takes no commands"
+)
+
+
+class Orders:
+    """Carries out units of script text: a handful of commands that are no URScript; the others are declined.
+
+    Args:
+        robot: Whom they are for.
+        control: The way to its controller.
+        answer: Sends a robot message to the client, or to whoever hears for it.
+    """
+
+    def __init__(self, robot: UrRobot, control: Control, answer: Callable[[bytes], None]) -> None:
+        self._robot = robot
+        self._control = control
+        self._answer = answer
+
+    def carry_out(self, unit: Unit) -> None:
+        """Do what a unit says."""
+        if unit.too_long:
+            self._except(unit, TOO_LONG)
+            return
+        words = unit.words if len(unit.text) < 1000 else ""
+        robot, control = self._robot, self._control
+
+        def outcome(refused: Refused | None) -> None:
+            self._refused(words, refused)
+
+        match words:
+            case "power on":
+                power.power_on(robot, control, outcome)
+            case "power off":
+                power.power_off(robot, control, outcome)
+            case "set robotmode run":
+                power.release_brakes(robot, control, outcome)
+            case "set unlock protective stop":
+                power.unlock(robot, control, outcome)
+            case "stop program":
+                robot.programs.stop(control, lambda done: None)  # noqa: ARG005  nobody is told on this interface
+            case "set sim" | "set real":
+                pass  # the arm is simulated, whatever is set
+            case _:
+                self._except(unit, NOT_RUN)
+
+    def read_only(self) -> None:
+        """Say that nothing is taken here."""
+        stamp = messages.stamp(self._robot.latest)
+        self._answer(messages.error_code(stamp, messages.READ_ONLY, 0, Level.VIOLATION, READ_ONLY))
+
+    def _except(self, unit: Unit, what: str) -> None:
+        stamp = messages.stamp(self._robot.latest)
+        self._robot.tell(messages.runtime_exception(stamp, unit.line, unit.column, what))
+
+    def _refused(self, words: str, refused: Refused | None) -> None:
+        if refused is None:
+            return
+        if refused.code in {"no_control", "stale_token"}:
+            self.read_only()
+        else:
+            stamp = messages.stamp(self._robot.latest)
+            self._answer(messages.text(stamp, f"{words} was refused: {refused.why}"))

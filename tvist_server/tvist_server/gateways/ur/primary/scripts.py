@@ -1,0 +1,118 @@
+"""Cuts what clients send as scripts into units that can be carried out one by one.
+
+A unit is a line, or a block from `def`, `sec` or another word that opens one to its `end`. Lines end with a line
+feed, before which a carriage return is no part of them; a last line without one is not complete.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import Final
+
+LONGEST: Final = 1 << 20
+"""Bytes of a unit: twenty times the longest program that a known client sends."""
+GLIMPSE: Final = 200
+"""Characters that are kept of one that is longer."""
+
+_OPENS = re.compile(r"(?:def|sec|thread|if|while|for|switch)\b.*:")
+_CLOSES = re.compile(r"\bend$")
+_HEAD = re.compile(r"(?:def|sec)\s+(\w+)")
+_STRING = re.compile(r"\"[^\"]*\"?|'[^']*'?")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A line or a block, complete."""
+
+    text: str
+    """As it was sent, lines ended by line feeds; of one that is too long, the beginning."""
+    line: int
+    """Where its code begins, 1 the first line: comments may stand before it."""
+    column: int
+    """Where in that line, 1 the first."""
+    too_long: bool = False
+    """Whether it is longer than `LONGEST` bytes: then it is thrown away to its end."""
+
+    @property
+    def words(self) -> str:
+        """Its code with single spaces, to be compared with a command."""
+        return " ".join(word for line in self.text.split("\n") for word in _code(line).split())
+
+    @property
+    def name(self) -> str | None:
+        """Of the program that it defines; None for others."""
+        head = _HEAD.match(self.text.split("\n")[self.line - 1].strip())
+        return None if head is None else head[1]
+
+
+class Intake:
+    """One client's stream of script text, cut anywhere."""
+
+    def __init__(self) -> None:
+        self._rest = bytearray()
+        """Of a line that is not complete."""
+        self._lines: list[str] = []
+        """Of the unit that is not complete."""
+        self._size = 0
+        """Bytes of them."""
+        self._depth = 0
+        """Blocks that are open."""
+        self._start: tuple[int, int] | None = None
+        """Line and column of the unit's first code."""
+        self._skipping = False
+        """Whether the rest of a unit is thrown away, which was too long."""
+
+    @property
+    def held(self) -> int:
+        """Bytes that are kept for a unit that is not complete."""
+        return self._size + len(self._rest)
+
+    def feed(self, data: bytes) -> list[Unit]:
+        """Take a piece; the units that it completes."""
+        units: list[Unit] = []
+        *lines, rest = data.split(b"\n")
+        for piece in lines:
+            self._keep(piece, units)
+            line = self._rest.decode(errors="replace").removesuffix("\r")
+            self._rest.clear()
+            self._take(line, units)
+        self._keep(rest, units)
+        return units
+
+    def _keep(self, piece: bytes, units: list[Unit]) -> None:
+        """Add to the line that is not complete."""
+        if self.held + len(piece) > LONGEST:
+            if not self._skipping:
+                seen = "\n".join(
+                    [*self._lines, self._rest.decode(errors="replace") + piece.decode(errors="replace")]
+                )
+                units.append(Unit(seen[:GLIMPSE], *(self._start or (1, 1)), too_long=True))
+            self._skipping = True
+            self._lines, self._size = [], 0
+            del self._rest[GLIMPSE:]  # the beginning of a line tells what it opens
+            piece = piece[:GLIMPSE]
+        self._rest += piece
+
+    def _take(self, line: str, units: list[Unit]) -> None:
+        """A line is complete."""
+        code = _code(line)
+        if not line.strip() and not self._lines and not self._skipping:
+            return
+        if code and self._start is None:
+            self._start = len(self._lines) + 1, len(line) - len(line.lstrip()) + 1
+        if not self._skipping:
+            self._lines.append(line)
+            self._size += len(line) + 1
+        if code == "end":
+            self._depth = max(self._depth - 1, 0)
+        elif _OPENS.match(code) and not _CLOSES.search(code):
+            self._depth += 1
+        if self._depth == 0 and (self._start is not None or self._skipping):
+            if not self._skipping:
+                line_number, column = self._start or (1, 1)
+                units.append(Unit("\n".join(self._lines) + "\n", line_number, column))
+            self._lines, self._size, self._start, self._skipping = [], 0, None, False
+
+
+def _code(line: str) -> str:
+    """What is left of it without strings' contents, comments, and space around."""
+    return _STRING.sub('""', line).partition("#")[0].strip()

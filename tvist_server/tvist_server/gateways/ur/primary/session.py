@@ -1,0 +1,82 @@
+"""One client of the primary or the secondary interface."""
+
+from typing import Final
+
+from tvist_protocol.stream import Event
+from tvist_server.gateways.ur import version
+from tvist_server.gateways.ur.base import Control, Send, Session
+from tvist_server.gateways.ur.primary import messages
+from tvist_server.gateways.ur.primary.messages import Level
+from tvist_server.gateways.ur.primary.orders import Orders
+from tvist_server.gateways.ur.primary.packages import robot_state
+from tvist_server.gateways.ur.primary.scripts import Intake
+from tvist_server.gateways.ur.robot import UrRobot
+from tvist_server.instruments.snapshot import Snapshot
+
+EVERY: Final = 50
+"""Ticks between two robot states: 10 Hz."""
+
+
+class PrimarySession(Session):
+    """Tells a client of the robot's state and of what happens, and hears its commands. The secondary is the same.
+
+    Args:
+        robot: The robot.
+        control: The way to its controller.
+        send: To the client.
+        read_only: Whether what the client sends is declined.
+    """
+
+    def __init__(self, robot: UrRobot, control: Control, send: Send, *, read_only: bool = False) -> None:
+        self._robot = robot
+        self._send = send
+        self._read_only = read_only
+        self._intake = Intake()
+        self._orders = Orders(robot, control, send)
+        self._due = 0
+        """Tick of the next robot state."""
+        self._safety_mode: int | None = None
+        """As the client knows it; it is told of changes alone."""
+
+    def opened(self) -> None:
+        """Say what runs here; the first robot state follows with the next tick."""
+        self._send(
+            messages.version(version.MAJOR, version.MINOR, version.BUGFIX, version.BUILD, version.DATE)
+        )
+
+    def receive(self, data: bytes) -> None:
+        """Take a piece of a script."""
+        for unit in self._intake.feed(data):
+            if self._read_only:
+                self._orders.read_only()
+            else:
+                self._orders.carry_out(unit)
+
+    def sample(self, snapshot: Snapshot) -> bytes:
+        """The robot state, ten times a second; before it, what has changed."""
+        mode = snapshot.safety_mode
+        if mode != self._safety_mode:
+            if self._safety_mode is not None:
+                self._send(messages.safety_mode(messages.stamp(snapshot), mode))
+            self._safety_mode = mode
+        tick = snapshot.state.tick
+        if tick < self._due:
+            return b""
+        first, self._due = self._due == 0, (tick // EVERY + 1) * EVERY
+        programs = self._robot.programs
+        state = robot_state(
+            self._robot.description, snapshot, playing=programs.playing, paused=programs.paused
+        )
+        if not first:
+            return state
+        self._send(state)  # a client waits for it: it is not to be dropped
+        return b""
+
+    def event(self, event: Event) -> None:
+        """Tell of a protective stop as the error it is, and of warnings as a line of the log."""
+        stamp = messages.stamp(self._robot.latest)
+        why = event.why or ""
+        if event.kind == "protective_stop":
+            self._send(messages.error_code(stamp, messages.PROTECTIVE_STOP, 0, Level.WARNING, why))
+        elif event.kind == "warning":
+            self._send(messages.text(stamp, why))

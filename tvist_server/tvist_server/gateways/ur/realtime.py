@@ -1,0 +1,104 @@
+"""UR's real-time interface, ports 30003 and 30013: all there is to know of a tick, at every tick.
+
+One package of 1220 bytes: its length as an int32, then 152 doubles, big-endian.
+"""
+
+from struct import Struct
+from typing import Final
+
+from tvist_server.gateways.ur.base import Control, Send, Session
+from tvist_server.gateways.ur.primary.orders import Orders
+from tvist_server.gateways.ur.primary.scripts import Intake
+from tvist_server.gateways.ur.robot import UrRobot
+from tvist_server.instruments.snapshot import Snapshot
+
+LAYOUT: Final[tuple[tuple[str | None, int], ...]] = (
+    ("timestamp", 1),
+    ("target_q", 6),
+    ("target_qd", 6),
+    ("target_qdd", 6),
+    ("target_current", 6),
+    ("target_moment", 6),
+    ("actual_q", 6),
+    ("actual_qd", 6),
+    ("actual_current", 6),
+    ("joint_control_output", 6),
+    ("actual_TCP_pose", 6),
+    ("actual_TCP_speed", 6),
+    ("actual_TCP_force", 6),
+    ("target_TCP_pose", 6),
+    ("target_TCP_speed", 6),
+    ("actual_digital_input_bits", 1),
+    ("joint_temperatures", 6),
+    ("actual_execution_time", 1),
+    (None, 1),  # test value, of UR's own use
+    ("robot_mode", 1),
+    ("joint_mode", 6),
+    ("safety_mode", 1),
+    (None, 6),
+    ("actual_tool_accelerometer", 3),
+    (None, 6),
+    ("speed_scaling", 1),
+    ("actual_momentum", 1),
+    (None, 2),
+    ("actual_main_voltage", 1),
+    ("actual_robot_voltage", 1),
+    ("actual_robot_current", 1),
+    ("actual_joint_voltage", 6),
+    ("actual_digital_output_bits", 1),
+    ("runtime_state", 1),
+    ("elbow_position", 3),
+    ("elbow_velocity", 3),
+    ("safety_status", 1),
+    (None, 3),
+    ("payload", 1),
+    ("payload_cog", 3),
+    ("payload_inertia", 6),
+)
+"""Doubles of the package: the snapshot's value and how many; reserved ones, without a name, are 0."""
+
+PACKAGE: Final = Struct(f">i{sum(count for _, count in LAYOUT)}d")
+_KEY: Final = "realtime"
+
+
+def package(snapshot: Snapshot) -> bytes:
+    """The package of a tick, made once for all clients of a robot."""
+    made: bytes | None = snapshot.shared.get(_KEY)
+    if made is None:
+        values: list[float] = []
+        for name, count in LAYOUT:
+            if name is None:
+                values += [0.0] * count
+            elif count == 1:
+                values.append(getattr(snapshot, name))
+            else:
+                found: list[float] = getattr(snapshot, name)
+                values += found[:count]
+                values += [0.0] * (count - len(found))  # an arm with fewer joints
+        made = snapshot.shared[_KEY] = PACKAGE.pack(PACKAGE.size, *values)
+    return made
+
+
+class RealtimeSession(Session):
+    """One client of the real-time interface. What it sends is taken for URScript, as on the primary interface.
+
+    Args:
+        robot: Whose ticks these are.
+        control: The way to its controller.
+        send: Not needed: answers to scripts come on the primary interface.
+        read_only: Whether what the client sends is thrown away.
+    """
+
+    def __init__(self, robot: UrRobot, control: Control, send: Send, *, read_only: bool = False) -> None:  # noqa: ARG002
+        self._intake = Intake()
+        self._orders = None if read_only else Orders(robot, control, robot.tell)
+
+    def receive(self, data: bytes) -> None:
+        """Take a piece of a script."""
+        if self._orders is not None:
+            for unit in self._intake.feed(data):
+                self._orders.carry_out(unit)
+
+    def sample(self, snapshot: Snapshot) -> bytes:
+        """The package of the tick."""
+        return package(snapshot)

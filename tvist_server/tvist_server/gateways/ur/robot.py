@@ -1,0 +1,36 @@
+"""What all doors to one robot share."""
+
+from collections.abc import Callable
+from zlib import crc32
+
+from tvist_plant.description import RobotDescription
+from tvist_server.gateways.ur.programs import Programs
+from tvist_server.gateways.ur.rtde.owners import InputOwners
+from tvist_server.instruments.snapshot import Snapshot
+
+
+class UrRobot:
+    """One robot, as the clients of its doors see it.
+
+    Args:
+        description: The robot.
+        name: On the network.
+        tell: Sends a robot message to all clients that get them.
+    """
+
+    def __init__(self, description: RobotDescription, name: str, tell: Callable[[bytes], None]) -> None:
+        self.description = description
+        self.name = name
+        self.serial = f"2024550{crc32(name.encode()) % 10_000:04d}"
+        """UR's begin with the year; the last digits stand for the name."""
+        self.latest: Snapshot | None = None
+        """The last tick; None before the first."""
+        self.operational_mode = "NONE"
+        """As the dashboard sets it."""
+        self.inputs = InputOwners()
+        self.programs = Programs(self)
+        self._tell = tell
+
+    def tell(self, message: bytes) -> None:
+        """Send a robot message to all clients that get them."""
+        self._tell(message)

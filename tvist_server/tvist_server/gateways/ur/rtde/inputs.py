@@ -1,0 +1,44 @@
+"""Variables that a client sets, with their types."""
+
+from typing import get_args
+
+from tvist_protocol.io import Bank
+from tvist_server.gateways.ur.rtde.registers import NUMBERS, SINGLE_BITS, WORDS
+from tvist_server.gateways.ur.rtde.wire import Wire
+
+DIGITAL: dict[str, tuple[int, int]] = {"standard": (0, 8), "configurable": (8, 8), "tool": (16, 2)}
+"""Groups of digital outputs: the first bit among all, and how many there are."""
+
+NAMED: dict[str, tuple[Wire, str]] = {
+    "speed_slider_mask": (Wire.UINT32, "1: use the fraction."),
+    "speed_slider_fraction": (Wire.DOUBLE, "The speed slider, 0 to 1."),
+    "standard_digital_output_mask": (Wire.UINT8, "Which of the eight standard digital outputs to set."),
+    "standard_digital_output": (Wire.UINT8, "What to set them to."),
+    "configurable_digital_output_mask": (Wire.UINT8, "Which of the eight configurable ones to set."),
+    "configurable_digital_output": (Wire.UINT8, "What to set them to."),
+    "tool_digital_output_mask": (Wire.UINT8, "Which of the tool's two to set."),
+    "tool_digital_output": (Wire.UINT8, "What to set them to."),
+    "standard_analog_output_mask": (Wire.UINT8, "Which of the two analogue outputs to set."),
+    "standard_analog_output_type": (Wire.UINT8, "A bit each: 0 is current (4–20 mA), 1 voltage (0–10 V)."),
+    "standard_analog_output_0": (Wire.DOUBLE, "Share of its range, 0 to 1."),
+    "standard_analog_output_1": (Wire.DOUBLE, "Share of its range, 0 to 1."),
+    "external_force_torque": (Wire.VECTOR6D, "A force sensor's values; kept, and nothing uses them yet."),
+}
+"""All but the registers, with what they are for."""
+
+_BITS, _INTS, _DOUBLES = get_args(Bank)[:3]
+REGISTERS: dict[str, tuple[Bank, int, Wire]] = (
+    {f"input_bit_registers{span}": (_BITS, 32 * k, Wire.UINT32) for k, span in enumerate(WORDS)}
+    | {f"input_bit_register_{k}": (_BITS, k, Wire.BOOL) for k in SINGLE_BITS}
+    | {f"input_int_register_{k}": (_INTS, k, Wire.INT32) for k in NUMBERS}
+    | {f"input_double_register_{k}": (_DOUBLES, k, Wire.DOUBLE) for k in NUMBERS}
+)
+"""Bank, first register and type."""
+
+INPUTS: dict[str, Wire] = {name: wire for name, (wire, _) in NAMED.items()} | {
+    name: wire for name, (_, _, wire) in REGISTERS.items()
+}
+"""Every input variable by name."""
+
+NEED_CONTROL = frozenset(NAMED) - {"external_force_torque"}
+"""What only who has control may set. Registers are memory that anyone may write."""

@@ -1,0 +1,91 @@
+"""`python -m tvist_server.gateways.ur.rtde.table`: prints docs/reference/rtde-variables.md."""
+
+from collections.abc import Iterable
+from inspect import getdoc
+
+from tvist_server.gateways.ur.rtde.inputs import NAMED as NAMED_INPUTS
+from tvist_server.gateways.ur.rtde.outputs import NAMED as NAMED_OUTPUTS
+from tvist_server.gateways.ur.rtde.wire import Wire
+from tvist_server.instruments.snapshot import Snapshot
+
+SOURCES = ("State", "Io", "Computed", "Constant")
+"""Words with which the description of an output variable begins."""
+
+HEAD = """\
+# RTDE's variables
+
+Made by `python -m tvist_server.gateways.ur.rtde.table > docs/reference/rtde-variables.md`.
+
+Nothing here was measured on a robot. Each output has one of four sources:
+
+- **state**: what every client gets in [`state`](../../protocol/README.md#state), to the last bit;
+- **io**: terminals, registers and set-up of the tool;
+- **computed**: from these, as said, when a client asks for it;
+- **constant**: stands in for something that is not simulated.
+
+Torque constants, resistances and thermal figures of the motors are guesses of the right size for a UR5e: two sizes of
+joint, 10 and 7.9 N m/A on the joint's side. Temperatures and energies add up while somebody reads; a time in which
+nobody did counts as one step with the currents at its end.
+
+Vectors of joints have six entries: those of an arm with fewer joints are filled with zeros, those of one with more
+are cut. All variables are offered, also those that a controller of the reported version would not have yet.
+"""
+REGISTER_ROWS = (
+    ("{bank}_bit_registers0_to_31", Wire.UINT32, "bits 0–31"),
+    ("{bank}_bit_registers32_to_63", Wire.UINT32, "bits 32–63"),
+    ("{bank}_bit_register_64 … _127", Wire.BOOL, "one bit each"),
+    ("{bank}_int_register_0 … _47", Wire.INT32, "integers"),
+    ("{bank}_double_register_0 … _47", Wire.DOUBLE, "doubles"),
+)
+
+
+def page() -> str:
+    """The whole page."""
+    outputs = _table(("variable", "type", "source", "what"), _outputs())
+    inputs = _table(("variable", "type", "what"), _inputs())
+    return f"""{HEAD}
+## Outputs
+
+{outputs}
+
+## Inputs
+
+A variable belongs to the connection that asked for it first, until that is closed; to others it is `IN_USE`. Speed
+and outputs are `IN_USE` too while somebody else has control. A value is passed on when it is news.
+
+{inputs}
+"""
+
+
+def describe(name: str) -> tuple[str, str]:
+    """Source of an output variable that is no register, and what it is."""
+    text = " ".join((getdoc(getattr(Snapshot, name)) or "").split())
+    source, _, what = text.partition(": ")
+    if source not in SOURCES or not what.endswith("."):
+        raise ValueError(f"{name} must be described as one of {SOURCES}: {text!r}")
+    return source.lower(), what
+
+
+def _outputs() -> Iterable[tuple[str, ...]]:
+    for wire, names in NAMED_OUTPUTS.items():
+        for name in names.split():
+            yield f"`{name}`", wire.name, *describe(name)
+    for bank in ("output", "input"):
+        for name, wire, what in REGISTER_ROWS:
+            yield f"`{name.format(bank=bank)}`", wire.name, "io", f"Registers: {what}."
+
+
+def _inputs() -> Iterable[tuple[str, ...]]:
+    for name, (wire, what) in NAMED_INPUTS.items():
+        yield f"`{name}`", wire.name, what
+    for name, wire, what in REGISTER_ROWS:
+        yield f"`{name.format(bank='input')}`", wire.name, f"Registers: {what}."
+
+
+def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    lines = [head, ("---",) * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+if __name__ == "__main__":
+    print(page(), end="")  # noqa: T201  its purpose

@@ -1,0 +1,228 @@
+"""Input variables to commands: only what is new, and as few as will do."""
+
+from collections.abc import Callable, Hashable, Iterable, Iterator
+from math import isclose
+
+from tvist_protocol.commands import Command, SetSpeed
+from tvist_protocol.io import Bank, Io, SetIo, SetRegisters
+from tvist_protocol.replies import Refused, Reply
+from tvist_server.gateways.ur.base import Control
+from tvist_server.gateways.ur.robot import UrRobot
+from tvist_server.gateways.ur.rtde.inputs import DIGITAL, REGISTERS
+from tvist_server.gateways.ur.rtde.recipes import Value
+from tvist_server.gateways.ur.rtde.wire import Wire
+
+Complain = Callable[[str], None]
+"""Tells the client what was refused."""
+Number = bool | int | float
+LARGEST = 1e308
+"""What a register may hold, either way: not infinity."""
+
+
+class InputWriter:
+    """Writes what one connection sends.
+
+    A variable that a package leaves out keeps the value it had on this connection: a mask is 0 before the first, and
+    what was never given a value is not set.
+
+    Args:
+        robot: Whose inputs they are.
+        control: The way to it.
+        complain: Takes sentences for the client.
+    """
+
+    def __init__(self, robot: UrRobot, control: Control, complain: Complain) -> None:
+        self._robot = robot
+        self._control = control
+        self._complain = complain
+        self._ledger = robot.inputs.ledger
+        self._held: dict[str, Value] = {}
+
+    def write(self, values: dict[str, Value]) -> None:
+        """Take what one package says."""
+        for name, value in values.items():
+            numbers = value if isinstance(value, tuple) else (value,)
+            if not all(abs(number) <= LARGEST for number in numbers):
+                self._complain(f"{name} is {value}: must be a number within ±{LARGEST:g}")
+                values = {other: kept for other, kept in values.items() if other != name}
+        self._held |= values
+        registers = {name: value for name, value in values.items() if name in REGISTERS}
+        if registers:
+            self._set_registers(registers)
+        if len(registers) == len(values):
+            return
+        force = values.get("external_force_torque")
+        if isinstance(force, tuple):
+            self._robot.inputs.external_force_torque = force
+        if "speed_slider_mask" in values or "speed_slider_fraction" in values:
+            self._set_speed()
+        if any("_output" in name for name in values):
+            self._set_outputs(values)
+
+    @property
+    def _io(self) -> Io | None:
+        latest = self._robot.latest
+        return None if latest is None else latest.io
+
+    def _number(self, name: str) -> float:
+        value = self._held.get(name, 0)
+        assert not isinstance(value, tuple)
+        return value
+
+    # ------------------------------------------------------------------ registers
+
+    def _set_registers(self, values: dict[str, Value]) -> None:
+        """Registers need no control."""
+        io = self._io
+        news: dict[Hashable, object] = {
+            name: value
+            for name, value in values.items()
+            if self._ledger.is_news(name, value, None if io is None else _present(io, name))
+        }
+        if not news:
+            return
+        cells: dict[Bank, dict[int, tuple[Number, bool]]] = {}
+        for name, value in values.items():
+            bank, first, wire = REGISTERS[name]
+            assert not isinstance(value, tuple)
+            new, cell = name in news, cells.setdefault(bank, {})
+            if wire is Wire.UINT32:
+                cell.update({first + k: (bool(int(value) >> k & 1), new) for k in range(32)})
+            else:
+                cell[first] = (value, new)
+        commands = [
+            SetRegisters(bank=bank, first=first, values=run)
+            for bank, cell in cells.items()
+            for first, run in _runs(cell)
+        ]
+        self._ledger.ask(news)
+        then = self._last_of(len(commands), news)
+        for command in commands:
+            self._control.ask(command, then)
+
+    # ------------------------------------------------------------------ what needs control
+
+    def _set_speed(self) -> None:
+        fraction = self._number("speed_slider_fraction")
+        if not int(self._number("speed_slider_mask")) & 1 or not self._is_share("speed_slider_fraction"):
+            return
+        io = self._io
+        if self._ledger.is_news("speed", fraction, None if io is None else io.target_speed_fraction):
+            self._change({"speed": fraction}, lambda token: SetSpeed(token=token, fraction=fraction))
+
+    def _set_outputs(self, values: Iterable[str]) -> None:
+        """Digital and analogue outputs that a package is about, in one command."""
+        groups = {name.partition("_output")[0] for name in values}
+        digital = {bit: on for bit, on in self._digital(groups) if self._is_digital_news(bit, on)}
+        analog: dict[int, tuple[int, float]] = {}
+        if "standard_analog" in groups:
+            analog = {number: kind for number, kind in self._analog() if self._is_analog_news(number, *kind)}
+        if not digital and not analog:
+            return
+        ratios = [analog[number][1] if number in analog else 0.0 for number in range(2)]
+        news: dict[Hashable, object] = {("digital", bit): on for bit, on in digital.items()}
+        news |= {("analog", number): kind for number, kind in analog.items()}
+        self._change(
+            news,
+            lambda token: SetIo(
+                token=token,
+                digital_output_mask=sum(1 << bit for bit in digital),
+                digital_outputs=sum(1 << bit for bit, on in digital.items() if on),
+                standard_analog_output_mask=sum(1 << number for number in analog),
+                standard_analog_output_type=sum(kind << number for number, (kind, _) in analog.items()),
+                standard_analog_output_0=ratios[0],
+                standard_analog_output_1=ratios[1],
+            ),
+        )
+
+    def _digital(self, groups: set[str]) -> Iterator[tuple[int, bool]]:
+        """Digital outputs of these groups that are to be set."""
+        for group, (first, count) in DIGITAL.items():
+            if f"{group}_digital" not in groups or f"{group}_digital_output" not in self._held:
+                continue
+            mask = int(self._number(f"{group}_digital_output_mask"))
+            wanted = int(self._number(f"{group}_digital_output"))
+            for bit in range(count):
+                if mask >> bit & 1:
+                    yield first + bit, bool(wanted >> bit & 1)
+
+    def _is_digital_news(self, bit: int, on: bool) -> bool:
+        io = self._io
+        present = None if io is None else bool(io.actual_digital_output_bits >> bit & 1)
+        return self._ledger.is_news(("digital", bit), on, present)
+
+    def _analog(self) -> Iterator[tuple[int, tuple[int, float]]]:
+        """Analogue outputs that are to be set: their type and share of the range."""
+        mask, types = (int(self._number(f"standard_analog_output_{part}")) for part in ("mask", "type"))
+        for number in range(2):
+            name = f"standard_analog_output_{number}"
+            if mask >> number & 1 and self._is_share(name):
+                yield number, (types >> number & 1, float(self._number(name)))
+
+    def _is_analog_news(self, number: int, kind: int, ratio: float) -> bool:
+        io = self._io
+        present: tuple[int, float] | None = None
+        if io is not None:
+            value, voltage = io.standard_analog_output[number], io.analog_io_types >> (2 + number) & 1
+            shown = value / 10.0 if voltage else (value - 0.004) / 0.016
+            present = voltage, ratio if isclose(shown, ratio, abs_tol=1e-9) else shown
+        return self._ledger.is_news(("analog", number), (kind, ratio), present)
+
+    def _is_share(self, name: str) -> bool:
+        if name not in self._held:
+            return False
+        value = self._number(name)
+        if 0.0 <= value <= 1.0:
+            return True
+        self._complain(f"{name} is {value:g}: must be between 0 and 1")
+        return False
+
+    def _change(self, values: dict[Hashable, object], command: Callable[[str], Command]) -> None:
+        if self._control.held_by_other:
+            self._complain("another client has control: speed and outputs stay as they are")
+            return
+        self._ledger.ask(values)
+        self._control.change(command, self._last_of(1, values))
+
+    def _last_of(self, count: int, values: dict[Hashable, object]) -> Callable[[Reply], None]:
+        """Takes the replies to so many commands, which set these values."""
+        left = count
+
+        def then(reply: Reply) -> None:
+            nonlocal left
+            left -= 1
+            if left == 0:
+                self._ledger.answered(values)
+            if isinstance(reply, Refused):
+                self._complain(reply.why)
+
+        return then
+
+
+def _present(io: Io, name: str) -> Number:
+    """What the robot shows of an input register."""
+    bank, first, wire = REGISTERS[name]
+    registers: list[int] | list[float] = getattr(io, f"{bank}_register")
+    if wire is Wire.BOOL:
+        return bool(int(registers[first // 32]) >> first % 32 & 1)
+    return registers[first // 32 if wire is Wire.UINT32 else first]
+
+
+def _runs(cells: dict[int, tuple[Number, bool]]) -> Iterator[tuple[int, tuple[Number, ...]]]:
+    """Registers in a row, from the first new one to the last: one command each."""
+    run: list[Number] = []
+    first = end = 0
+    for number in [*sorted(cells), None]:
+        if run and (number is None or number != first + len(run)):
+            yield first, tuple(run[:end])
+            run = []
+        if number is None:
+            return
+        value, new = cells[number]
+        if not run and not new:
+            continue
+        if not run:
+            first = number
+        run.append(value)
+        if new:
+            end = len(run)

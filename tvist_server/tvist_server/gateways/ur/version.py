@@ -1,0 +1,5 @@
+"""Version of UR's software that all doors report: of 5.22, since clients ask later ones for more."""
+
+MAJOR, MINOR, BUGFIX, BUILD = 5, 22, 0, 1
+DATE = "01-01-2025, 00:00:00"
+"""Of the build."""

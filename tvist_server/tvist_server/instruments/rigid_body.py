@@ -1,0 +1,167 @@
+"""Mechanics of the rigid arm with the payload that was declared, as the instruments need it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from tvist_plant.description import Payload as Body
+from tvist_plant.description import RobotDescription
+from tvist_plant.model import FLANGE, Floats, payload_inertia, rigid_model
+from tvist_protocol.values import Payload
+
+ELBOW = 2
+"""The joint whose axis is the elbow."""
+SINGULAR = 0.08
+"""Singular value of the Jacobian below which forces are damped [m, or -]."""
+
+
+@dataclass(frozen=True)
+class Tool:
+    """How the tool centre point moves, in the base frame."""
+
+    pose: list[float]
+    """x y z [m] and rotation vector [rad]."""
+    speed: list[float]
+    """Linear [m/s] and angular [rad/s]."""
+    acceleration: list[float]
+    """Linear [m/s²] and angular [rad/s²]."""
+
+
+def add(a: list[float], b: list[float]) -> list[float]:
+    """Sum of two vectors: as lists, for numpy takes ten times as long for three numbers."""
+    return [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+
+
+def cross(a: Sequence[float], b: Sequence[float]) -> list[float]:
+    """Product a × b, as lists too."""
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def carried(omega: list[float], alpha: list[float], arm: list[float]) -> list[float]:
+    """Acceleration of a body's point relative to another one, α × r + ω × (ω × r) [m/s²].
+
+    Args:
+        omega: Angular velocity [rad/s].
+        alpha: Angular acceleration [rad/s²].
+        arm: r, from the other point to this one [m].
+    """
+    return add(cross(alpha, arm), cross(omega, cross(omega, arm)))
+
+
+class RigidBody:
+    """The arm as a controller knows it.
+
+    Args:
+        description: The robot.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self._model = rigid_model(description, Body())
+        self._data = self._model.createData()
+        self._flange = self._model.getFrameId(FLANGE)
+        frame = self._model.frames[self._flange]
+        self._last, self._placement = frame.parentJoint, frame.placement
+        self._bare = self._model.inertias[self._last].copy()
+        self._payload: Payload | None = None
+        self._elbow = ELBOW + 1 if description.joints > ELBOW else 0
+        drives = description.drives
+        self._rotor = np.array(drives.rotor_inertia)
+        self._friction = np.array(drives.coulomb_friction)
+        self._width, self._linear = drives.friction_width, drives.linear_friction
+
+    def tool(self, q: list[float], qd: list[float], qdd: list[float], offset: list[float]) -> Tool:
+        """Motion of the tool centre point.
+
+        Args:
+            q: Joint positions [rad].
+            qd: Joint velocities [rad/s].
+            qdd: Joint accelerations [rad/s²].
+            offset: Of the tool centre point in the flange frame: x y z [m] and rotation vector [rad].
+        """
+        model, data, flange = self._model, self._data, self._flange
+        pin.forwardKinematics(model, data, np.array(q), np.array(qd), np.array(qdd))
+        placement = pin.updateFramePlacement(model, data, flange)
+        velocity = pin.getFrameVelocity(model, data, flange, pin.LOCAL_WORLD_ALIGNED)
+        acceleration = pin.getFrameClassicalAcceleration(model, data, flange, pin.LOCAL_WORLD_ALIGNED)
+        position, rotation = placement.translation.tolist(), placement.rotation
+        linear, linear_rate = velocity.linear.tolist(), acceleration.linear.tolist()
+        omega, alpha = velocity.angular.tolist(), acceleration.angular.tolist()
+        if any(offset):
+            arm = (rotation @ np.array(offset[:3])).tolist()
+            rotation = rotation @ pin.exp3(np.array(offset[3:]))
+            position, linear = add(position, arm), add(linear, cross(omega, arm))
+            linear_rate = add(linear_rate, carried(omega, alpha, arm))
+        return Tool(
+            pose=position + pin.log3(rotation).tolist(),
+            speed=linear + omega,
+            acceleration=linear_rate + alpha,
+        )
+
+    def flange_rotation(self, q: list[float]) -> Floats:
+        """From flange to base, shape (3, 3)."""
+        pin.framesForwardKinematics(self._model, self._data, np.array(q))
+        return np.array(self._data.oMf[self._flange].rotation)
+
+    def elbow(self, q: list[float], qd: list[float]) -> tuple[list[float], list[float]]:
+        """Position [m] and velocity [m/s] of the elbow's axis; of the flange where an arm has no elbow."""
+        model, data = self._model, self._data
+        pin.forwardKinematics(model, data, np.array(q), np.array(qd))
+        if self._elbow:
+            velocity = pin.getVelocity(model, data, self._elbow, pin.LOCAL_WORLD_ALIGNED)
+            return data.oMi[self._elbow].translation.tolist(), velocity.linear.tolist()
+        placement = pin.updateFramePlacement(model, data, self._flange)
+        velocity = pin.getFrameVelocity(model, data, self._flange, pin.LOCAL_WORLD_ALIGNED)
+        return placement.translation.tolist(), velocity.linear.tolist()
+
+    def momentum(self, q: list[float], qd: list[float], payload: Payload) -> float:
+        """|Σ m v| of the links and the payload [kg m/s]."""
+        self._load(payload)
+        momentum = pin.computeCentroidalMomentum(self._model, self._data, np.array(q), np.array(qd))
+        return float(np.linalg.norm(momentum.linear))
+
+    def base_wrench(self, q: list[float], qd: list[float], qdd: list[float], payload: Payload) -> list[float]:
+        """Force [N] and torque [N m] of the arm on its foot, base frame; without the foot's own weight."""
+        self._load(payload)
+        pin.rnea(self._model, self._data, np.array(q), np.array(qd), np.array(qdd))
+        wrench = -self._data.oMi[1].act(self._data.f[1]).vector
+        return [float(value) for value in wrench]
+
+    def expected(self, moment: list[float], qd: list[float], qdd: list[float]) -> Floats:
+        """What drives that follow their target give: the rigid arm's torque, rotors and friction, shape (n,) [N m]."""
+        velocity = np.array(qd) / self._width
+        friction = self._friction * (velocity if self._linear else np.tanh(velocity))
+        expected: Floats = np.array(moment) + self._rotor * np.array(qdd) + friction
+        return expected
+
+    def wrench(self, q: list[float], torque: Floats, offset: list[float]) -> Floats:
+        """Force at the tool centre point that pushes the joints with such torques, shape (6,) [N, N m].
+
+        F with Jᵀ F = τ, by the singular values σ of J: each part of F is τ's over σ, and σ/(σ² + λ²) where
+        σ is small, with λ² = ε² (1 - (σ/ε)²) below ε (Maciejewski and Klein, 1988). What no joint feels is zero.
+
+        Args:
+            q: Joint positions [rad].
+            torque: Of the surroundings on the joints, shape (n,) [N m].
+            offset: Of the tool centre point in the flange frame.
+        """
+        jacobian = pin.computeFrameJacobian(
+            self._model, self._data, np.array(q), self._flange, pin.LOCAL_WORLD_ALIGNED
+        ).reshape(6, -1)  # of an arm with one joint pinocchio makes a plain vector
+        rotation = self._data.oMf[self._flange].rotation
+        if any(offset[:3]):
+            jacobian[:3] -= pin.skew(rotation @ np.array(offset[:3])) @ jacobian[3:]
+        left, values, right = np.linalg.svd(jacobian, full_matrices=False)
+        damping = np.clip(SINGULAR**2 - values**2, 0.0, None)
+        return np.array(left @ (values / (values**2 + damping) * (right @ torque)))
+
+    def _load(self, payload: Payload) -> None:
+        """Let the last link carry this payload."""
+        if payload is self._payload or payload == self._payload:
+            return
+        self._payload, inertia = payload, self._bare
+        if payload.mass > 0.0:
+            body = Body(mass=payload.mass, com=payload.com, inertia=payload.inertia)
+            inertia = self._bare + self._placement.act(payload_inertia(body))
+        self._model.inertias[self._last] = inertia

@@ -1,0 +1,30 @@
+"""Where UR's own interfaces are."""
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta, Struct
+
+Door = Literal[
+    "dashboard", "primary", "secondary", "realtime", "rtde",
+    "primary_read_only", "secondary_read_only", "realtime_read_only",
+]  # fmt: skip
+"""One of them."""
+Port = Annotated[int, Meta(ge=0, le=65535)]
+
+
+class UrPorts(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """TCP port of each; 0 keeps one shut."""
+
+    dashboard: Port = 29999
+    primary: Port = 30001
+    secondary: Port = 30002
+    realtime: Port = 30003
+    rtde: Port = 30004
+    primary_read_only: Port = 30011
+    secondary_read_only: Port = 30012
+    realtime_read_only: Port = 30013
+
+    def open(self) -> dict[Door, int]:
+        """Port by door, of those that are not kept shut."""
+        return {door: port for door, port in msgspec.structs.asdict(self).items() if port}  # type: ignore[misc]
