@@ -29,6 +29,7 @@ class FakeControl:
         self.commands = []
         self.reply = Done()
         self.held_by_other = False
+        self.left = 0
         self._waiting = None
 
     def change(self, command, then):
@@ -52,6 +53,13 @@ class FakeControl:
         waiting, self._waiting = self._waiting, None
         for then in waiting:
             then(reply or self.reply)
+
+    def lasting(self):
+        return self
+
+    def leave(self):
+        """What lasted is over."""
+        self.left += 1
 
     def of(self, kind):
         """The recorded commands of one kind."""

@@ -328,14 +328,11 @@ def test_a_program_ends_with_the_power_and_not_with_a_power_off_that_was_refused
     assert client.ask("programState") == "STOPPED wait_program.urp"
 
 
-def test_what_plays_outlives_other_clients_and_not_its_own(client, desk, control):
-    other = Client(desk, SimpleNamespace(held_by_other=False))
+def test_what_plays_outlives_its_client(client, desk):
     client.ask("load wait_program.urp")
     client.ask("play")
-    other.session.closed()
-    assert desk.programs.playing
     client.session.closed()
-    assert not desk.programs.playing
+    assert desk.programs.playing
 
 
 # ---------------------------------------------------------------------- order, bounds, ends

@@ -237,3 +237,32 @@ async def test_in_lockstep_nothing_is_dropped():
     await desk.doors.shut()
     await until(lambda: not desk.doors._connections)
     desk.doors.close()
+
+
+async def test_a_program_goes_on_without_its_client_and_control_ends_with_it(desk):
+    await desk.tick()
+    reader, writer = await connect(desk, "dashboard")
+    await reader.readline()
+    answers = await lines(reader, writer, "load Q2.urp", "play")
+    assert answers[1] == "Starting program"
+    writer.close()
+    await until(lambda: not desk.doors._connections)
+    await desk.tick(100)
+    assert desk.doors.robot.programs.playing
+    assert desk.holder() == "ur-127.0.0.1"
+    await desk.tick(1200)
+    await until(lambda: desk.holder() is None)
+    assert not desk.doors.robot.programs.playing
+    target = desk.doors.robot.latest.target_q
+    assert max(abs(a - b) for a, b in zip(target, UR5E.poses["Q2"], strict=True)) < 1e-6
+
+
+async def test_a_client_that_quits_behind_a_slow_command_is_let_out(desk):
+    await desk.tick()
+    reader, writer = await connect(desk, "dashboard")
+    await reader.readline()
+    writer.write(b"power off\nquit\n")
+    assert (await reader.readline()).startswith(b"Powering off")
+    await reader.readline()
+    await desk.tick(2)
+    assert await asyncio.wait_for(reader.read(), 10) == b""

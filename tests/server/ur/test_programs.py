@@ -34,6 +34,13 @@ class Motions:
         self.commands, self.waiting = [], None
         self.number = 0
         self.refusals = {}
+        self.left = 0
+
+    def lasting(self):
+        return self
+
+    def leave(self):
+        self.left += 1
 
     def change(self, command, then):
         self.ask(command("token"), then)
@@ -367,22 +374,28 @@ def test_a_program_ends_where_the_arm_may_move_no_longer(programs, robot, motion
     assert titles(robot) == [STARTED, STOPPED]
 
 
-def test_a_client_that_goes_takes_its_program_along_and_nobody_elses(programs, motions, answers):
-    load(programs, "paper.urp", motions)
+def test_control_is_held_as_long_as_the_program_plays(programs, motions, answers):
+    load(programs, "Q2.urp", motions)
     programs.play(motions, answers)
-    programs.left(Motions())
-    assert programs.playing
-    programs.left(motions)
-    assert programs.state is ProgramState.STOPPED
-    assert motions.kinds() == [c.MoveJ, c.Stop]
+    programs.pause(motions, answers)
+    assert motions.left == 0
+    other = Motions()
+    programs.play(other, answers)
+    assert (motions.left, other.left) == (1, 0)
     programs.event(done(1))
-    assert len(motions.targets) == 1
+    assert programs.state is ProgramState.STOPPED
+    assert (motions.left, other.left) == (1, 1)
 
 
 class Direct:
     """A control that is a real controller in lockstep."""
 
     held_by_other = False
+
+    def lasting(self):
+        return self
+
+    def leave(self): ...
 
     def __init__(self, robot):
         self.robot = robot

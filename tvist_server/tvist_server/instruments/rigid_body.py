@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import hypot
 
 import numpy as np
 import pinocchio as pin
@@ -119,7 +120,7 @@ class RigidBody:
         """|Σ m v| of the links and the payload [kg m/s]."""
         self._load(payload)
         momentum = pin.computeCentroidalMomentum(self._model, self._data, np.array(q), np.array(qd))
-        return float(np.linalg.norm(momentum.linear))
+        return hypot(*momentum.linear.tolist())
 
     def base_wrench(self, q: list[float], qd: list[float], qdd: list[float], payload: Payload) -> list[float]:
         """Force [N] and torque [N m] of the arm on its foot, base frame; without the foot's own weight."""

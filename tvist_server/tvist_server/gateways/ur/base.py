@@ -29,6 +29,12 @@ class Control(Protocol):
     def ask(self, command: Command, then: Then) -> None:
         """Send a command that needs none."""
 
+    def lasting(self) -> "Control":
+        """Another one for the same host, that does not end with the connection but by its own `leave`."""
+
+    def leave(self) -> None:
+        """Give back what was held by it."""
+
     @property
     def held_by_other(self) -> bool:
         """Whether somebody else holds control, as far as is known: commands that change something are refused."""

@@ -107,6 +107,8 @@ class Connection(asyncio.Protocol):
             log.exception("a UR door failed, its client is cut off")
             transport.abort()
             return
+        if session.over:
+            transport.close()
         if not data:
             return
         if self._lossless:

@@ -126,8 +126,12 @@ class ConnectionControl(Control):
         """Whether somebody else has control."""
         return self._lease.held_by_other
 
+    def lasting(self) -> "ConnectionControl":
+        """Another one for the same host, that does not end with the connection."""
+        return ConnectionControl(self._lease)
+
     def leave(self) -> None:
-        """The connection is closed."""
+        """The connection is closed, or what lasted beyond it is over."""
         self._lease.leave(self)
 
 

@@ -132,7 +132,8 @@ class Programs:
         elif self.playing or not self._ready() or control.held_by_other:
             heard(False)
         else:
-            self.state, self._control, self._line = ProgramState.PLAYING, control, 0
+            self.state, self._line = ProgramState.PLAYING, 0
+            self._hold(control)
             if self._moves:
                 self._move(heard)
             else:
@@ -174,11 +175,6 @@ class Programs:
         self._end()
         control.ask(Stop(), lambda reply: heard(not isinstance(reply, Refused)))
 
-    def left(self, control: Control) -> None:
-        """A client is gone, and its control with it: the program that it played ends."""
-        if self._control is control:
-            self.stop(control, lambda done: None)  # noqa: ARG005
-
     def interrupt(self) -> None:
         """The arm can move no longer: the program ends."""
         self._end()
@@ -212,7 +208,8 @@ class Programs:
         if control.held_by_other:
             heard(False)
             return
-        self.state, self._control = ProgramState.PLAYING, control
+        self.state = ProgramState.PLAYING
+        self._hold(control)
         if self.standing:
             self._go_on()
             heard(True)
@@ -305,8 +302,15 @@ class Programs:
         if begun:
             self._say("PROGRAM_XXX_STOPPED")
 
+    def _hold(self, control: Control | None) -> None:
+        """Play with the control of whoever plays: it lasts as long as the program, its client may go."""
+        before, self._control = self._control, None if control is None else control.lasting()
+        if before is not None:
+            before.leave()
+
     def _forget(self) -> None:
-        self.state, self._begun, self._control = ProgramState.STOPPED, False, None
+        self.state, self._begun = ProgramState.STOPPED, False
+        self._hold(None)
         self._motion, self._awaited, self._ended = None, False, {}
 
     def _say(self, title: str) -> None:

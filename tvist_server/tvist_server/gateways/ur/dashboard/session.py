@@ -76,7 +76,6 @@ class DashboardSession(Session):
     def closed(self) -> None:
         """Forget what waits."""
         self.over, self._rested = True, None
-        self._robot.programs.left(self._control)
 
     def _work(self) -> None:
         """Carry out what waits, until a command has to wait for its answer."""
