@@ -142,3 +142,15 @@ def test_a_filter_that_cannot_do_what_it_should_says_so_once():
     assert robot.send(c.SetShaper, name="auto") == Done()
     robot.tick(5)
     assert len([event for event in robot.events if event.code == "out_of_range"]) == 2
+
+
+def test_a_clipped_filter_is_a_bit_in_every_state_and_one_event():
+    robot = Robot()
+    estimator = robot.controller.cycle.tvist.estimator
+    for now in (False, True, False, True):
+        estimator.clipped = now
+        robot.tick(3)
+    bits = [state.shaper_clipped for state in robot.states]
+    assert bits == [False] * 3 + [True] * 3 + [False] * 3 + [True] * 3
+    said = [event.tick for event in robot.events if event.code == "out_of_range"]
+    assert said == [4, 10]

@@ -1,7 +1,7 @@
 """One robot of a server: its controller, and what stands between that and clock, network and file."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from tvist_protocol.stream import Event, Telemetry
@@ -90,10 +90,11 @@ class ServedRobot:
         """Why the robot ticks no more, where it does not."""
         return self._host.failure
 
-    def telemetry(self, gateway: Gateway, punctuality: Punctuality | None) -> Telemetry:
+    def telemetry(self, gateways: Sequence[Gateway], punctuality: Punctuality | None) -> Telemetry:
         """The server's own figures on this robot."""
         controller, counters = self.controller, self.controller.counters
         late, lost, limited = controller.motion.counters()
+        refused = sum(gateway.setpoints_refused for gateway in gateways)
         on_time = punctuality or Punctuality(0, 1.0, 0.0, 0.0, 0.0)
         return Telemetry(
             tick=controller.tick_number,
@@ -102,10 +103,10 @@ class ServedRobot:
             late_p99_us=on_time.p99_us,
             late_max_us=on_time.max_us,
             missed_ticks=counters.missed_ticks,
-            dropped_states=self.outlet.dropped,
+            dropped_states=self.outlet.dropped + sum(gateway.dropped for gateway in gateways),
             recorder_dropped=self.recorder.dropped if self.recorder is not None else 0,
-            setpoints_received=counters.setpoints_received + gateway.setpoints_refused,
-            setpoints_refused=counters.setpoints_refused + gateway.setpoints_refused,
+            setpoints_received=counters.setpoints_received + refused,
+            setpoints_refused=counters.setpoints_refused + refused,
             setpoints_late=late,
             setpoints_lost=lost,
             setpoints_limited=limited,

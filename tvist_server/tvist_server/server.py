@@ -145,8 +145,9 @@ class Server:
     def _tell_telemetry(self) -> None:
         # In lockstep each robot has a clock of its own.
         clocks = self._clocks if len(self._clocks) > 1 else self._clocks * len(self.robots)
-        for robot, gateway, clock in zip(self.robots, self._gateways, clocks, strict=True):
-            robot.outlet.telemetry(robot.telemetry(gateway, clock.punctuality(robot.driven)))
+        for number, (robot, clock) in enumerate(zip(self.robots, clocks, strict=True)):
+            gateways = [self._gateways[number], *self._doors[number : number + 1]]
+            robot.outlet.telemetry(robot.telemetry(gateways, clock.punctuality(robot.driven)))
 
 
 def _on_signals(loop: asyncio.AbstractEventLoop) -> asyncio.Event:

@@ -45,6 +45,8 @@ class Gateway(ABC):
 
     setpoints_refused: int
     """Set-points that never reached the desk: put on a key with a wildcard, or too large."""
+    dropped = 0
+    """States that found too many waiting."""
 
     @abstractmethod
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:

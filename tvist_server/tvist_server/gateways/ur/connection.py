@@ -80,6 +80,8 @@ class Connection(asyncio.Protocol):
         session, self.session = self.session, None
         self._transport = None
         self._members.discard(self)
+        if self.dropped:
+            log.warning("a client of a UR door read too slowly: %d samples were dropped", self.dropped)
         if session is not None:
             try:
                 session.closed()

@@ -73,8 +73,6 @@ class UrDoors(Gateway):
         # Each is counted by one thread alone.
         self._handed, self._taken = 0, 0
         self._room = threading.Event()
-        self.dropped = 0
-        """States that found too many waiting."""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._servers: list[asyncio.Server] = []
         self._alive: asyncio.Task[None] | None = None
