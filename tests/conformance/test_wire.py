@@ -159,7 +159,7 @@ class TestControl:
 
 class TestWhatIsSaid:
     def test_every_kind_of_message_agrees_with_its_schema(self, stepped):
-        stepped.listen("state", "event", "truth", "telemetry")
+        stepped.listen("state", "event", "truth", "telemetry", "io")
         with stepped.control() as token:
             said = [stepped.info(), stepped.command("keep_alive", token="stale")]
             said.append(stepped.command("move_j", token=token, q=Q_NEAR))
@@ -169,10 +169,11 @@ class TestWhatIsSaid:
             said.append(stepped.command("set_shaper", token=token, name="zvd"))
             stepped.step(token, 1)
             stepped.wait("telemetry")
+            stepped.wait("io")
         for messages in stepped.received.values():
             said += messages
         kinds = {message["type"] for message in said}
-        assert kinds == {"info", "refused", "accepted", "done", "state", "event", "truth", "telemetry"}
+        assert kinds == {"info", "refused", "accepted", "done", "state", "event", "truth", "telemetry", "io"}
         for message in {json.dumps(message): message for message in said}.values():
             validate(message)
 
