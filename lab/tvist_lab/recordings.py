@@ -34,6 +34,7 @@ STATE_COLUMNS = (
     "estimated_zeta",
     "shaper_delay",
     "missed_ticks",
+    "shaper_clipped",
 )
 """Fields of a `state`, each of which becomes a column of the same name."""
 TRUTH_PREFIX = "truth_"

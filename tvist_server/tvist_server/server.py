@@ -121,6 +121,7 @@ class Server:
         self.start()
         try:
             for doors in self._doors:
+                await doors.first_tick()
                 await doors.open()
             ready()
             while not ended.is_set() and self.failure is None:

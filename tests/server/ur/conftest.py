@@ -4,6 +4,7 @@ from collections.abc import Callable
 from types import SimpleNamespace
 
 import pytest
+from hypothesis import settings
 
 from tvist_plant.description import load
 from tvist_protocol import commands as c
@@ -13,6 +14,10 @@ from tvist_protocol.values import Payload
 from tvist_server.controller import Controller
 from tvist_server.instruments.snapshot import Instruments
 from tvist_server.setup import Setup, paper_payload
+
+# On a busy machine any example can take long.
+settings.register_profile("busy", deadline=None)
+settings.load_profile("busy")
 
 UR5E = load("ur5e")
 TOKEN = "the-token"

@@ -2,7 +2,10 @@
 
 import asyncio
 import contextlib
+import gc
+import socket
 import struct
+import weakref
 
 import pytest
 from tests.server.robots import UR5E, Robot
@@ -239,6 +242,27 @@ async def test_in_lockstep_nothing_is_dropped():
     desk.doors.close()
 
 
+@pytest.mark.parametrize("lockstep", [False, True])
+async def test_what_everybody_is_told_reaches_who_is_far_behind_in_lockstep_alone(lockstep):
+    desk = Desk()
+    desk.doors = UrDoors(desk, UR5E, "ur5e", "127.0.0.1", {"primary": 0}, lockstep=lockstep)
+    await desk.doors.open()
+    reader, writer = await connect(desk, "primary")
+    await until(lambda: desk.doors._connections)
+    (connection,) = desk.doors._connections
+    writer.transport.pause_reading()
+    connection._transport.pause_reading()
+    connection._transport.write(bytes(20_000_000))
+    desk.doors.robot.tell(b"news")
+    connection.close()
+    writer.transport.resume_reading()
+    assert (await reader.read()).endswith(b"news") == lockstep
+    await until(lambda: not desk.doors._connections)
+    await desk.doors.shut()
+    desk.doors.close()
+    writer.close()
+
+
 async def test_a_program_goes_on_without_its_client_and_control_ends_with_it(desk):
     await desk.tick()
     reader, writer = await connect(desk, "dashboard")
@@ -266,3 +290,150 @@ async def test_a_client_that_quits_behind_a_slow_command_is_let_out(desk):
     await reader.readline()
     await desk.tick(2)
     assert await asyncio.wait_for(reader.read(), 10) == b""
+
+
+async def answered(reader, lines):
+    for _ in range(lines):
+        assert await asyncio.wait_for(reader.readline(), 30)
+
+
+async def test_a_client_that_asks_much_at_once_and_reads_gets_every_answer(desk):
+    await desk.tick()
+    reader, writer = await connect(desk, "dashboard")
+    await reader.readline()
+    reading = asyncio.create_task(answered(reader, 60_000))
+    writer.write(b"\n" * 60_000)
+    await reading
+
+
+async def test_a_client_that_asks_and_does_not_read_is_not_asked_for_more(desk):
+    await desk.tick()
+    reader, writer = await connect(desk, "dashboard")
+    await reader.readline()
+    reader._transport.pause_reading()
+    (connection,) = desk.doors._connections
+    writer.write(b"\n" * 60_000)
+    await until(lambda: not connection._transport.is_reading())
+    assert connection._transport.get_write_buffer_size() < 600_000
+    assert await lines(*await connect_and_greet(desk), "robotmode") == ["Robotmode: RUNNING"]
+    reader._transport.resume_reading()
+    await answered(reader, 60_000)
+
+
+async def connect_and_greet(desk):
+    reader, writer = await connect(desk, "dashboard")
+    await reader.readline()
+    return reader, writer
+
+
+async def test_scripts_by_the_thousand_cut_nobody_off_who_hears_of_them(desk):
+    await desk.tick()
+    listener, _ = await connect(desk, "primary")
+    _, writer = await connect(desk, "realtime")
+    await until(lambda: len(desk.doors._connections) == 2)
+    writer.write(b"x\n" * 30_000)
+    text = b"program_not_run"
+    heard = 0
+    while heard < 1000:
+        data = await asyncio.wait_for(listener.read(1 << 16), 30)
+        assert data
+        heard += data.count(text)
+    await until(lambda: len(desk.doors._connections) == 2)
+
+
+async def test_no_more_commands_of_a_client_wait_than_a_tick_can_do(desk, monkeypatch):
+    await desk.tick()
+    due = []
+    monkeypatch.setattr(desk, "request", lambda data, reply: due.append((data, reply)))
+    _, writer = await connect(desk, "realtime")
+    writer.write(b"stop program\n" * 1000)
+    done = most = 0
+    while done < 1000:
+        await until(lambda: due)
+        most = max(most, len(due))
+        assert len(due) < 100
+        done += len(due)
+        for data, reply in due:
+            reply(desk.host.request(data))
+        due.clear()
+    assert most > 1
+
+
+async def test_who_comes_first_finds_a_robot():
+    desk = Desk()
+    desk.doors = UrDoors(desk, UR5E, "ur5e", "127.0.0.1", {"dashboard": 0})
+    waiting = asyncio.create_task(desk.doors.first_tick())
+    await asyncio.sleep(0)
+    assert not waiting.done()
+    await desk.tick()
+    await waiting
+    await desk.doors.open()
+    assert desk.doors.robot.latest.state.tick == 1
+    await desk.doors.shut()
+    desk.doors.close()
+
+
+async def test_hosts_that_have_gone_are_forgotten(desk):
+    await desk.tick()
+    for last in range(2, 12):
+        reader, writer = await asyncio.open_connection(
+            "127.0.0.1", desk.doors.ports["dashboard"], local_addr=(f"127.0.0.{last}", 0)
+        )
+        await reader.readline()
+        assert await lines(reader, writer, "power off") == ["Powering off"]
+        assert desk.holder() == f"ur-127.0.0.{last}"
+        writer.close()
+        await until(lambda: desk.holder() is None)
+    await until(lambda: not desk.doors._connections)
+    gc.collect()
+    assert not desk.doors._leases
+
+
+async def test_who_quits_behind_a_slow_command_waits_for_no_tick(desk):
+    await desk.tick()
+    reader, writer = await connect(desk, "dashboard")
+    await reader.readline()
+    writer.write(b"power off\nquit\n")
+    assert (await asyncio.wait_for(reader.read(), 10)).endswith(b"Disconnected\n")
+
+
+async def test_a_fault_of_ours_at_an_answer_ends_that_connection(desk, monkeypatch, caplog):
+    await desk.tick()
+    reader, writer = await connect(desk, "dashboard")
+    await reader.readline()
+    (connection,) = desk.doors._connections
+    monkeypatch.setattr(connection.session, "_say", lambda _: 1 / 0)
+    writer.write(b"power off\n")
+    with contextlib.suppress(ConnectionError):
+        assert await asyncio.wait_for(reader.read(), 10) == b""
+    assert "failed" in caplog.text
+
+
+async def test_a_tick_leaves_nothing_for_the_collector(desk):
+    await desk.tick()
+    reader, writer = await connect(desk, "rtde")
+    names = b"actual_q,target_current,output_int_register_3"
+    recipe = struct.pack(">HBd", 11 + len(names), ord("O"), 500.0) + names
+    writer.write(struct.pack(">HBH", 5, ord("V"), 2) + recipe + struct.pack(">HB", 3, ord("S")))
+    for _ in range(3):
+        await reader.readexactly(struct.unpack(">H", await reader.readexactly(2))[0] - 2)
+    gc.collect()
+    gc.disable()
+    try:
+        await desk.tick()
+        gone = weakref.ref(desk.doors.robot.latest)
+        await desk.tick(2)
+        assert gone() is None
+    finally:
+        gc.enable()
+
+
+async def test_a_client_whose_machine_lost_power_is_found_out(desk):
+    await connect(desk, "dashboard")
+    await until(lambda: desk.doors._connections)
+    (connection,) = desk.doors._connections
+    found = connection._transport.get_extra_info("socket")
+    assert found.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+    idle = found.getsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE)
+    every = found.getsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL)
+    assert idle + every * found.getsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT) <= 30

@@ -99,6 +99,18 @@ def test_where_somebody_else_has_control_the_refusal_comes_back_each_time():
     assert replies[-1] == Done()
 
 
+def test_who_was_refused_is_not_kept_in_mind():
+    desk, replies = Desk(), []
+    desk.take("anna")
+    for last in range(10):
+        connection = ConnectionControl(lease(desk, f"127.0.0.{last}"))
+        connection.change(slow(0.5), replies.append)
+        desk.answer()
+        connection.leave()
+    assert len(replies) == 10
+    assert not desk.controller.session._present
+
+
 def test_another_host_is_somebody_else():
     desk, replies = Desk(), []
     here, there = (ConnectionControl(lease(desk, host)) for host in ("127.0.0.1", "10.0.0.2"))

@@ -1,6 +1,7 @@
 """The primary interface: robot state, robot messages, and the ear for commands."""
 
 import struct
+import tracemalloc
 from types import SimpleNamespace
 
 import pytest
@@ -351,6 +352,20 @@ def test_a_unit_that_is_too_long_is_answered_once_and_forgotten():
     assert units[0].text.startswith("def f():")
     units = intake.feed(b"end\nstop program\n")
     assert [unit.words for unit in units] == ["stop program"]
+
+
+def test_a_unit_of_short_lines_takes_little_more_memory_than_it_has_bytes():
+    intake = Intake()
+    tracemalloc.start()
+    try:
+        intake.feed(b"def f():\n")
+        for _ in range(100):
+            intake.feed(b"ab\n" * 3000)
+        held = tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    assert intake.held > 900_000
+    assert held < 2 * intake.held
 
 
 def test_a_line_that_is_too_long_does_not_swallow_the_next():

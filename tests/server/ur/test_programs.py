@@ -488,3 +488,15 @@ def test_whatever_happens_each_request_is_answered_once_and_starts_and_stops_alt
     assert said[::2] == ["PROGRAM_XXX_STARTED"] * len(said[::2])
     assert said[1::2] == ["PROGRAM_XXX_STOPPED"] * len(said[1::2])
     assert len(said) % 2 == 0
+
+
+@pytest.mark.parametrize("name", ["Q2.urp", "wait_program.urp"])
+def test_no_program_survives_an_arm_without_power(programs, robot, motions, answers, ur5e, name):
+    load(programs, name, motions)
+    programs.play(motions, answers)
+    programs.watch(robot.latest)
+    assert programs.playing
+    programs.watch(ur5e(mode="POWER_OFF").tick())
+    assert programs.state is ProgramState.STOPPED
+    assert titles(robot) == [STARTED, STOPPED]
+    assert motions.left == 1

@@ -8,8 +8,10 @@ import socket
 import threading
 from collections.abc import Callable, Mapping
 from functools import partial
+from weakref import WeakValueDictionary
 
 from tvist_plant.description import RobotDescription
+from tvist_plant.plant import PERIOD
 from tvist_protocol.io import Io
 from tvist_protocol.stream import Event, State
 from tvist_server.gateways.base import Desk, Gateway, GatewayError, Message, Topic
@@ -30,6 +32,11 @@ MOST_CONNECTIONS = 256
 """At all doors of a robot together."""
 SEND_BUFFER = 32_768
 """What the system holds for a client [bytes]: a tenth of a second of samples; more would only be older."""
+PROBES = (10, 5, 3)
+"""A client that is silent so long [s] is asked for a sign of life at such intervals [s]; after so many without one
+it is gone, and its control with it: its machine may have lost power or network."""
+FIRST = 1000
+"""Ticks that the first one may take."""
 MOST_PENDING = 250
 """States that may wait for this thread: half a second."""
 PAUSE = 0.02
@@ -67,8 +74,11 @@ class UrDoors(Gateway):
         self.robot = UrRobot(description, name, self._tell)
         self._instruments = Instruments(description)
         self._io: Io | None = None
+        self._first: State | None = None
+        """The last one before the doors open."""
         self._connections: set[Connection] = set()
-        self._leases: dict[str, HostLease] = {}
+        self._leases = WeakValueDictionary[str, HostLease]()
+        """By host, as long as one of its connections lives."""
         self._lockstep = lockstep
         # Each is counted by one thread alone.
         self._handed, self._taken = 0, 0
@@ -89,9 +99,18 @@ class UrDoors(Gateway):
         """Port by door, as they are."""
         return {door: bound.getsockname()[1] for door, bound in self._sockets.items()}
 
+    async def first_tick(self) -> None:
+        """Wait for it, where time passes by itself: clients that come before would find no controller."""
+        for _ in range(0 if self._lockstep else FIRST):
+            if self._first is not None:
+                return
+            await asyncio.sleep(PERIOD)
+
     async def open(self) -> None:
         """Let clients in; they are served by the running loop."""
         self._loop = asyncio.get_running_loop()
+        if self._first is not None:
+            self._see(self._first)
         for door, bound in self._sockets.items():
             self._servers.append(
                 await self._loop.create_server(
@@ -113,6 +132,8 @@ class UrDoors(Gateway):
         if self._loop is None:  # nobody is in
             if isinstance(message, Io):
                 self._io = message
+            elif isinstance(message, State):
+                self._first = message
         elif isinstance(message, State):
             if self._has_room():
                 self._handed += 1
@@ -153,8 +174,15 @@ class UrDoors(Gateway):
     def _on_state(self, state: State) -> None:
         self._taken += 1
         self._room.set()
+        self._see(state)
+
+    def _see(self, state: State) -> None:
         if self._io is not None:
+            if self.robot.latest is not None:
+                # What was made of the last tick knows it: without this both would wait for the collector.
+                self.robot.latest.shared.clear()
             snapshot = self.robot.latest = self._instruments.snapshot(state, self._io)
+            self.robot.programs.watch(snapshot)
             for connection in tuple(self._connections):
                 connection.sample(snapshot)
 
@@ -166,12 +194,13 @@ class UrDoors(Gateway):
     def _tell(self, message: bytes) -> None:
         for connection in tuple(self._connections):
             if isinstance(connection.session, PrimarySession):
-                connection.send(message)
+                connection.tell(message)
 
     def _lease(self, host: str) -> HostLease:
-        if host not in self._leases:
-            self._leases[host] = HostLease(self._desk, host, self._soon)
-        return self._leases[host]
+        lease = self._leases.get(host)
+        if lease is None:
+            lease = self._leases[host] = HostLease(self._desk, host, self._soon)
+        return lease
 
     def _soon(self, action: Callable[[], None]) -> None:
         loop = self._loop
@@ -208,9 +237,13 @@ def _listen(address: str, port: int, door: Door) -> socket.socket:
     bound = socket.socket(family, socket.SOCK_STREAM)
     try:
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        bound.setsockopt(
-            socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER
-        )  # those of its clients have it, too
+        # Those of its clients have these, too.
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        for option, value in zip(
+            (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT), PROBES, strict=True
+        ):
+            bound.setsockopt(socket.IPPROTO_TCP, option, value)
         bound.bind((address, port))
         bound.listen(32)
     except OSError as error:

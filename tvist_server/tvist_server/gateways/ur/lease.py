@@ -99,6 +99,7 @@ class HostLease:
             if not self._users:  # they went meanwhile
                 self.leave(None)
         else:
+            self._desk.client_gone(self.client)
             for _, then in waiting:
                 then(reply)
 
@@ -108,18 +109,31 @@ class ConnectionControl(Control):
 
     Args:
         lease: Of its host.
+        hear: Called with each answer, as a call to make.
     """
 
-    def __init__(self, lease: HostLease) -> None:
+    def __init__(self, lease: HostLease, hear: Callable[[Callable[[], None]], None] | None = None) -> None:
         self._lease = lease
+        self._hear = hear or _at_once
+        self.unanswered = 0
+        """Commands whose answers are still to come."""
 
     def change(self, command: Callable[[str], Command], then: Then) -> None:
         """Send a command that needs control."""
-        self._lease.change(self, command, then)
+        self._lease.change(self, command, self._counted(then))
 
     def ask(self, command: Command, then: Then) -> None:
         """Send a command that needs none."""
-        self._lease.ask(command, then)
+        self._lease.ask(command, self._counted(then))
+
+    def _counted(self, then: Then) -> Then:
+        self.unanswered += 1
+
+        def counted(reply: Reply) -> None:
+            self.unanswered -= 1
+            self._hear(lambda: then(reply))
+
+        return counted
 
     @property
     def held_by_other(self) -> bool:
@@ -133,6 +147,10 @@ class ConnectionControl(Control):
     def leave(self) -> None:
         """The connection is closed, or what lasted beyond it is over."""
         self._lease.leave(self)
+
+
+def _at_once(action: Callable[[], None]) -> None:
+    action()
 
 
 def _nothing(reply: Reply) -> None:

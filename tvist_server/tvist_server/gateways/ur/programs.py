@@ -175,6 +175,11 @@ class Programs:
         self._end()
         control.ask(Stop(), lambda reply: heard(not isinstance(reply, Refused)))
 
+    def watch(self, snapshot: Snapshot) -> None:
+        """A tick: no program survives an arm without power, whoever took it."""
+        if self.state is not ProgramState.STOPPED and snapshot.robot_mode != RobotMode.RUNNING:
+            self.interrupt()
+
     def interrupt(self) -> None:
         """The arm can move no longer: the program ends."""
         self._end()

@@ -50,10 +50,8 @@ class Intake:
     def __init__(self) -> None:
         self._rest = bytearray()
         """Of a line that is not complete."""
-        self._lines: list[str] = []
-        """Of the unit that is not complete."""
-        self._size = 0
-        """Bytes of them."""
+        self._unit = bytearray()
+        """Lines of the unit that is not complete: as bytes, since a string a line takes twenty times as much."""
         self._depth = 0
         """Blocks that are open."""
         self._start: tuple[int, int] | None = None
@@ -64,7 +62,7 @@ class Intake:
     @property
     def held(self) -> int:
         """Bytes that are kept for a unit that is not complete."""
-        return self._size + len(self._rest)
+        return len(self._unit) + len(self._rest)
 
     def feed(self, data: bytes) -> list[Unit]:
         """Take a piece; the units that it completes."""
@@ -72,7 +70,7 @@ class Intake:
         *lines, rest = data.split(b"\n")
         for piece in lines:
             self._keep(piece, units)
-            line = self._rest.decode(errors="replace").removesuffix("\r")
+            line = bytes(self._rest).removesuffix(b"\r")
             self._rest.clear()
             self._take(line, units)
         self._keep(rest, units)
@@ -82,26 +80,24 @@ class Intake:
         """Add to the line that is not complete."""
         if self.held + len(piece) > LONGEST:
             if not self._skipping:
-                seen = "\n".join(
-                    [*self._lines, self._rest.decode(errors="replace") + piece.decode(errors="replace")]
-                )
+                seen = (self._unit + self._rest + piece).decode(errors="replace")
                 units.append(Unit(seen[:GLIMPSE], *(self._start or (1, 1)), too_long=True))
             self._skipping = True
-            self._lines, self._size = [], 0
+            self._unit.clear()
             del self._rest[GLIMPSE:]  # the beginning of a line tells what it opens
             piece = piece[:GLIMPSE]
         self._rest += piece
 
-    def _take(self, line: str, units: list[Unit]) -> None:
+    def _take(self, whole: bytes, units: list[Unit]) -> None:
         """A line is complete."""
+        line = whole.decode(errors="replace")
         code = _code(line)
-        if not line.strip() and not self._lines and not self._skipping:
+        if not line.strip() and not self._unit and not self._skipping:
             return
         if code and self._start is None:
-            self._start = len(self._lines) + 1, len(line) - len(line.lstrip()) + 1
+            self._start = self._unit.count(b"\n") + 1, len(line) - len(line.lstrip()) + 1
         if not self._skipping:
-            self._lines.append(line)
-            self._size += len(line) + 1
+            self._unit += whole + b"\n"
         if code == "end":
             self._depth = max(self._depth - 1, 0)
         elif _OPENS.match(code) and not _CLOSES.search(code):
@@ -109,8 +105,9 @@ class Intake:
         if self._depth == 0 and (self._start is not None or self._skipping):
             if not self._skipping:
                 line_number, column = self._start or (1, 1)
-                units.append(Unit("\n".join(self._lines) + "\n", line_number, column))
-            self._lines, self._size, self._start, self._skipping = [], 0, None, False
+                units.append(Unit(self._unit.decode(errors="replace"), line_number, column))
+            self._unit.clear()
+            self._start, self._skipping = None, False
 
 
 def _code(line: str) -> str:

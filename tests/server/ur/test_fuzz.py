@@ -1,0 +1,293 @@
+"""Whatever the bytes, and however they are cut: each door of a robot stands, and its other clients notice nothing.
+
+The controller is a real one. Its replies come late, as over a thread, so that clients go while they are on their way.
+"""
+
+import gc
+import struct
+import tracemalloc
+from collections import deque
+from random import Random
+
+import pytest
+
+from tvist_server.gateways.ur.dashboard.commands import COMMANDS
+from tvist_server.gateways.ur.dashboard.session import DashboardSession
+from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
+from tvist_server.gateways.ur.primary.session import PrimarySession
+from tvist_server.gateways.ur.realtime import RealtimeSession
+from tvist_server.gateways.ur.robot import UrRobot
+from tvist_server.gateways.ur.rtde.session import RtdeSession
+from tvist_server.host import Host
+from tvist_server.instruments.snapshot import Instruments
+
+from ..robots import UR5E, Robot  # noqa: TID252  the tests of the server share it
+from . import rtde_client
+from .decoders import split
+
+DOORS = {
+    "rtde": RtdeSession,
+    "primary": PrimarySession,
+    "realtime": RealtimeSession,
+    "dashboard": DashboardSession,
+}
+CLIENTS = 4
+"""That send anything, of two hosts."""
+LIVES = 60
+"""Packages that a client sends before it goes, on the average."""
+READ = ["timestamp", "actual_q"]
+
+
+class House:
+    """A robot with doors and no sockets; `tick` lets time pass, `answer` gives the replies that are due."""
+
+    def __init__(self):
+        self.controller = Robot().controller
+        self.controller.session.release()
+        self.host = Host(self.controller, self)
+        self.instruments = Instruments(UR5E)
+        self.robot = UrRobot(UR5E, "ur5e", self.tell)
+        self.leases = {host: HostLease(self, host, self.due_append) for host in ("127.0.0.1", "127.0.0.2")}
+        self.due = deque()
+        self.clients = []
+        self.latest_io = self.latest = None
+
+    def due_append(self, action):
+        self.due.append(action)
+
+    def request(self, data, reply):
+        self.due.append(lambda: reply(self.host.request(data)))
+
+    def client_seen(self, name):
+        self.due.append(lambda: self.host.client_seen(name))
+
+    def client_gone(self, name):
+        self.due.append(lambda: self.host.client_gone(name))
+
+    def holder(self):
+        lease = self.controller.session.lease
+        return None if lease is None else lease.client
+
+    def answer(self):
+        while self.due:
+            self.due.popleft()()
+
+    def tell(self, message):
+        for client in self.clients:
+            if isinstance(client.session, PrimarySession):
+                client.take(message)
+
+    def state(self, state):
+        self.latest = state
+
+    def io(self, io):
+        self.latest_io = io
+
+    def event(self, event):
+        self.robot.programs.event(event)
+        for client in self.clients:
+            client.session.event(event)
+
+    def journal(self, entry): ...
+
+    def tick(self):
+        self.answer()
+        self.host.tick()
+        snapshot = self.robot.latest = self.instruments.snapshot(self.latest, self.latest_io)
+        self.robot.programs.watch(snapshot)
+        for client in self.clients:
+            client.sampled = client.session.sample(snapshot)
+        return snapshot
+
+
+class Client:
+    """A connection. What it was sent is looked at, and thrown away, by `heard`."""
+
+    def __init__(self, house, door, host="127.0.0.1"):
+        self.house, self.door = house, door
+        self.stream, self.sampled, self.rest = bytearray(), b"", b""
+        self.control = ConnectionControl(house.leases[host])
+        self.session = DOORS[door](house.robot, self.control, self.take)
+        house.clients.append(self)
+        self.session.opened()
+
+    def take(self, data):
+        self.stream += data
+
+    def heard(self):
+        data = bytes(self.stream)
+        self.stream.clear()
+        if self.door == "rtde":
+            rtde_client.packages(data)
+        elif self.door == "primary":
+            split(data)
+        elif self.door == "dashboard":
+            assert not data or data.endswith(b"\n")
+            data.decode()
+        return data
+
+    def go(self):
+        self.house.clients.remove(self)
+        self.session.closed()
+        self.control.leave()
+
+
+# ---------------------------------------------------------------------- what is sent
+
+NAMES = [*rtde_client.OUTPUT_TYPES, *rtde_client.INPUT_TYPES]
+INPUTS = [*rtde_client.INPUT_TYPES]
+NUMBERS = [struct.pack(">d", number) for number in (float("nan"), float("inf"), -1e308, 0.0, 0.5, 1e-320)]
+
+
+def recipe(random):
+    kind = random.random()
+    if kind < 0.01:
+        return ["payload"] * 10_000 if random.random() < 0.5 else ["x"] * 10_000
+    names = [random.choice(INPUTS if random.random() < 0.7 else NAMES) for _ in range(random.randrange(12))]
+    if kind < 0.1:
+        names.append(random.choice(["", "ü", "nonsense", "\0", "actual_q "]))
+    return names
+
+
+def rtde(random):
+    kind = random.randrange(10)
+    if kind == 0:
+        size = random.choice([0, 1, 2, 3, 4, 65535, random.randrange(200)])
+        return struct.pack(">HB", size, random.randrange(256)) + random.randbytes(random.randrange(90))
+    if kind == 1:
+        return rtde_client.version(random.randrange(4))
+    if kind == 2:
+        payload = random.choice([*NUMBERS, struct.pack(">d", 125.0)]) + ",".join(recipe(random)).encode()
+        return rtde_client.package("O", payload[:65532])
+    if kind == 3:
+        return rtde_client.package("I", ",".join(recipe(random)).encode()[:65532])
+    if kind < 8:
+        values = b"".join(random.choice(NUMBERS) for _ in range(random.randrange(8)))
+        if random.random() < 0.5:
+            values = random.randbytes(random.randrange(100))
+        return rtde_client.package("U", bytes([random.randrange(5)]) + values)
+    return rtde_client.package(random.choice("SPvMVOIx"), random.randbytes(random.randrange(40)))
+
+
+ORDERS = [
+    "power on",
+    "power off",
+    "set robotmode run",
+    "set unlock protective stop",
+    "stop program",
+    "set sim",
+]
+SCRIPTS = [
+    "def f():\n",
+    "sec g():\n",
+    " if x:\n",
+    "end\n",
+    "end",
+    "  movej(q)\n",
+    '"',
+    "#",
+    "\r\n",
+    "\n",
+    "\0",
+    "ü",
+]
+
+
+def script(random):
+    kind = random.random()
+    if kind < 0.3:
+        return random.choice(ORDERS).encode() + b"\n"
+    if kind < 0.7:
+        return "".join(random.choices(SCRIPTS, k=random.randrange(8))).encode()
+    if kind < 0.71:
+        return b"def f():\n" + b"ab\n" * 2_000
+    return random.randbytes(random.randrange(200))
+
+
+def line(random):
+    kind = random.random()
+    if kind < 0.8:
+        said = random.choice(COMMANDS).keyword
+        said = random.choice([said, said.upper(), said + " ", said + "x"])
+        argument = random.choice(["", " paper.urp", " Q1.urp", " /a/wait_program.urp", " ü\0", " MANUAL"])
+        return (said + argument).encode() + random.choice([b"\n", b"\r\n"])
+    if kind < 0.81:
+        return b"a" * 10_000
+    return random.randbytes(random.randrange(80)) + random.choice([b"", b"\n", b"\n\n\n"])
+
+
+SENT = {"rtde": rtde, "primary": script, "realtime": script, "dashboard": line}
+
+
+# ---------------------------------------------------------------------- what is seen
+
+
+def watch(house, reader, asker):
+    """A tick, at which those who do no wrong get what they wait for."""
+    snapshot = house.tick()
+    found = rtde_client.decoded(reader.sampled, READ)
+    assert found == {"timestamp": snapshot.timestamp, "actual_q": snapshot.actual_q}
+    assert not reader.heard()
+    asker.session.receive(b"version\n")
+    assert asker.heard().startswith(b"5.22")
+
+
+def attack(house, door, random, packages):
+    """Clients that come, send so many packages, cut anywhere, and go."""
+    hosts = [*house.leases]
+    clients = [Client(house, door, random.choice(hosts)) for _ in range(CLIENTS)]
+    reader, asker = Client(house, "rtde"), Client(house, "dashboard")
+    listener = Client(house, "primary")
+    for sent in (rtde_client.version(), rtde_client.outputs(READ), rtde_client.package("S")):
+        reader.session.receive(sent)
+    reader.heard()
+    asker.heard()
+    for number in range(packages):
+        which = random.randrange(CLIENTS)
+        client = clients[which]
+        client.rest += SENT[door](random)
+        if random.random() < 0.7:
+            cut = random.randrange(len(client.rest) + 1)
+            if not client.session.over:
+                client.session.receive(client.rest[:cut])
+            client.rest = client.rest[cut:]
+        client.heard()
+        if random.random() < 0.3:
+            house.answer()
+        if random.random() < 1 / LIVES:
+            client.go()
+            clients[which] = Client(house, door, random.choice(hosts))
+        if number % 20 == 0:
+            watch(house, reader, asker)
+            listener.heard()
+    for client in (*clients, reader, listener, asker):
+        client.go()
+    last = Client(house, "dashboard")
+    last.session.receive(b"stop\n")
+    last.go()
+    house.answer()
+
+
+@pytest.mark.parametrize(
+    "packages", [1_000, pytest.param(100_000, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
+)
+@pytest.mark.parametrize("door", DOORS)
+def test_a_door_stands_and_nobody_else_notices(door, packages):
+    house, random = House(), Random(packages)
+    house.host.tick()
+    house.tick()
+    rounds = 4
+    memory = []
+    tracemalloc.start(1)
+    try:
+        for _ in range(rounds):
+            attack(house, door, random, packages // rounds)
+            gc.collect()
+            memory.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    assert house.holder() is None
+    assert not house.robot.inputs._owners
+    assert not house.clients
+    assert all(not lease._users for lease in house.leases.values())
+    assert memory[-1] - memory[0] < 200_000  # bytes
