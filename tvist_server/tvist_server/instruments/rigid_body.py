@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import hypot
+from math import hypot, sqrt
 
 import numpy as np
 import pinocchio as pin
@@ -14,8 +14,10 @@ from tvist_protocol.values import Payload
 
 ELBOW = 2
 """The joint whose axis is the elbow."""
-SINGULAR = 0.08
-"""Singular value of the Jacobian below which forces are damped [m, or -]."""
+NEAR_SINGULAR = 0.01
+"""Manipulability √det(J Jᵀ) below which forces are damped; a UR5e has up to 0.11 [m³ with six joints]."""
+DAMPING = 0.08
+"""λ where the posture is singular [m, or -]."""
 
 
 @dataclass(frozen=True)
@@ -139,8 +141,8 @@ class RigidBody:
     def wrench(self, q: list[float], torque: Floats, offset: list[float]) -> Floats:
         """Force at the tool centre point that pushes the joints with such torques, shape (6,) [N, N m].
 
-        F with Jᵀ F = τ, by the singular values σ of J: each part of F is τ's over σ, and σ/(σ² + λ²) where
-        σ is small, with λ² = ε² (1 - (σ/ε)²) below ε (Maciejewski and Klein, 1988). What no joint feels is zero.
+        F with Jᵀ F = τ by damped least squares, F = J (Jᵀ J + λ² 1)⁻¹ τ, with λ = λ₀ (1 - w/w₀) where the
+        manipulability w is below w₀ (Nakamura and Hanafusa, 1986). What no joint feels is zero.
 
         Args:
             q: Joint positions [rad].
@@ -153,9 +155,15 @@ class RigidBody:
         rotation = self._data.oMf[self._flange].rotation
         if any(offset[:3]):
             jacobian[:3] -= pin.skew(rotation @ np.array(offset[:3])) @ jacobian[3:]
-        left, values, right = np.linalg.svd(jacobian, full_matrices=False)
-        damping = np.clip(SINGULAR**2 - values**2, 0.0, None)
-        return np.array(left @ (values / (values**2 + damping) * (right @ torque)))
+        tall = jacobian.shape[1] <= jacobian.shape[0]
+        square = jacobian.T @ jacobian if tall else jacobian @ jacobian.T
+        manipulability = sqrt(max(float(np.linalg.det(square)), 0.0))
+        if manipulability < NEAR_SINGULAR:
+            damping = DAMPING * (1.0 - manipulability / NEAR_SINGULAR)
+            square.flat[:: len(square) + 1] += damping * damping
+        if tall:
+            return np.array(jacobian @ np.linalg.solve(square, torque))
+        return np.array(np.linalg.solve(square, jacobian @ torque))
 
     def _load(self, payload: Payload) -> None:
         """Let the last link carry this payload."""
