@@ -90,9 +90,9 @@ def _told(ranked: Sequence[dict[str, Any]]) -> str:
         return ""
     return f"""
 
-Told before each move begins where it will end, and checked for causality given that: {", ".join(names)}. In a stream,
-where nobody knows the end, the double S and what is frozen are not to be had, and `auto-target` goes by where the arm
-is, as `auto` does."""
+Told before each move begins where it will end, and checked for causality given that:
+{", ".join(names)}. In a stream, where nobody knows the end,
+the double S and what is frozen are not to be had, and `auto-target` goes by where the arm is, as `auto` does."""
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
