@@ -6,6 +6,7 @@ import errno
 import logging
 import socket
 import threading
+from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
 from weakref import WeakValueDictionary
@@ -74,8 +75,8 @@ class UrDoors(Gateway):
         self.robot = UrRobot(description, name, self._tell)
         self._instruments = Instruments(description)
         self._io: Io | None = None
-        self._first: State | None = None
-        """The last one before the doors open."""
+        self._early = deque[State](maxlen=FIRST)
+        """Those before the doors open: temperatures and energies begin with the first tick."""
         self._connections: set[Connection] = set()
         self._leases = WeakValueDictionary[str, HostLease]()
         """By host, as long as one of its connections lives."""
@@ -102,15 +103,15 @@ class UrDoors(Gateway):
     async def first_tick(self) -> None:
         """Wait for it, where time passes by itself: clients that come before would find no controller."""
         for _ in range(0 if self._lockstep else FIRST):
-            if self._first is not None:
+            if self._early:
                 return
             await asyncio.sleep(PERIOD)
 
     async def open(self) -> None:
         """Let clients in; they are served by the running loop."""
         self._loop = asyncio.get_running_loop()
-        if self._first is not None:
-            self._see(self._first)
+        while self._early:
+            self._see(self._early.popleft())
         for door, bound in self._sockets.items():
             self._servers.append(
                 await self._loop.create_server(
@@ -133,7 +134,7 @@ class UrDoors(Gateway):
             if isinstance(message, Io):
                 self._io = message
             elif isinstance(message, State):
-                self._first = message
+                self._early.append(message)
         elif isinstance(message, State):
             if self._has_room():
                 self._handed += 1
