@@ -9,7 +9,7 @@ from tests.conformance.wire import Wire
 
 @pytest.fixture(scope="module", autouse=True)
 def collected():
-    """Put aside what earlier tests left: to look through all of it would stop a client here for a quarter of a second."""
+    """Put aside what earlier tests left: to look through it would stop a client for a quarter of a second."""
     gc.collect()
     gc.freeze()
     yield

@@ -36,7 +36,7 @@ async def ur_doors(seconds: float, tell: Callable[[str], None]) -> dict[str, Any
     async with served(options) as server:
         await server.robot.state()
         tell(f"a robot whose doors are open, without clients, for {seconds:g} s")
-        alone, _, _ = await _watched(server, seconds)
+        alone, missed_alone, _ = await _watched(server, seconds)
         tell(f"{CLIENTS} RTDE clients for {seconds:g} s")
         async with _clients(port) as said:
             busy, missed, late = await _watched(server, seconds)
@@ -46,6 +46,7 @@ async def ur_doors(seconds: float, tell: Callable[[str], None]) -> dict[str, Any
         "seconds": seconds,
         "us_per_client_and_tick": 1e6 * (busy - alone) * PERIOD / CLIENTS,
         "missed": missed,
+        "missed_without_clients": missed_alone,
         "missed_percent": 100.0 * missed / ticks,
         "late_p50_us": late["late_p50_us"],
         "late_p99_us": late["late_p99_us"],
