@@ -24,8 +24,8 @@ Nothing here was measured on a robot. Each output has one of four sources:
 - **constant**: stands in for something that is not simulated.
 
 Torque constants, resistances and thermal figures of the motors are guesses of the right size for a UR5e: two sizes of
-joint, 10 and 7.9 N m/A on the joint's side. Temperatures and energies add up while somebody reads; a time in which
-nobody did counts as one step with the currents at its end.
+joint, 10 and 7.9 N m/A on the joint's side. Temperatures and energies add up from the first tick on, whether or not
+somebody reads.
 
 Vectors of joints have six entries: those of an arm with fewer joints are filled with zeros, those of one with more
 are cut. All variables are offered, also those that a controller of the reported version would not have yet.
