@@ -62,6 +62,7 @@ class Robot:
         self._truths: Feed[Truth] = Feed(transport, "truth", decode_truth, once_a_tick=True)
         self._telemetries: Feed[Telemetry] = Feed(transport, "telemetry", decode_telemetry, once_a_tick=False)
         self._ios: Feed[Io] = Feed(transport, "io", decode_io, once_a_tick=False)
+        self._feeds = (self._states, self._events, self._truths, self._telemetries, self._ios)
         self.motions = Motions(self._until_ended)
         # Before any command is sent, since an event may come before the answer.
         self._events.listen(self.motions.on_event)
@@ -98,7 +99,7 @@ class Robot:
 
     async def close(self) -> None:
         """End the connection; iterators end too."""
-        for feed in (self._states, self._events, self._truths, self._telemetries, self._ios):
+        for feed in self._feeds:
             feed.finish()
         self.motions.fail(NotConnectedError("the connection was closed"))
         await self._transport.close()
@@ -310,7 +311,7 @@ class Robot:
         return await self._states.next(lambda _: True, STATE_S)
 
     def _on_lost(self, error: NotConnectedError) -> None:
-        for feed in (self._states, self._events, self._truths, self._telemetries, self._ios):
+        for feed in self._feeds:
             feed.fail(error)
         self.motions.fail(error)
 

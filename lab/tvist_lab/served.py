@@ -21,11 +21,16 @@ class ServedError(RuntimeError):
     """The served robot did not come up, or did not end well."""
 
 
-def free_endpoint() -> str:
-    """An endpoint on this machine that nobody listens on."""
+def free_port() -> int:
+    """A TCP port of 127.0.0.1 that nobody listens on."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        return int(probe.getsockname()[1])
+
+
+def free_endpoint() -> str:
+    """An endpoint on this machine that nobody listens on."""
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
 @dataclass(frozen=True)

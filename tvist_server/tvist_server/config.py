@@ -112,12 +112,13 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             ConfigError: `ur_address` is none, or leaves no room for so many.
         """
         try:
-            address = ipaddress.ip_address(self.ur_address) + number
+            first = ipaddress.ip_address(self.ur_address)
+            address = first + number
         except ValueError as error:
             raise ConfigError(
                 f"ur_address is {self.ur_address!r}: must be an IP address ({error})"
             ) from error
-        if number and ipaddress.ip_address(self.ur_address).is_unspecified:
+        if number and first.is_unspecified:
             raise ConfigError(
                 f"ur_address is {self.ur_address}: several robots need an address of their own each"
             )

@@ -90,11 +90,14 @@ class Controller:
         """Carry out a command between two ticks. A refused one changes nothing."""
         self.counters.commands += 1
         try:
-            return _HANDLERS[type(command)](self, command)
+            reply = _HANDLERS[type(command)](self, command)
         except RefusalError as refusal:
             reply = refusal.reply
         except NoControlError as refusal:
             reply = Refused(code=refusal.code, where="token", why=refusal.why)
+        else:
+            self._io_changed |= type(command) in _TOLD_IN_IO
+            return reply
         self.counters.refused += 1
         return reply
 
@@ -275,14 +278,12 @@ class Controller:
         """Scale the time of motions."""
         self._authorize(command.token)
         self.motion.set_speed(command.fraction)
-        self._io_changed = True
         return Done()
 
     def set_io(self, command: SetIo) -> Reply:
         """Set outputs."""
         self._authorize(command.token)
         self.peripherals.set_outputs(command)
-        self._io_changed = True
         return Done()
 
     def set_registers(self, command: SetRegisters) -> Reply:
@@ -293,7 +294,6 @@ class Controller:
             why = f"token is missing: {command.bank} registers are the robot's own, and take control to write"
             raise RefusalError("missing_field", "token", why)
         self.peripherals.set_registers(command)
-        self._io_changed = True
         return Done()
 
     def set_tcp(self, command: SetTcp) -> Reply:
@@ -301,14 +301,12 @@ class Controller:
         self._authorize(command.token)
         self.peripherals.tcp_offset = command.offset
         self._reporter.set_tcp(command.offset)
-        self._io_changed = True
         return Done()
 
     def simulation_set_inputs(self, command: SimulationSetInputs) -> Reply:
         """Put signals on inputs."""
         self._authorize(command.token)
         self.peripherals.set_inputs(command)
-        self._io_changed = True
         return Done()
 
     def power_on(self, command: c.PowerOn) -> Reply:
@@ -352,7 +350,6 @@ class Controller:
         self.filters.declare(payload)
         self.motion.collisions.carry(body(payload))
         self._payload_monitor.declare(body(payload))
-        self._io_changed = True
         return Done()
 
     def simulation_reset(self, command: c.SimulationReset) -> Reply:
@@ -430,3 +427,5 @@ _HANDLERS: dict[type, Callable[[Controller, Any], Reply]] = {
     SetTcp: Controller.set_tcp,
     SimulationSetInputs: Controller.simulation_set_inputs,
 }
+_TOLD_IN_IO = frozenset({c.SetPayload, c.SetSpeed, SetIo, SetRegisters, SetTcp, SimulationSetInputs})
+"""Commands that change what `io` tells."""

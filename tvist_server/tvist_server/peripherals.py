@@ -14,6 +14,18 @@ LEAST, MOST = -(2**31), 2**31 - 1
 """Of an integer register."""
 
 
+def analog_value(share: float, *, voltage: bool) -> float:
+    """What an analogue terminal gives at a share of its range [A or V]."""
+    low, high = VOLTAGE if voltage else CURRENT
+    return low + share * (high - low)
+
+
+def analog_share(value: float, *, voltage: bool) -> float:
+    """Share of its range at which an analogue terminal gives a value [-]."""
+    low, high = VOLTAGE if voltage else CURRENT
+    return (value - low) / (high - low)
+
+
 class Peripherals:
     """What hangs on the control box, apart from the arm. It starts with everything off and at zero."""
 
@@ -101,8 +113,8 @@ class Peripherals:
         )
 
     def _analog_output(self, number: int) -> float:
-        low, high = VOLTAGE if self._analog_types >> (2 + number) & 1 else CURRENT
-        return low + self._analog_ratios[number] * (high - low)
+        voltage = bool(self._analog_types >> (2 + number) & 1)
+        return analog_value(self._analog_ratios[number], voltage=voltage)
 
 
 def _with_bits(words: list[int], first: int, values: Sequence[Register], bank: Bank) -> list[int]:

@@ -36,7 +36,7 @@ async def one_robot(seconds: float, tell: Callable[[str], None]) -> dict[str, An
             await server.robot.state()
             start_s = server.took
             tell(f"a served robot for {seconds:g} s")
-            tick, share = await _punctuality(server, seconds)
+            tick, share = await punctuality(server, seconds)
             async with server.robot.control("bench") as arm:
                 tell(f"set-points at 500 Hz for {seconds:g} s")
                 setpoints = await _setpoints(server.robot, arm, seconds)
@@ -53,7 +53,7 @@ async def one_robot(seconds: float, tell: Callable[[str], None]) -> dict[str, An
     }
 
 
-async def _punctuality(server: Served, seconds: float) -> tuple[dict[str, float], float]:
+async def punctuality(server: Served, seconds: float) -> tuple[dict[str, float], float]:
     """Lateness of its ticks; share of a core that it takes."""
     robot = server.robot
     heard: list[Telemetry] = []

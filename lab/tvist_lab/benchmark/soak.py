@@ -5,13 +5,11 @@ second is this one, and five observers, each with a connection of its own, share
 """
 
 import asyncio
-import json
 import math
-import sys
 import tempfile
 import time
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from collections.abc import Callable
+from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -23,6 +21,7 @@ from tvist_client.errors import StreamStoppedError
 from tvist_client.servo import Servo
 from tvist_lab.benchmark.lateness import over_all
 from tvist_lab.benchmark.process import cpu_seconds, rss_mb
+from tvist_lab.benchmark.readers import readers
 from tvist_lab.served import Served, served
 from tvist_plant.plant import PERIOD
 from tvist_protocol.recorded import END_METADATA, TICK_NS
@@ -49,7 +48,10 @@ async def soak(minutes: float, tell: Callable[[str], None]) -> dict[str, Any]:
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "soak.mcap"
-        async with served(["--record", str(path)]) as server, _observed(server) as observed:
+        async with (
+            served(["--record", str(path)]) as server,
+            _observed(server) as observed,
+        ):
             watch = _Watch(server, 60.0 * minutes, tell)
             result = await watch.run()
         return result | _observers(observed) | _recording(path)
@@ -138,23 +140,9 @@ class _Watch:
             await arm.keep_alive()
 
 
-@asynccontextmanager
-async def _observed(server: Served) -> AsyncIterator[list[dict[str, int]]]:
+def _observed(server: Served) -> AbstractAsyncContextManager[list[dict[str, int]]]:
     """Observers in a process; what they say at their end stands in the list."""
-    command = [sys.executable, "-m", "tvist_lab.benchmark.observers", server.endpoint, "ur5e", str(OBSERVERS)]
-    pipe = asyncio.subprocess.PIPE
-    process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe)
-    said: list[dict[str, int]] = []
-    try:
-        assert process.stdout is not None
-        await process.stdout.readline()  # they all listen
-        yield said
-        out, _ = await process.communicate(b"")  # which ends its stdin
-        said += json.loads(out)
-    finally:
-        if process.returncode is None:
-            process.kill()
-            await process.wait()
+    return readers("observers", server.endpoint, "ur5e", str(OBSERVERS))
 
 
 def _observers(observed: list[dict[str, int]]) -> dict[str, int]:

@@ -1,6 +1,7 @@
 """A robot as its doors see it, with programs."""
 
 from tvist_server.gateways.ur.programs import Programs
+from tvist_server.gateways.ur.robot import NO_MODE
 
 from .decoders import message
 
@@ -8,7 +9,7 @@ from .decoders import message
 def host(robot):
     """The fixture `robot`, with programs and what else the text doors share."""
     robot.programs = Programs(robot)
-    robot.operational_mode = "NONE"
+    robot.operational_mode = NO_MODE
     return robot
 
 

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.server.robots import UR5E
 
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done, Refused
@@ -14,7 +15,6 @@ from tvist_server.gateways.ur.dashboard.commands import COMMANDS, find
 from tvist_server.gateways.ur.dashboard.lines import LONGEST
 from tvist_server.gateways.ur.dashboard.session import MOST_WAITING, DashboardSession
 
-from ..robots import UR5E  # noqa: TID252  the tests of the server share it
 from .decoders import message
 from .hosts import host, told
 

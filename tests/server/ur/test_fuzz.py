@@ -10,6 +10,7 @@ from collections import deque
 from random import Random
 
 import pytest
+from tests.server.robots import UR5E, Robot
 
 from tvist_server.gateways.ur.dashboard.commands import COMMANDS
 from tvist_server.gateways.ur.dashboard.session import DashboardSession
@@ -21,7 +22,6 @@ from tvist_server.gateways.ur.rtde.session import RtdeSession
 from tvist_server.host import Host
 from tvist_server.instruments.snapshot import Instruments
 
-from ..robots import UR5E, Robot  # noqa: TID252  the tests of the server share it
 from . import rtde_client
 from .decoders import split
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.server.robots import UR5E, cut
 
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Refused
@@ -17,7 +18,6 @@ from tvist_server.gateways.ur.primary.packages import robot_state
 from tvist_server.gateways.ur.primary.scripts import LONGEST, Intake
 from tvist_server.gateways.ur.primary.session import PrimarySession
 
-from ..robots import UR5E, cut  # noqa: TID252  the tests of the server share it
 from .decoders import Cursor, message, parts, split
 from .hosts import host, told
 

@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.server.robots import Q1, Q2, Q3, UR5E
 
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.stream import Event
 from tvist_server.gateways.ur.programs import Programs, ProgramState
 
-from ..robots import Q1, Q2, Q3, UR5E  # noqa: TID252  the tests of the server share it
 from .decoders import message
 from .hosts import host, told
 

@@ -4,11 +4,11 @@ import struct
 from types import SimpleNamespace
 
 import pytest
+from tests.server.robots import cut
 
 from tvist_protocol import commands as c
 from tvist_server.gateways.ur.realtime import RealtimeSession, package
 
-from ..robots import cut  # noqa: TID252  the tests of the server share it
 from .hosts import host, told
 
 # Zero-based numbers of doubles, from the description of the interface; counts behind.

@@ -8,6 +8,9 @@ from tvist_server.gateways.ur.programs import Programs
 from tvist_server.gateways.ur.rtde.owners import InputOwners
 from tvist_server.instruments.snapshot import Snapshot
 
+NO_MODE = "NONE"
+"""Operational mode while nobody has set one."""
+
 
 class UrRobot:
     """One robot, as the clients of its doors see it.
@@ -25,7 +28,7 @@ class UrRobot:
         """UR's begin with the year; the last digits stand for the name."""
         self.latest: Snapshot | None = None
         """The last tick; None before the first."""
-        self.operational_mode = "NONE"
+        self.operational_mode = NO_MODE
         """As the dashboard sets it."""
         self.inputs = InputOwners()
         self.programs = Programs(self)

@@ -10,15 +10,13 @@ from tvist_protocol.replies import Refused
 from tvist_server.gateways.ur import power, version
 from tvist_server.gateways.ur.base import Control
 from tvist_server.gateways.ur.primary import messages
-from tvist_server.gateways.ur.robot import UrRobot
+from tvist_server.gateways.ur.robot import NO_MODE, UrRobot
 
 UNNAMED: Final = "<unnamed>"
 """Stands for the program where none is loaded."""
 INSTALLATION: Final = "default.installation"
 """The one there is."""
 MODES: Final = ("MANUAL", "AUTOMATIC")
-NO_MODE: Final = "NONE"
-"""Operational mode while nobody has set one."""
 TOO_SOON: Final = (
     "Cannot unlock protective stop until 5s after occurrence. "
     "Always inspect cause of protective stop before unlocking"

@@ -11,6 +11,7 @@ from tvist_server.gateways.ur.robot import UrRobot
 from tvist_server.gateways.ur.rtde.inputs import DIGITAL, REGISTERS
 from tvist_server.gateways.ur.rtde.recipes import Value
 from tvist_server.gateways.ur.rtde.wire import Wire
+from tvist_server.peripherals import analog_share
 
 Complain = Callable[[str], None]
 """Tells the client what was refused."""
@@ -164,7 +165,7 @@ class InputWriter:
         present: tuple[int, float] | None = None
         if io is not None:
             value, voltage = io.standard_analog_output[number], io.analog_io_types >> (2 + number) & 1
-            shown = value / 10.0 if voltage else (value - 0.004) / 0.016
+            shown = analog_share(value, voltage=bool(voltage))
             present = voltage, ratio if isclose(shown, ratio, abs_tol=1e-9) else shown
         return self._ledger.is_news(("analog", number), (kind, ratio), present)
 
