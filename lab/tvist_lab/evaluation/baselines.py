@@ -53,16 +53,27 @@ class Baseline:
         start, target = np.array(move.start), np.array(move.target)
         if self.shaper is None:
             return lengthened(start, target, ticks)
+        tvist = self.tvist(recipe, description, move)
+        tvist.reset(start)
+        return shape(tvist.filter, reference)[0]
+
+    def tvist(self, recipe: Recipe, description: RobotDescription, move: Move) -> TvistFilter:
+        """Its fixed filter for a move; only where it has a shaper.
+
+        Args:
+            recipe: Says where estimates come from.
+            description: The robot.
+            move: The move.
+        """
+        assert self.shaper is not None
         f_d, zeta = self.f_d, self.zeta
         if f_d is None or zeta is None:
-            there = recipe.estimator(description, move.mass, 1).estimate(target)
+            there = recipe.estimator(description, move.mass, 1).estimate(np.array(move.target))
             f_d, zeta = float(there[0][0]), float(there[1][0])
         made = shaper(self.shaper)
         # However low a wrong estimate is.
         longest = max(1.0, 1.01 * made.duration_periods / f_d)
-        tvist = TvistFilter(made, Fixed([f_d], [zeta]), joints=len(start), max_delay=longest)
-        tvist.reset(start)
-        return shape(tvist.filter, reference)[0]
+        return TvistFilter(made, Fixed([f_d], [zeta]), joints=description.joints, max_delay=longest)
 
 
 EQUAL_DURATION = Baseline("equal_duration_double_s", "longer double S")

@@ -15,9 +15,6 @@ from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
-from tvist_shaping.catalogue import shaper
-from tvist_shaping.estimators.fixed import Fixed
-from tvist_shaping.filter import TvistFilter
 from tvist_shaping.named import AIMED
 from tvist_shaping.steady import ProductDesign, SteadyFilter
 
@@ -117,15 +114,7 @@ class Shaping(Candidate):
 
     def stepper(self, task: Task) -> "Filtering":
         """The fixed filter, reset; where it is designed for the target, that is known to it."""
-        baseline = self.baseline
-        assert baseline.shaper is not None
-        f_d, zeta = baseline.f_d, baseline.zeta
-        if f_d is None or zeta is None:
-            estimator = self.recipe.estimator(task.description, task.move.mass, 1)
-            there = estimator.estimate(np.array(task.move.target))
-            f_d, zeta = float(there[0][0]), float(there[1][0])
-        joints = task.description.joints
-        return _from_rest(TvistFilter(shaper(baseline.shaper), Fixed([f_d], [zeta]), joints=joints), task)
+        return _from_rest(self.baseline.tvist(self.recipe, task.description, task.move), task)
 
 
 def _from_rest(tvist: Filter, task: Task) -> "Filtering":
