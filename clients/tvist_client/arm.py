@@ -17,6 +17,7 @@ from tvist_protocol.commands import (
     Pause,
     PowerOff,
     PowerOn,
+    RestartSafety,
     Resume,
     ServoStart,
     ServoStop,
@@ -175,6 +176,10 @@ class Arm:
     async def unlock_protective_stop(self) -> None:
         """Leave a protective stop, once the arm rests."""
         await self.robot.request(UnlockProtectiveStop(token=self.token))
+
+    async def restart_safety(self) -> None:
+        """Restart the safety system after a violation or a fault; the arm is without power then."""
+        await self.robot.request(RestartSafety(token=self.token))
 
     # ------------------------------------------------------------------ setting up
 

@@ -182,6 +182,10 @@ class Arm:
         """Leave a protective stop, once the arm rests."""
         self._portal.call(self._arm.unlock_protective_stop)
 
+    def restart_safety(self) -> None:
+        """Restart the safety system after a violation or a fault; the arm is without power then."""
+        self._portal.call(self._arm.restart_safety)
+
     def set_tcp(self, offset: Iterable[float]) -> None:
         """Say where the tool centre point is."""
         self._portal.call(lambda: self._arm.set_tcp(offset))

@@ -216,6 +216,13 @@ class UnlockProtectiveStop(ClientMessage, frozen=True, kw_only=True, tag="unlock
     """Names the lease."""
 
 
+class RestartSafety(ClientMessage, frozen=True, kw_only=True, tag="restart_safety"):
+    """Restart the safety system after a violation or a fault; the arm is without power then."""
+
+    token: Token
+    """Names the lease."""
+
+
 class SimulationReset(ClientMessage, frozen=True, kw_only=True, tag="simulation.reset"):
     """Put the simulated arm somewhere at rest; what is null stays. Stops motion, keeps lease and tick."""
 
@@ -228,7 +235,7 @@ class SimulationReset(ClientMessage, frozen=True, kw_only=True, tag="simulation.
     payload: Payload | None = None
     """What the arm carries, whatever the controller believes."""
     mode: ResetMode | None = None
-    """Robot mode to put it into; any of them ends a protective stop."""
+    """Robot mode to put it into; any of them ends protective, safeguard and emergency stops, violations and faults."""
     shaper: Name | None = None
     """Shaper to choose, as `set_shaper` does."""
 
@@ -289,6 +296,7 @@ Command = (
     | PowerOn
     | PowerOff
     | UnlockProtectiveStop
+    | RestartSafety
     | SimulationReset
     | SimulationStep
     | SimulationInject

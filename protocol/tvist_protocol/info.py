@@ -26,6 +26,21 @@ class Limits(Struct, frozen=True, kw_only=True, gc=False):
     """Rated payload [kg]."""
 
 
+class Stopping(Struct, frozen=True, kw_only=True, gc=False):
+    """A stop of the joint that is the slowest to stop, with the arm stretched out, by the rigid arm's reference."""
+
+    payload: float
+    """Mass at the flange [kg]."""
+    speed: float
+    """Velocity of the joint when the stop begins, as a share of its limit [-]."""
+    joint: str
+    """Which joint that is."""
+    duration: float
+    """Until it rests [s]."""
+    way: float
+    """That it turns until then [rad]."""
+
+
 class CalibrationInfo(Struct, frozen=True, kw_only=True, gc=False):
     """The calibration in use."""
 
@@ -80,3 +95,5 @@ class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=F
     """Client that has control; null: nobody."""
     tick: int
     """Tick at which this was said."""
+    stopping: list[Stopping] = []
+    """How long stops last and how far they go: at 33, 66 and 100 % speed, without payload and with the rated one."""

@@ -17,6 +17,7 @@ EventKind = Literal[
     "stream_stopped",
     "lease_lost",
     "protective_stop",
+    "safety_stop",
     "shaper_changed",
     "warning",
 ]
@@ -28,6 +29,7 @@ EVENT_MEANINGS: dict[EventKind, str] = {
     "stream_stopped": "the stream of set-points ended; `why` says how",
     "lease_lost": "nobody has control any longer",
     "protective_stop": "the robot stops to protect itself; `code` says from what",
+    "safety_stop": "the safety system stops the robot: `category` says how, `why` for what",
     "shaper_changed": "another shaper or estimator is in use",
     "warning": "something a person should know of; nothing stopped",
 }
@@ -43,7 +45,7 @@ class State(Struct, frozen=True, kw_only=True, tag_field="type", tag="state", gc
     robot_mode: int
     """RTDE's number: 3 is POWER_OFF, 5 IDLE, 7 RUNNING."""
     safety_mode: int
-    """RTDE's number: 1 is NORMAL, 2 REDUCED, 3 PROTECTIVE_STOP."""
+    """RTDE's number: 1 is NORMAL, 2 REDUCED, 3 PROTECTIVE_STOP, 5 SAFEGUARD_STOP, 6 and 7 emergency stops."""
     runtime_state: int
     """RTDE's number: 0 is STOPPING, 1 STOPPED, 2 PLAYING, 3 PAUSING, 4 PAUSED."""
     setpoint_sequence: int | None
@@ -97,6 +99,12 @@ class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc
     """The reason, for a program."""
     why: str | None = None
     """The reason, for a person."""
+    category: int | None = None
+    """Of a stop, as IEC 60204-1 numbers them: 0 the brakes at once, 1 at rest the power is taken, 2 it is not."""
+    duration: float | None = None
+    """Of a stop: from now until the shaped reference rests; null where that is too far ahead to say [s]."""
+    way: float | None = None
+    """Of a stop: how far the joint that turns most still turns; null likewise [rad]."""
 
 
 class Truth(Struct, frozen=True, kw_only=True, tag_field="type", tag="truth", gc=False):

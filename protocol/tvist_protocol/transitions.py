@@ -31,6 +31,8 @@ class Activity(StrEnum):
     """A stop, past the filter."""
     POWERING_OFF = "POWERING_OFF"
     """The same, with the power to be taken once the arm rests."""
+    BRAKING = "BRAKING"
+    """The power is gone, and the brakes bring the arm to rest."""
     PROTECTIVE_STOPPING = "PROTECTIVE_STOPPING"
     """The same, as a protective stop."""
     PROTECTIVE_STOP = "PROTECTIVE_STOP"
@@ -40,7 +42,7 @@ class Activity(StrEnum):
     def robot_mode(self) -> RobotMode:
         """As RTDE numbers it."""
         # Compared, since looking up an enumeration's member costs ten times as much: this is asked every tick.
-        if self is Activity.POWER_OFF:
+        if self is Activity.POWER_OFF or self is Activity.BRAKING:
             return RobotMode.POWER_OFF
         return RobotMode.IDLE if self is Activity.IDLE else RobotMode.RUNNING
 
@@ -49,13 +51,18 @@ class Activity(StrEnum):
         """Whether something moves, or is about to go on."""
         return self in _MOVING
 
+    @property
+    def protective(self) -> bool:
+        """Whether it is a protective stop."""
+        return self is Activity.PROTECTIVE_STOPPING or self is Activity.PROTECTIVE_STOP
+
     def safety_mode(self, *, reduced: bool) -> SafetyMode:
-        """As RTDE numbers it.
+        """As RTDE numbers it, as long as the safety system has nothing graver.
 
         Args:
             reduced: Whether the speed is reduced.
         """
-        if self is Activity.PROTECTIVE_STOPPING or self is Activity.PROTECTIVE_STOP:
+        if self.protective:
             return SafetyMode.PROTECTIVE_STOP
         return SafetyMode.REDUCED if reduced else SafetyMode.NORMAL
 
@@ -83,6 +90,7 @@ HAPPENINGS: dict[str, str] = {
     "power": "`power_on` with `release_brakes` false",
     "at_rest": "the shaped reference has come to rest",
     "interruption": "motion must end: the lease did, a set-point failed to come for 250 ms, something would meet",
+    "brakes": "the power is gone, by a fault or the safety system: the brakes close at once",
     "protective_stop": "a drive's torque was beyond its limit for more than 10 ms, or the fault was injected",
     "plant_failure": "the simulated arm's state was no longer finite: it was put at rest where its reference was",
     "lease_end": "nobody renewed the lease, or its client's liveliness token went",
@@ -90,12 +98,21 @@ HAPPENINGS: dict[str, str] = {
 
 _A = Activity
 _MOVING = frozenset(
-    {_A.MOVING, _A.PAUSED, _A.STREAMING, _A.ENDING, _A.STOPPING, _A.POWERING_OFF, _A.PROTECTIVE_STOPPING}
+    {
+        _A.MOVING,
+        _A.PAUSED,
+        _A.STREAMING,
+        _A.ENDING,
+        _A.STOPPING,
+        _A.POWERING_OFF,
+        _A.BRAKING,
+        _A.PROTECTIVE_STOPPING,
+    }
 )
 _FREE_TO_END = (_A.MOVING, _A.PAUSED, _A.STREAMING, _A.ENDING, _A.STOPPING)
 """Motion that is not yet ending for good."""
 _STANDING = (_A.POWER_OFF, _A.IDLE, _A.REST, _A.PROTECTIVE_STOP)
-_DRIVEN = tuple(activity for activity in _A if activity not in {_A.POWER_OFF, _A.IDLE})
+_DRIVEN = tuple(activity for activity in _A if activity not in {_A.POWER_OFF, _A.IDLE, _A.BRAKING})
 
 TRANSITIONS: tuple[Transition, ...] = (
     Transition("take_control", (Control.FREE, Control.HELD), Control.HELD),
@@ -116,11 +133,16 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition("power_off", _STANDING, _A.POWER_OFF),
     Transition("power_off", (*_FREE_TO_END, _A.POWERING_OFF, _A.PROTECTIVE_STOPPING), _A.POWERING_OFF),
     Transition("at_rest", (_A.POWERING_OFF,), _A.POWER_OFF),
+    Transition("power_off", (_A.BRAKING,), _A.BRAKING),
+    Transition("brakes", _STANDING, _A.POWER_OFF),
+    Transition("brakes", (*_FREE_TO_END, _A.POWERING_OFF, _A.PROTECTIVE_STOPPING), _A.BRAKING),
+    Transition("at_rest", (_A.BRAKING,), _A.POWER_OFF),
     Transition("protective_stop", (_A.REST,), _A.PROTECTIVE_STOP),
     Transition("protective_stop", _FREE_TO_END, _A.PROTECTIVE_STOPPING),
     Transition("at_rest", (_A.PROTECTIVE_STOPPING,), _A.PROTECTIVE_STOP),
     Transition("unlock_protective_stop", (_A.PROTECTIVE_STOP,), _A.REST),
     Transition("plant_failure", _DRIVEN, _A.PROTECTIVE_STOP),
+    Transition("plant_failure", (_A.BRAKING,), _A.POWER_OFF),
 )
 """The table. `simulation.reset` is not in it: it puts the robot at REST, IDLE or POWER_OFF from everywhere."""
 

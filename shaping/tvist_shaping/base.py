@@ -71,6 +71,14 @@ class Filter(ABC):
     def mean_delay(self) -> float:
         """Of the weights of the last tick [s]: how far the shaped reference trails one of constant velocity."""
 
+    @property
+    def peak(self) -> float:
+        """By what factor the velocity and acceleration may exceed the reference's while the weights stay as they are.
+
+        The sum of the weights' magnitudes [-], 1 where none is negative.
+        """
+        return 1.0
+
     @abstractmethod
     def _start(self) -> None:
         """Weights for the modes at the last shaped reference, nothing remembered."""
@@ -140,6 +148,10 @@ class Filter(ABC):
         """Replace what is changed in place by copies: a new copy of the filter shares it still."""
         self.estimator, self._line = self.estimator.fork(), self._line.fork()
         self._q_star = self._q_star.copy()
+
+    def window(self) -> Floats:
+        """Samples of the reference that it may still read, the oldest first, shape (k, joints) [rad]."""
+        return self._line.newest(self._line.capacity)
 
     def take_over(self, other: "Filter") -> None:
         """Go on where another filter is: with the reference it was given, from the shaped one it gave.

@@ -109,6 +109,11 @@ class TvistFilter(Filter):
         """Of the impulses of the last tick [s]."""
         return self.impulses.mean_delay
 
+    @property
+    def peak(self) -> float:
+        """See `Filter.peak`: the shaper's own, once for each mode."""
+        return float(self.shaper.peak**self.estimator.modes)
+
     def replace(self, *, shaper: Shaper | None = None, estimator: Estimator | None = None) -> "TvistFilter":
         """A filter with another shaper or estimator that goes on where this one is.
 

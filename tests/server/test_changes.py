@@ -121,7 +121,7 @@ def test_a_change_that_has_not_begun_to_count_gives_way_to_the_next():
         line.step()
     line.use(TvistFilter(shaper("none"), Fixed([6.7], [0.1]), joints=6))
     line.use(newest := TvistFilter(shaper("ei3"), Fixed([6.7], [0.1]), joints=6))
-    assert line._fade.new is newest
+    assert line._filter._fade.new is newest
 
 
 def test_a_stream_at_its_limit_keeps_it_through_a_change():
@@ -144,8 +144,8 @@ def test_a_stream_at_its_limit_keeps_it_through_a_change():
     shaped = np.array(shaped)
     own = np.abs(np.diff(shaped, 2, axis=0)) / H**2
     assert (own / alone.bound(2, PAPER.acceleration, len(shaped))).max() < 1.0 + TOLERANCE
-    assert line._fade is None
-    line.end_stream(stream)
+    assert line._filter._fade is None
+    line.start(line.end_of(stream))
     while not line.at_rest:
         line.step()
     assert np.abs(line.position - line.reference).max() <= STILL
@@ -161,7 +161,7 @@ def test_paused_a_change_is_made_where_nothing_moves():
     robot.tick(5)
     held = robot.column("target_q")[-100:]
     assert (held == held[0]).all()
-    assert robot.controller.cycle._fade is None
+    assert robot.controller.cycle._filter._fade is None
     robot.send(c.Resume)
     robot.until_rest()
     assert robot.kinds()[-1] == "motion_done"
@@ -176,7 +176,7 @@ def test_a_stop_during_a_change_is_a_stop_and_the_new_filter_is_in_force_after_i
         if tick == 500:
             line.use(new)
         line.step()
-    assert 0.0 < line._fade.share < 1.0
+    assert 0.0 < line._filter._fade.share < 1.0
     before = line.newest
     line.stop(None)
     line.step()
@@ -184,7 +184,7 @@ def test_a_stop_during_a_change_is_a_stop_and_the_new_filter_is_in_force_after_i
     while not line.at_rest:
         line.step()
     assert line.tvist is new
-    assert line._fade is None
+    assert line._filter._fade is None
     assert (line.tvist.filter(line.reference) == line.reference).all()
 
 

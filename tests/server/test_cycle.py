@@ -128,7 +128,7 @@ def test_what_a_stream_leaves_behind_comes_to_rest_through_the_filter():
     for k in range(300):
         stream.offer(k, Q1 + 0.2 * (1 - np.cos(2.0 * k * H)))
         line.step()
-    line.end_stream(stream)
+    line.start(line.end_of(stream))
     shaped = []
     while not line.at_rest:
         line.step()

@@ -1,5 +1,6 @@
 """Where the arm would meet itself or the floor: capsules of the robot file, distances by coal."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
@@ -16,12 +17,10 @@ CLEARANCE = 0.005
 """Least distance between two bodies [m]."""
 FAR = 0.05
 """Distance that allows a long step [m]."""
-SHORT = 0.02
-"""Step where something is nearer than that [rad]."""
+SHORT = 0.004
+"""Way of the arm's points between two looks where something is as near as it may be [m]."""
 PAYLOAD = "payload"
 FLOOR = "floor"
-REACH = 1.0
-"""How far a point of the arm can be from a joint's axis: what moves by that times the angle [m]."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +31,9 @@ class Meeting:
     second: str
     distance: float
     """Between their surfaces; negative where they overlap [m]."""
+
+    def __str__(self) -> str:
+        return f"{self.first} and {self.second} would be {1e3 * self.distance:.0f} mm apart"
 
 
 class CollisionModel:
@@ -45,6 +47,9 @@ class CollisionModel:
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
         self._model = rigid_model(description, Payload())
         self._data = self._model.createData()
+        self._reach = np.zeros(description.joints)
+        self.carried = payload
+        """What the controller believes that the arm carries."""
         self._geometry = pin.GeometryModel()
         self._names: list[str] = []
         collision = description.collision
@@ -70,34 +75,59 @@ class CollisionModel:
         """
         return self._nearest(q) if self._within(self._fine, q) else None
 
-    def on_way(self, way: Callable[[float], Floats], length: float) -> tuple[float, Meeting] | None:
+    def on_line(self, start: Floats, end: Floats) -> tuple[float, Meeting] | None:
+        """The first meeting on the straight line between two postures; see `on_way`."""
+        way = end - start
+        return self.on_way(lambda share: start + share * way, self.travel(way))
+
+    def on_way(
+        self, way: Callable[[float], Floats], travel: float, *, before: Floats | None = None
+    ) -> tuple[float, Meeting] | None:
         """The first meeting on a way, found by long steps where everything is far apart and short ones elsewhere.
 
         Args:
             way: Share of the way, 0 to 1, to joint positions of shape (n,) [rad].
-            length: Sum over the joints of what they turn on it [rad].
+            travel: No point of the arm travels farther on it [m], nor on a part of it than this times the share.
+            before: Posture that the way begins from, shape (n,) [rad]: what is in a meeting there may move out of it.
+                None: the beginning of the way itself.
 
         Returns:
             Share of the way and the pair; None where it is free.
         """
-        share, escaping = 0.0, self.meeting(way(0.0))
+        share, escaping = 0.0, self.meeting(way(0.0) if before is None else before)
         while True:
             q = way(share)
-            # Nothing comes nearer than REACH times the angle turned.
-            angle = (FAR - CLEARANCE) / REACH
+            step = FAR - CLEARANCE
             if self._within(self._coarse, q):
-                angle = SHORT
-                if self._within(self._fine, q):
-                    nearest = self._nearest(q)
-                    # What is in a meeting already may move out of it.
-                    if escaping is None or nearest.distance < escaping.distance:
-                        return share, nearest
-                    escaping = nearest
-                else:
+                nearest = self._nearest(q)
+                step = max(nearest.distance - CLEARANCE, SHORT)
+                if nearest.distance >= CLEARANCE:
                     escaping = None
+                # What is in a meeting already may move out of it.
+                elif escaping is None or nearest.distance < escaping.distance:
+                    return share, nearest
+                else:
+                    escaping = nearest
+            else:
+                escaping = None
             if share >= 1.0:
                 return None
-            share = 1.0 if length <= 0.0 else min(share + angle / length, 1.0)
+            share = 1.0 if travel <= 0.0 else min(share + step / travel, 1.0)
+
+    def nearest(self, postures: Floats, far: float = FAR) -> float:
+        """Least distance between two bodies at some postures, shape (k, n) [rad]; `far` where none is nearer [m]."""
+        near = [q for q in postures if self._names and self._within(self._coarse, q)]
+        return min((far, *(self._nearest(q).distance for q in near)))
+
+    def travel(self, turned: Floats) -> float:
+        """Upper bound of the way of any point of the arm while its joints turn by so much, shape (n,) [rad], in m."""
+        return float(np.abs(turned) @ self._reach)
+
+    def room(self, q: Floats) -> float:
+        """How far any point of the arm may travel from a posture before something can meet [m]; 0 in a meeting."""
+        if not self._names:
+            return math.inf
+        return max(self._nearest(q).distance - CLEARANCE, 0.0)
 
     def _request(self, margin: float) -> pin.GeometryData:
         data = self._geometry.createData()
@@ -138,6 +168,7 @@ class CollisionModel:
         Args:
             payload: What the controller believes that the arm carries.
         """
+        self.carried = payload
         if not self._names:
             return
         centre = np.array(payload.com)
@@ -148,6 +179,24 @@ class CollisionModel:
         body.geometry.halfLength = length / 2.0
         self._loaded = payload.mass > 0.0
         body.disableCollision = not self._loaded
+        self._reach = self._reaches()
+
+    def _reaches(self) -> Floats:
+        """How far any point of the arm can be from each joint's axis, in any posture, shape (n,) [m]."""
+        joints = self._model.nv
+        own = np.zeros(joints)  # from the joint's origin to the farthest point of its own link
+        for body in self._geometry.geometryObjects[: len(self._names) - 1]:
+            if body.parentJoint > 0 and not body.disableCollision:
+                axis = body.placement.rotation[:, 2] * body.geometry.halfLength
+                ends = [np.linalg.norm(body.placement.translation + sign * axis) for sign in (-1.0, 1.0)]
+                joint = body.parentJoint - 1
+                own[joint] = max(own[joint], max(ends) + body.geometry.radius)
+        links = [float(np.linalg.norm(placement.translation)) for placement in self._model.jointPlacements]
+        reach, beyond = np.zeros(joints), 0.0
+        for joint in reversed(range(joints)):
+            reach[joint] = beyond = max(own[joint], beyond)
+            beyond += links[joint + 1]
+        return reach
 
     def _add_capsule(
         self, name: str, joint: int, frame: pin.SE3, start: Floats, end: Floats, radius: float

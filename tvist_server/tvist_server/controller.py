@@ -179,9 +179,17 @@ class Controller:
         id: int | None = None,  # noqa: A002  the wire's name
         code: Code | None = None,
         why: str | None = None,
+        category: int | None = None,
+        duration: float | None = None,
+        way: float | None = None,
     ) -> None:
         """Put down an event of the tick that is being made; of the next one between two."""
-        self._events.append(Event(tick=self.tick_number + 1, kind=kind, id=id, code=code, why=why))
+        tick = self.tick_number + 1
+        self._events.append(
+            Event(
+                tick=tick, kind=kind, id=id, code=code, why=why, category=category, duration=duration, way=way
+            )
+        )
 
     def _watch_time(self) -> None:
         """End what is over, and what nobody keeps up."""
@@ -328,16 +336,27 @@ class Controller:
         self.motion.unlock()
         return Done()
 
+    def restart_safety(self, command: c.RestartSafety) -> Reply:
+        """Restart the safety system."""
+        self._authorize(command.token)
+        self.motion.restart_safety()
+        return Done()
+
     def set_shaper(self, command: c.SetShaper) -> Reply:
         """Choose the shaper."""
         self._authorize(command.token)
-        self.filters.use(self.filters.choose(command.name, self.declared, command.modes, "name"))
+        chosen = self.filters.choose(command.name, self.declared, command.modes, "name")
+        self.motion.check_filter(chosen[1])
+        self.filters.use(chosen)
         return Done()
 
     def set_estimator(self, command: c.SetEstimator) -> Reply:
         """Choose the estimator."""
         self._authorize(command.token)
-        self.filters.estimate(command, self.declared)
+        chosen = self.filters.estimate(command, self.declared)
+        self.motion.check_filter(chosen[1])
+        self.filters.use(chosen)
+        self.filters.warn_of_payload(self.declared)
         return Done()
 
     def set_payload(self, command: c.SetPayload) -> Reply:
@@ -345,10 +364,11 @@ class Controller:
         self._authorize(command.token)
         payload = Payload(mass=command.mass, com=command.com, inertia=command.inertia)
         check_body(payload, rated=self.setup.description.limits.payload)
+        tvist = self.filters.with_payload(payload)
+        self.motion.check_payload(body(payload), tvist)
         self.declared = payload
         self.cycle.declare(body(payload))
-        self.filters.declare(payload)
-        self.motion.collisions.carry(body(payload))
+        self.filters.declare(payload, tvist)
         self._payload_monitor.declare(body(payload))
         return Done()
 
@@ -421,6 +441,7 @@ _HANDLERS: dict[type, Callable[[Controller, Any], Reply]] = {
     c.PowerOn: Controller.power_on,
     c.PowerOff: Controller.power_off,
     c.UnlockProtectiveStop: Controller.unlock_protective_stop,
+    c.RestartSafety: Controller.restart_safety,
     c.SimulationInject: Controller.simulation_inject,
     SetIo: Controller.set_io,
     SetRegisters: Controller.set_registers,

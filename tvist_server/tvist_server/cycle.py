@@ -1,6 +1,7 @@
 """One control period: the paper's Figure 6, left to right."""
 
 import math
+from collections.abc import Callable
 from typing import TypeVar
 
 import numpy as np
@@ -11,15 +12,20 @@ from tvist_plant.plant import PERIOD, Measurement, Plant
 from tvist_server.control.differentiator import Differentiator, Floats, Target
 from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.control.joint_controllers import JointControllers
-from tvist_server.safety import StopPlan, TorqueRoom, plan_stop
-from tvist_server.trajectory import DoubleS, Limits, Rest, SetpointStream, Stop, Trajectory
+from tvist_server.line_filter import LineFilter
+from tvist_server.safety import TorqueRoom
+from tvist_server.stops import STILL, StopPlan, StopPlanner
+from tvist_server.trajectory import DoubleS, Limits, Line, LineStop, Rest, SetpointStream, Stop, Trajectory
 from tvist_shaping.base import Filter
-from tvist_shaping.fade import Fade
 
 T = TypeVar("T", bound=Trajectory)
 
-STILL = 1e-7
-"""A reference that moves less than this between two ticks is at rest [rad]."""
+MOST_AHEAD = 4000
+"""Ticks that a motion is run ahead at most to see how it will end."""
+
+
+def _anywhere(_: Stop) -> bool:
+    return True
 
 
 class Sample(Struct, frozen=True, eq=False, gc=False):
@@ -60,19 +66,14 @@ class ControlCycle:
         seed: int,
     ) -> None:
         self.description = description
-        self.tvist = tvist
-        """The filter chosen last: in force, or about to be."""
-        self._fade: Fade | None = None
-        self._limits = Limits(
-            min(description.limits.velocity),
-            min(description.limits.acceleration),
-            min(description.limits.jerk),
-        )
-        """Of the present motion."""
+        limits = description.limits
+        most = Limits(min(limits.velocity), min(limits.acceleration), min(limits.jerk))
+        self._filter = LineFilter(tvist, most)
         self.arm = Plant(description, carried)
         self.inverse_dynamics = InverseDynamics(description, declared)
         self._joint_controllers = JointControllers(description, PERIOD)
         self._differentiator = Differentiator(q, PERIOD)
+        self.stops = StopPlanner(description, self.inverse_dynamics, PERIOD)
         self.trajectory: Trajectory = Rest(q)
         self.reference = q
         """Newest one before shaping, shape (n,) [rad]."""
@@ -80,18 +81,30 @@ class ControlCycle:
         """Whether nothing moves the shaped reference any more."""
         self.stopping = False
         """Whether a stop bypasses the filter."""
+        self.running_out = False
+        """Whether what was under way comes to rest by itself, since no stop is quicker."""
+        self.guard: Callable[[Target], Stop | None] | None = None
+        """Asked before each shaped reference is played; where it answers with a stop, that is made instead."""
         self._deceleration = math.inf
         self.reset(q, carried=carried, seed=seed)
         # The first steps load compiled code, which lasts many ticks: they are made here, and taken back.
-        self._fade = self._fade_to(tvist.with_estimator(tvist.estimator), tvist)
+        self._filter.rehearse(q)
         for _ in range(3):
             self.step()
         self.reset(q, seed=seed)
 
+    @property
+    def tvist(self) -> Filter:
+        """The filter chosen last: in force, or about to be."""
+        return self._filter.tvist
+
     def step(self) -> Sample:
         """One tick."""
-        reference = self.reference = self.trajectory.next()  # q [rad]
-        shaped = reference if self.stopping else self._shape(reference)  # q* [rad]
+        reference = self.trajectory.next()  # q [rad]
+        shaped = reference if self.stopping else self._filter.filter(reference)  # q* [rad]
+        if self.guard is not None:
+            reference, shaped = self._guarded(self.guard, reference, shaped)
+        self.reference = reference
         target = self._differentiator.update(shaped)  # q*, q̇*, q̈* of the tick before
         self.inverse_dynamics.advance()
         torque = self.inverse_dynamics.torque(target.q, target.qd, target.qdd)  # τ* [N m]
@@ -101,21 +114,16 @@ class ControlCycle:
         self._settle(reference, target)
         return Sample(reference, target, torque, command.torque, measured)
 
-    def _shape(self, reference: Floats) -> Floats:
-        """Shaped reference, on the way from one filter to another where there is one."""
-        fade = self._fade
-        if fade is None:
-            return self.tvist.filter(reference)
-        shaped = fade.filter(reference)
-        if fade.new is not self.tvist:  # it waits for its turn
-            self.tvist.filter(reference)
-        if fade.finished:
-            self._fade = None if fade.new is self.tvist else self._fade_to(fade.new, self.tvist)
-        return shaped
-
-    def _fade_to(self, old: Filter, new: Filter) -> Fade:
-        limits = self._limits
-        return Fade(old, new, velocity=limits.velocity, acceleration=limits.acceleration, jerk=limits.jerk)
+    def _guarded(
+        self, guard: Callable[[Target], Stop | None], reference: Floats, shaped: Floats
+    ) -> tuple[Floats, Floats]:
+        """What is played in place of a reference from which no stop would be clear."""
+        stop = None if self.stopping else guard(self._differentiator.after(shaped))
+        if stop is None:
+            return reference, shaped
+        self._bypass(stop)
+        reference = stop.next()
+        return reference, reference
 
     def use(self, tvist: Filter) -> None:
         """Change the filter: at once where the arm is at rest, else within the limits of the motion.
@@ -125,27 +133,23 @@ class ControlCycle:
         Args:
             tvist: The filter to come; its joints and period are the present one's.
         """
-        fade = self._fade
         if self.at_rest or self.stopping:
-            tvist.reset(self.reference)
-        elif fade is None or fade.share == 0.0:
-            self._fade = self._fade_to(self.tvist if fade is None else fade.old, tvist)
+            self._filter.begin(tvist, self.reference)
         else:
-            tvist.take_over(self.tvist)
-        self.tvist = tvist
+            self._filter.use(tvist)
 
     def _settle(self, reference: Floats, target: Target) -> None:
         """Notice the end of a motion: its trajectory is over and the shaped reference rests on it."""
-        if self.at_rest or self._fade is not None or not self.trajectory.finished:
+        trajectory = self.trajectory
+        if self.at_rest or not (trajectory.finished or (self.running_out and trajectory.standing)):
             return
-        step = PERIOD * (
-            target.qd - 0.5 * PERIOD * target.qdd
-        )  # what central differences make of q*ᵢ - q*ᵢ₋₁
-        way_left = reference - target.q
-        self.at_rest = bool(max(np.abs(step).max(), np.abs(way_left).max()) <= STILL)
+        self.at_rest = not self._filter.fading and _rests(reference, target)
         if self.at_rest and self.stopping:  # the delay line starts anew from where the stop ended
-            self.tvist.reset(reference)
-            self.stopping = False
+            self._filter.begin(self.tvist, reference)
+        if self.at_rest and not trajectory.finished:  # what ran out was paused: it goes no further
+            self.trajectory = Rest(reference)
+        if self.at_rest:
+            self.stopping, self.running_out, self.guard = False, False, None
 
     @property
     def position(self) -> Floats:
@@ -178,47 +182,156 @@ class ControlCycle:
         """Follow a trajectory that begins where the reference is."""
         self.trajectory = trajectory
         if isinstance(trajectory, DoubleS | SetpointStream):
-            self._limits = trajectory.limits
+            self._filter.limits = trajectory.limits
         self.at_rest = False
         return trajectory
 
-    def end_stream(self, stream: SetpointStream) -> None:
-        """Bring a stream to rest inside its own limits, through the filter."""
+    def end_of(self, stream: SetpointStream) -> Stop:
+        """How a stream comes to rest inside its own limits, through the filter."""
         limits = stream.limits
-        self.start(Stop(*stream.state, acceleration=limits.acceleration, jerk=limits.jerk, period=PERIOD))
+        return Stop(*stream.state, acceleration=limits.acceleration, jerk=limits.jerk, period=PERIOD)
 
     @property
     def newest(self) -> Target:
         """State of motion of the newest shaped reference."""
         return self._differentiator.newest
 
-    def plan_stop(self, deceleration: float | None) -> StopPlan:
-        """The stop that could be made now; deceleration as of `stop`."""
-        return plan_stop(self.description, self.inverse_dynamics, self.newest, deceleration, PERIOD)
+    def foresee(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Floats | None:
+        """Run the references ahead: what they will be if nothing is commanded.
 
-    def stop(self, deceleration: float | None) -> StopPlan | None:
-        """Stop past the filter, straight from the shaped reference; nothing in the delay line plays on.
+        Args:
+            tvist: A filter to change to now; None for no change.
+            trajectory: One to follow from now on; None for the present one.
+
+        Returns:
+            The two shaped references played last and those to come until they rest, one a tick, shape (k, n) [rad];
+            None where that takes more than `MOST_AHEAD` ticks.
+        """
+        trajectory = (self.trajectory if trajectory is None else trajectory).fork()
+        line_filter, differentiator = self._filter.fork(), self._differentiator.fork()
+        if tvist is not None and not self.stopping:
+            line_filter.use(tvist)
+        ahead = [differentiator.published.q, differentiator.newest.q]
+        for _ in range(MOST_AHEAD):
+            reference = trajectory.next()
+            shaped = reference if self.stopping else line_filter.filter(reference)
+            target = differentiator.update(shaped)
+            ahead.append(shaped)
+            if trajectory.standing and not line_filter.fading and _rests(reference, target):
+                return np.array(ahead)
+        return None
+
+    def window(self) -> Floats:
+        """References that the filter may still read, shape (k, n) [rad]."""
+        return self._filter.window()
+
+    def plan_stop(
+        self,
+        deceleration: float | None,
+        *,
+        clear: Callable[[Stop], bool] = _anywhere,
+        otherwise: Callable[[], Stop] | None = None,
+        asked: Floats | None = None,
+    ) -> StopPlan | None:
+        """The quickest permitted stop from here; see `StopPlanner`.
+
+        Args:
+            deceleration: As of `stop`.
+            clear: As of `stop`.
+            otherwise: As of `stop`.
+            asked: As of `stop`.
+
+        Returns:
+            None where a stop under way is as quick already.
+        """
+        line = self.trajectory.line
+        if line is None:
+            quickest = self.stops.by_joints(self.newest, deceleration, clear)
+            if quickest is None and self.stopping:
+                return None
+            if quickest is None:
+                quickest = self.stops.hardest(self.newest) if otherwise is None else otherwise()
+            return self._plan(quickest, deceleration, quickest.duration, quickest.end)
+        state, line = self._differentiator.published, self._shaped(line)
+        found = self.stops.on_line(state, line, deceleration, asked)
+        if found is None and self.stopping:
+            return None
+        if found is not None:
+            return self._plan(found, deceleration, found.duration - PERIOD, found.end)
+        ahead = self.foresee()
+        if ahead is None:
+            return StopPlan(None, None, deceleration is not None, None, None)
+        found, _ = self.stops.under(ahead, state, line, deceleration)
+        if found is None:
+            return self._plan(None, deceleration, (len(ahead) - 2) * PERIOD, ahead[-1])
+        return self._plan(found, deceleration, found.duration - PERIOD, found.end)
+
+    def _plan(
+        self, stop: Stop | LineStop | None, wanted: float | None, duration: float, end: Floats
+    ) -> StopPlan:
+        kept = None if stop is None else stop.acceleration
+        way = float(np.abs(end - self.position).max())
+        return StopPlan(stop, kept, wanted is not None and kept != wanted, max(duration, 0.0), way)
+
+    def _shaped(self, line: Line) -> Line:
+        """What is known of a line after the filter."""
+        if self.stopping:
+            return line
+        peak = self._filter.peak
+        known = peak == 1.0 and not self._filter.fading
+        return Line(line.direction, peak * line.braking, line.steady if known else 0.0)
+
+    def stop(
+        self,
+        deceleration: float | None,
+        *,
+        clear: Callable[[Stop], bool] = _anywhere,
+        otherwise: Callable[[], Stop] | None = None,
+        asked: Floats | None = None,
+    ) -> StopPlan | None:
+        """Come to rest as soon as is permitted: past the filter, nothing in the delay line plays on.
+
+        A motion stays on its way, never further along it than if it had not been stopped, and rests no later.
+        Where no stop does that within the torque, the motion runs out through the filter.
 
         Args:
             deceleration: Wanted limit [rad/s^2]; None for what the torque allows.
+            clear: Whether nothing meets on the way of a stop that leaves the way of the motion, as that of a stream.
+            otherwise: A stop for where none is clear and keeps the torque; None for the hardest.
+            asked: Largest torques that the motion itself would ask from now on [N m]; None where not known.
 
         Returns:
-            The stop with the limit it keeps; None where a stop under way is as hard already, and goes on.
+            What is done; None where a stop under way is as hard already, and goes on.
         """
         wanted = math.inf if deceleration is None else deceleration
-        if self.stopping and wanted <= self._deceleration:
+        if (self.stopping or self.running_out) and wanted <= self._deceleration:
             return None
-        plan = self.plan_stop(deceleration)
-        self.start(plan.trajectory)
-        self.stopping, self._deceleration, self._fade = True, wanted, None
+        plan = self.plan_stop(deceleration, clear=clear, otherwise=otherwise, asked=asked)
+        self._deceleration = wanted
+        if plan is None:
+            return None
+        if plan.trajectory is None:
+            self.running_out = True
+        else:
+            self._bypass(plan.trajectory)
         return plan
+
+    def brake(self, trajectory: Trajectory) -> None:
+        """Follow the arm while its brakes bring it to rest, past the filter."""
+        self._bypass(trajectory)
+        self._deceleration = math.inf
+
+    def _bypass(self, trajectory: Trajectory) -> None:
+        self.start(trajectory)
+        self._filter.cut()
+        self.stopping, self.running_out = True, False
 
     def reset(self, q: Floats, *, carried: Payload | None = None, seed: int = 0) -> None:
         """Put the arm at rest somewhere, in static equilibrium; everything on the line starts anew."""
         self.trajectory, self.reference = Rest(q), q
-        self.at_rest, self.stopping, self._fade = True, False, None
+        self.at_rest, self.stopping, self.running_out, self.guard = True, False, False, None
         self.inverse_dynamics.settle()
-        self.tvist.reset(q)
+        self._filter.begin(self.tvist, q)
         self._differentiator.reset(q)
         self._joint_controllers.reset()
         still = np.zeros_like(q)
@@ -229,3 +342,11 @@ class ControlCycle:
     def declare(self, payload: Payload) -> None:
         """Change the payload that inverse dynamics counts on; torque goes there without a step."""
         self.inverse_dynamics.declare(payload)
+
+
+def _rests(reference: Floats, target: Target) -> bool:
+    """Whether a shaped reference rests on its reference, by the target that was made of it."""
+    # What central differences make of q*ᵢ - q*ᵢ₋₁.
+    step = PERIOD * (target.qd - 0.5 * PERIOD * target.qdd)
+    return bool(max(np.abs(step).max(), np.abs(reference - target.q).max()) <= STILL)
+

@@ -41,10 +41,24 @@ class Faults:
         match command.fault:
             case "protective_stop":
                 motion.protect("a protective stop was injected")
-            case "reduced" | "normal":
-                motion.reduce(reduced=command.fault == "reduced")
-                if ticks is not None:
-                    self._at(tick + ticks, lambda: motion.reduce(reduced=False))
+            case "reduced":
+                motion.reduce(reduced=True)
+                self._release(tick, ticks, lambda: motion.reduce(reduced=False))
+            case "safeguard_stop":
+                motion.safeguard(stopped=True)
+                self._release(tick, ticks, lambda: motion.safeguard(stopped=False))
+            case "emergency_stop":
+                motion.emergency("robot")
+                self._release(tick, ticks, lambda: motion.end_emergency("robot"))
+            case "system_emergency_stop":
+                motion.emergency("system")
+                self._release(tick, ticks, lambda: motion.end_emergency("system"))
+            case "normal":
+                motion.release()
+            case "power_loss":
+                motion.cut_power("a loss of power was injected")
+            case "violation" | "fault" as found:
+                motion.cut_power(f"a {found} of the safety system was injected", found)
             case "nan":
                 motion.cycle.arm.spoil()
             case "torque":
@@ -63,6 +77,10 @@ class Faults:
             heapq.heappop(self._ends)[-1]()
         self._push[:] = 0.0
         self._motion.cycle.arm.push(self._push)
+
+    def _release(self, tick: int, ticks: int | None, end: Callable[[], None]) -> None:
+        if ticks is not None:
+            self._at(tick + ticks, end)
 
     def _at(self, tick: int, end: Callable[[], None]) -> None:
         heapq.heappush(self._ends, (tick, next(self._number), end))

@@ -62,8 +62,8 @@ class Filters:
         self._cycle.use(tvist)
         self._emit("shaper_changed", why=f"{tvist.name} with estimator {self.source.name}")
 
-    def estimate(self, command: SetEstimator, declared: Payload) -> None:
-        """Take modes from elsewhere.
+    def estimate(self, command: SetEstimator, declared: Payload) -> tuple[ModeSource, Filter]:
+        """The present filter with modes from elsewhere, for `use`.
 
         Raises:
             RefusalError: That is not possible.
@@ -71,15 +71,24 @@ class Filters:
         source, present = choose_source(command, self._setup), self._cycle.tvist
         where = "f_d" if source.calibration is None else "calibration"
         estimator = make_estimator(source, present.estimator.modes, declared, where)
-        tvist = choose_filter(present.name, estimator, self._setup.description.joints, where=where)
-        self.use((source, tvist))
-        self.warn_of_payload(declared)
+        return source, choose_filter(present.name, estimator, self._setup.description.joints, where=where)
 
-    def declare(self, payload: Payload) -> None:
-        """The arm carries something else: so has it other modes."""
-        if self.source.knows_payload:
-            present = self._cycle.tvist
-            self._cycle.use(present.with_estimator(self.source.estimator(present.estimator.modes, payload)))
+    def with_payload(self, payload: Payload) -> Filter | None:
+        """The present filter with the modes of the arm with another payload; None where they are not known."""
+        if not self.source.knows_payload:
+            return None
+        present = self._cycle.tvist
+        return present.with_estimator(self.source.estimator(present.estimator.modes, payload))
+
+    def declare(self, payload: Payload, tvist: Filter | None) -> None:
+        """The arm carries something else: so it may have other modes.
+
+        Args:
+            payload: What the controller believes that it carries.
+            tvist: The filter for it, from `with_payload`.
+        """
+        if tvist is not None:
+            self._cycle.use(tvist)
         self.warn_of_payload(payload)
 
     def warn_of_payload(self, declared: Payload) -> None:

@@ -8,24 +8,32 @@ from typing import Protocol
 
 import numpy as np
 
-from tvist_plant.plant import PlantError
+from tvist_plant.description import Payload
+from tvist_plant.plant import PERIOD, PlantError
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import Code
 from tvist_protocol.stream import EventKind
 from tvist_protocol.transitions import Activity, after
 from tvist_protocol.values import ResetMode
+from tvist_server.brakes import brake
 from tvist_server.collision import CLEARANCE, CollisionModel, Meeting
 from tvist_server.control.differentiator import Floats
 from tvist_server.cycle import ControlCycle, Sample
 from tvist_server.overload import Overload
 from tvist_server.refusal import RefusalError, out_of_turn
-from tvist_server.safety import GENTLEST_STOP, REDUCED_SHARE
+from tvist_server.safety import REDUCED_SHARE, acceleration_on_way, largest_torque, torque_to_come
+from tvist_server.safety_system import Emergency, Latched, SafetySystem
+from tvist_server.stops import STILL, StopPlan
 from tvist_server.trajectory import DoubleS, Limits, SetpointStream
+from tvist_server.way_ahead import WayAhead
+from tvist_shaping.base import Filter
 
 STREAM_TIMEOUT = 0.25
 """A stream without set-points for this long is stopped [s]."""
-LOOKS = np.linspace(0.0, 1.0, 9)[1:, None]
-"""Shares of the way to rest at which a stream is looked ahead of [-], shape (8, 1)."""
+PAUSE_SHARE = 0.95
+"""Share of the acceleration that torque leaves on the way that a pause uses: the filter may add a little [-]."""
+LEAST_PAUSE = 0.2
+"""Share of a motion's acceleration that a pause must have; where torque leaves less the motion goes on to its end [-]."""
 
 
 _PUT: dict[ResetMode, Activity] = {
@@ -40,6 +48,7 @@ _RUNTIME = {
     Activity.PAUSED: RuntimeState.PAUSED,
     Activity.STOPPING: RuntimeState.STOPPING,
     Activity.POWERING_OFF: RuntimeState.STOPPING,
+    Activity.BRAKING: RuntimeState.STOPPING,
     Activity.PROTECTIVE_STOPPING: RuntimeState.STOPPING,
 }
 """All else is STOPPED."""
@@ -55,6 +64,9 @@ class Emit(Protocol):
         id: int | None = None,  # noqa: A002  the wire's name
         code: Code | None = None,
         why: str | None = None,
+        category: int | None = None,
+        duration: float | None = None,
+        way: float | None = None,
     ) -> None:
         """Of the tick that is being made, or of the next one between two."""
 
@@ -76,10 +88,12 @@ class MotionControl:
         self.collisions = collisions
         self.activity = _PUT[mode]
         """What the robot is doing."""
+        self.safety = SafetySystem()
+        """What the safety system allows."""
         self._emit = emit
+        self._ahead = WayAhead(cycle, collisions)
         limits = cycle.description.limits
         self._overload = Overload(limits.torque)
-        self._reduced = False
         self._reduced_velocity = REDUCED_SHARE * min(limits.velocity)
         self._started = 0
         self._motion: int | None = None
@@ -87,6 +101,10 @@ class MotionControl:
         self._velocity = 0.0
         """Limit of the running motion [rad/s]."""
         self._speed = 1.0
+        self._held = False
+        """Whether the running motion is held by a pause."""
+        self._goes_on = False
+        """Whether it goes on by itself when the safeguard stop is released."""
         self._stream: SetpointStream | None = None
         self._heard = 0.0
         self._late, self._lost, self._limited = 0, 0, 0
@@ -120,19 +138,41 @@ class MotionControl:
             trajectory = self.cycle.plan(target, spared, self._rate(limits.velocity))
         except ValueError as error:
             raise RefusalError("out_of_range", "velocity", str(error)) from error
-        way = target - start
-        found = self.collisions.on_way(lambda share: start + share * way, float(np.abs(way).sum()))
+        found = self.collisions.on_line(start, target)
         if found is not None:
             share, meeting = found
             after = trajectory.time_at(share)
-            raise RefusalError("collision", "q", f"{_met(meeting)} {after:.2f} s after the start", CLEARANCE)
+            raise RefusalError("collision", "q", f"{meeting} {after:.2f} s after the start", CLEARANCE)
         self.cycle.tvist.aim(target)
         self.cycle.start(trajectory)
         self._started += 1
         self._motion, self._trajectory, self._velocity = self._started, trajectory, limits.velocity
+        self._held = self._goes_on = False
         self._go("move_j")
         self._emit("motion_started", id=self._motion)
+        self._warn_of_torque(start, target, spared)
         return self._motion
+
+    def _warn_of_torque(self, start: Floats, target: Floats, limits: Limits) -> None:
+        """Say by how much a motion that has just begun will pass a limit of torque, where it will."""
+        cycle, allowed = self.cycle, self._overload.limits
+        most = largest_torque(
+            cycle.inverse_dynamics, start, target - start, limits.velocity, limits.acceleration
+        )
+        if (most <= allowed).all():
+            return
+        ahead = cycle.foresee()
+        if ahead is None:
+            return
+        most = torque_to_come(cycle.inverse_dynamics, ahead, PERIOD)[0]
+        joint = int(np.argmax(most / allowed))
+        if most[joint] > allowed[joint]:
+            name, limit = cycle.description.robot.joints[joint], allowed[joint]
+            why = (
+                f"torque of joint {name} will reach {most[joint]:.0f} N m, "
+                f"{most[joint] - limit:.1f} beyond its limit of {limit:g}: ask for less acceleration"
+            )
+            self._emit("warning", id=self._motion, code="limit_torque", why=why)
 
     def set_speed(self, fraction: float) -> None:
         """Scale the time of motions, the one that runs and those to come; streams keep their client's time."""
@@ -140,13 +180,28 @@ class MotionControl:
         self._set_rate()
 
     def pause(self) -> None:
-        """Bring the motion to a standstill on its way.
+        """Bring the motion to a standstill on its way; one that is about to end anyway goes on to its end.
 
         Raises:
             RefusalError: None is running.
         """
         self._go("pause")
-        self._set_rate()
+        self._goes_on = False
+        self._hold()
+
+    def _hold(self) -> None:
+        """Slow the motion down to a standstill within the torque, where that ends it sooner."""
+        trajectory, cycle = self._trajectory, self.cycle
+        if trajectory is None or self._held:
+            return
+        most = trajectory.limits.acceleration
+        speed = max(trajectory.velocity, float(np.abs(cycle.newest.qd).max()))
+        left = trajectory.target - cycle.position
+        farthest = float(np.abs(left).max())
+        way = left * min(speed * speed / (most * max(farthest, STILL)), 1.0)
+        room = acceleration_on_way(cycle.inverse_dynamics, cycle.position, way, speed, self._overload.limits)
+        room *= PAUSE_SHARE
+        self._held = room > LEAST_PAUSE * most and trajectory.hold(min(room, most))
 
     def resume(self) -> None:
         """Go on with a motion that was paused.
@@ -155,7 +210,9 @@ class MotionControl:
             RefusalError: None is.
         """
         self._go("resume")
-        self._set_rate()
+        if self._trajectory is not None and self._held:
+            self._trajectory.release(self._rate(self._velocity))
+        self._held = False
 
     @property
     def speed(self) -> float:
@@ -171,35 +228,107 @@ class MotionControl:
     def runtime(self) -> RuntimeState:
         """Whether something moves."""
         state = _RUNTIME.get(self.activity, RuntimeState.STOPPED)
-        return RuntimeState.PAUSING if state is RuntimeState.PAUSED and self.speed > 0.0 else state
+        pausing = state is RuntimeState.PAUSED and self.speed > 0.0 and not self.cycle.at_rest
+        return RuntimeState.PAUSING if pausing else state
 
     @property
     def safety_mode(self) -> SafetyMode:
         """What the safety system allows."""
-        return self.activity.safety_mode(reduced=self._reduced)
+        return self.safety.mode(self.activity)
 
     def _rate(self, velocity: float) -> float:
         """Rate for the time of a motion with this velocity limit [-]."""
-        return min(self._speed, self._reduced_velocity / velocity) if self._reduced else self._speed
+        return min(self._speed, self._reduced_velocity / velocity) if self.safety.reduced else self._speed
 
     def _set_rate(self) -> None:
-        if self._trajectory is not None:
-            paused = self.activity is Activity.PAUSED
-            self._trajectory.speed = 0.0 if paused else self._rate(self._velocity)
+        if self._trajectory is not None and not self._held:
+            self._trajectory.speed = self._rate(self._velocity)
 
     def reduce(self, *, reduced: bool) -> None:
         """Reduce the speed, or allow all of it again.
 
         Motions are slowed on their way; a stream, whose time is its client's, is stopped if it may be faster.
         """
-        if reduced == self._reduced:
+        if reduced == self.safety.reduced:
             return
-        self._reduced = reduced
+        self.safety.reduced = reduced
         share = f"{100 * REDUCED_SHARE:g} % of the joints' limits" if reduced else "no longer reduced"
         self._emit("warning", why=f"safety_mode is {self.safety_mode.name}: speed is {share}")
         self._set_rate()
         if reduced and self._stream is not None and self._stream.limits.velocity > self._reduced_velocity:
             self.stop(None, "speed was reduced", "limit_velocity")
+
+    def safeguard(self, *, stopped: bool) -> None:
+        """Stop by category 2, or allow motion again: a motion pauses and then goes on, a stream ends.
+
+        Args:
+            stopped: Whether the safeguard asks for the stop.
+        """
+        if stopped == self.safety.safeguard:
+            return
+        self.safety.safeguard = stopped
+        if not stopped:
+            if self._goes_on and self.activity is Activity.PAUSED:
+                self.resume()
+            self._goes_on = False
+            return
+        why, category = "a safeguard stop was injected", 2
+        if after(self.activity, "pause") is None:
+            self._end("interruption", why, kind="safety_stop", category=category)
+            return
+        goes_on = self.activity is Activity.MOVING or self._goes_on
+        self.pause()
+        self._goes_on = goes_on
+        duration, way = self._ahead.until_rest()
+        self._emit("safety_stop", why=why, category=category, duration=duration, way=way)
+
+    def emergency(self, whose: Emergency) -> None:
+        """Stop by category 1: on the way, then without power until it is released."""
+        if self.safety.emergency is not None:
+            return
+        self.safety.emergency = whose
+        self._end("power_off", f"the {whose}'s emergency stop was pressed", kind="safety_stop", category=1)
+
+    def end_emergency(self, whose: Emergency) -> None:
+        """Release an emergency stop; the power stays off until it is switched on."""
+        if self.safety.emergency == whose:
+            self.safety.emergency = None
+
+    def release(self) -> None:
+        """Release all inputs of the safety system: speed, safeguard and emergency stops."""
+        self.reduce(reduced=False)
+        self.safeguard(stopped=False)
+        self.safety.release()
+
+    def cut_power(self, why: str, latched: Latched | None = None) -> None:
+        """Stop by category 0: the brakes close at once.
+
+        Args:
+            why: The reason, for a person.
+            latched: What the safety system has found, until it is restarted; None: nothing.
+        """
+        if latched is not None:
+            self.safety.latched = latched
+        target = after(self.activity, "brakes")
+        if target is None:
+            self._emit("safety_stop", why=why, category=0, duration=0.0, way=0.0)
+            return
+        self.activity = target
+        cycle, plan = self.cycle, StopPlan(None, None, limited=False, duration=0.0, way=0.0)
+        if not cycle.at_rest:
+            stop = brake(cycle.description, cycle.arm.payload, cycle.newest, PERIOD)
+            way = float(np.abs(stop.end - cycle.position).max())
+            plan = replace(plan, duration=stop.duration, way=way)
+            cycle.brake(stop)
+        self._tell_end(plan, why, None, "safety_stop", 0)
+
+    def restart_safety(self) -> None:
+        """Restart the safety system after a violation or a fault.
+
+        Raises:
+            RefusalError: There was none.
+        """
+        self.safety.restart()
 
     def power_on(self, *, release_brakes: bool = True) -> None:
         """Power the arm and release its brakes.
@@ -214,13 +343,12 @@ class MotionControl:
 
     def power_off(self) -> None:
         """Stop what moves, then take the power; the brakes hold the arm where it is."""
-        self._end("power_off", "power_off was commanded")
+        self._end("power_off", "power_off was commanded", category=1)
 
     def protect(self, why: str, code: Code | None = None) -> None:
         """Make a protective stop; nothing happens where the brakes hold the arm or power is on its way out."""
         if after(self.activity, "protective_stop") is not None:
-            self._emit("protective_stop", code=code, why=why)
-            self._end("protective_stop", why, code)
+            self._end("protective_stop", why, code, kind="protective_stop")
 
     def unlock(self) -> None:
         """Leave a protective stop.
@@ -259,6 +387,7 @@ class MotionControl:
         target = after(self.activity, trigger)
         if target is None:
             raise out_of_turn(trigger, self.activity)
+        self.safety.check(trigger, self.activity)
         return target
 
     def _go(self, trigger: str) -> None:
@@ -271,11 +400,12 @@ class MotionControl:
             RefusalError: The arm is busy, or such a stream may be too fast.
         """
         target = self._check("servo_start")
-        if self._reduced and limits.velocity > (most := self._reduced_velocity):
+        if self.safety.reduced and limits.velocity > (most := self._reduced_velocity):
             why = f"velocity is {limits.velocity:g} rad/s; safety_mode is REDUCED, which leaves {most:.3g}"
             raise RefusalError("limit_velocity", "velocity", why, most)
         self.activity = target
         self._stream = self.cycle.stream(period, limits)
+        self._ahead.begin()
         self._heard = now
 
     def offer(self, sequence: int, q: Floats, now: float) -> None:
@@ -290,9 +420,15 @@ class MotionControl:
         Raises:
             RefusalError: None is running.
         """
+        if self._stream is None:
+            raise out_of_turn("servo_stop", self.activity)
+        end = self.cycle.end_of(self._stream)
+        met = self._ahead.after_stream(end)
+        if met is not None:
+            self.interrupt(f"{met} before the stream came to rest through the filter", "collision")
+            return
         self._go("servo_stop")
-        if self._stream is not None:
-            self.cycle.end_stream(self._stream)
+        self.cycle.start(end)
         self._forget_stream("servo_stop")
 
     def stop(self, deceleration: float | None, why: str, code: Code | None = None) -> None:
@@ -310,21 +446,50 @@ class MotionControl:
         self._end("interruption", why, code)
 
     def _end(
-        self, trigger: str, why: str, code: Code | None = None, deceleration: float | None = None
+        self,
+        trigger: str,
+        why: str,
+        code: Code | None = None,
+        deceleration: float | None = None,
+        *,
+        kind: EventKind | None = None,
+        category: int = 2,
     ) -> None:
-        """Go where a trigger leads, and stop on the way what moves. One that leads nowhere is none of ours."""
+        """Go where a trigger leads, and stop on the way what moves. One that leads nowhere is none of ours.
+
+        Args:
+            trigger: Of the table.
+            why: The reason, for a person.
+            code: The reason, for a program.
+            deceleration: Wanted limit [rad/s^2]; None for what the torque allows.
+            kind: Of an event that tells of the stop itself; None for none.
+            category: Of the stop.
+        """
         target = after(self.activity, trigger)
         if target is None:
             return
         self.activity = target
-        self._forget_stream(why, code)
-        plan = None if self.cycle.at_rest else self.cycle.stop(deceleration)
+        plan = None if self.cycle.at_rest else self._ahead.stop(deceleration)
         if plan is not None and plan.limited:
-            why = f"{why}; deceleration is {plan.acceleration:.3g} rad/s², limited from {deceleration:.3g}"
-            if self._motion is None:
-                self._emit("warning", code="limit_acceleration", why=why)
+            kept = "the motion's own" if plan.acceleration is None else f"{plan.acceleration:.3g} rad/s²"
+            why = f"{why}; deceleration is {kept}, limited from {deceleration:.3g}"
+        bare = self._motion is None  # what has no number ends without a word on limits
+        self._tell_end(plan, why, code, kind, category)
+        if bare and plan is not None and plan.limited:
+            self._emit("warning", code="limit_acceleration", why=why)
+
+    def _tell_end(
+        self, plan: StopPlan | None, why: str, code: Code | None, kind: EventKind | None, category: int
+    ) -> None:
+        """Tell of a stop, and of what it has ended."""
+        duration, way = (0.0, 0.0) if self.cycle.at_rest else self._ahead.until_rest(plan)
+        told = {"category": category, "duration": duration, "way": way}
+        if kind is not None:
+            self._emit(kind, code=code, why=why, **told)
+        if self._stream is not None:
+            self._forget_stream(why, code, **told)
         if self._motion is not None:
-            self._end_motion(why, code)
+            self._end_motion(why, code, **told)
 
     def abandon(self, why: str, code: Code | None = None) -> None:
         """Say that what was moving ended: the arm is put elsewhere."""
@@ -336,8 +501,12 @@ class MotionControl:
         """Be in a robot mode; None: in the present one, at rest. The arm was put somewhere at rest before."""
         if mode is not None:
             self.activity = _PUT[mode]
-        elif self.activity.safety_mode(reduced=False) is SafetyMode.PROTECTIVE_STOP:
+            self.safety.release()
+            self.safety.latched = None
+        elif self.activity.protective:
             self.activity = Activity.PROTECTIVE_STOP
+        elif self.activity is Activity.BRAKING or (self.safety.emergency and self.activity.moving):
+            self.activity = Activity.POWER_OFF
         elif self.activity.moving:
             self.activity = Activity.REST
         self._overload.forget()
@@ -353,9 +522,9 @@ class MotionControl:
         Raises:
             PlantError: The arm's state is no longer finite: `recover`.
         """
-        if self._stream is not None:
-            self._look_ahead()
         sample = self.cycle.step()
+        if self.cycle.stopping and self.activity in {Activity.STREAMING, Activity.ENDING}:
+            self._end("interruption", str(self._ahead.met), "collision")
         if self.cycle.at_rest and self.activity.moving:
             self._arrive()
         if self.activity.robot_mode is RobotMode.RUNNING:
@@ -380,36 +549,46 @@ class MotionControl:
             why = f"torque of joint {name} is {moment:.0f} N m; beyond its {limit:g} for more than 10 ms"
             self.protect(why, "limit_torque")
 
-    def _look_ahead(self) -> None:
-        """Stop a stream before it brings the arm to where something meets.
+    def check_payload(self, payload: Payload, tvist: Filter | None) -> None:
+        """Check the rest of what moves with another payload, and put it into the collision model.
 
-        Far from everything a rough guess of where a stop would end is enough; near something the stop itself is
-        planned, with what the torque allows there.
+        Args:
+            payload: What the controller is to believe that the arm carries.
+            tvist: Filter that comes with it; None for the present one.
+
+        Raises:
+            RefusalError: Something would meet; nothing has changed.
         """
-        state = self.cycle.newest
-        ahead = state.q + LOOKS * (state.qd * np.abs(state.qd) / (2.0 * GENTLEST_STOP))
-        if all(self.collisions.meeting(q) is None for q in ahead):
-            return
-        stop = self.cycle.plan_stop(None).trajectory
-        for share in LOOKS[:, 0]:
-            meeting = self.collisions.meeting(stop.at(share * stop.duration)[0])
-            if meeting is not None:
-                self.interrupt(_met(meeting), "collision")
-                return
+        before, q = self.collisions.carried, self.cycle.position
+        escaping = self.cycle.at_rest or self.collisions.meeting(q) is not None
+        self.collisions.carry(payload)
+        met = None if escaping else self.collisions.meeting(q)
+        met = met or self._ahead.rest_of_way(tvist)
+        if met is not None:
+            self.collisions.carry(before)
+            why = f"{met} on the rest of the way with this payload"
+            raise RefusalError("collision", "com", why, CLEARANCE)
 
-    def _end_motion(self, why: str, code: Code | None = None) -> None:
-        self._emit("motion_stopped", id=self._motion, code=code, why=why)
+    def check_filter(self, tvist: Filter) -> None:
+        """Check the rest of a stream that has ended with another filter.
+
+        Raises:
+            RefusalError: Something would meet.
+        """
+        if self.activity is Activity.ENDING:
+            met = self._ahead.rest_of_way(tvist)
+            if met is not None:
+                raise RefusalError("collision", "name", f"{met} on the rest of the way", CLEARANCE)
+
+    def _end_motion(self, why: str, code: Code | None = None, **told: float | None) -> None:
+        self._emit("motion_stopped", id=self._motion, code=code, why=why, **told)
         self._forget_motion()
 
     def _forget_motion(self) -> None:
-        self._motion, self._trajectory = None, None
+        self._motion, self._trajectory, self._held, self._goes_on = None, None, False, False
 
-    def _forget_stream(self, why: str, code: Code | None = None) -> None:
+    def _forget_stream(self, why: str, code: Code | None = None, **told: float | None) -> None:
         if self._stream is not None:
             self._late, self._lost, self._limited = self.counters()
             self._stream = None
-            self._emit("stream_stopped", code=code, why=why)
-
-
-def _met(meeting: Meeting) -> str:
-    return f"{meeting.first} and {meeting.second} would be {1e3 * meeting.distance:.0f} mm apart"
+            self._emit("stream_stopped", code=code, why=why, **told)

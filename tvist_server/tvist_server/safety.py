@@ -1,15 +1,14 @@
 """What the arm may do: positions, velocities, accelerations, torques."""
 
 import math
-from bisect import bisect_left
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
 
 import numpy as np
 
 from tvist_plant.description import RobotDescription
 from tvist_server.control.differentiator import Floats, Target
 from tvist_server.control.inverse_dynamics import InverseDynamics
-from tvist_server.trajectory import Stop
+from tvist_server.trajectory import LineStop, Stop
 
 TORQUE_SHARE = 0.9
 """Share of the joints' torque that a stop or a stream may ask for [-]."""
@@ -19,8 +18,8 @@ again without damping. A stop bypasses the filter, so its change is sudden."""
 GENTLEST_STOP = 1.0
 """Deceleration below which no stop goes: neither for torque, nor because a client wants it [rad/s^2]."""
 
-STEP = 0.8
-"""From one deceleration that is tried to the next [-]."""
+LOOK_EVERY = 4
+"""Ticks between two looks at the torque of references that are known."""
 REDUCED_SHARE = 0.25
 """Share of the joints' velocity that is left while the safety system reduces it [-]."""
 
@@ -52,94 +51,125 @@ class TorqueRoom:
         return max(float((left / np.abs(self._dynamics.inertia(q)).sum(axis=1)).min()), GENTLEST_STOP)
 
 
-@dataclass(frozen=True)
-class StopPlan:
-    """A stop and what limits it."""
+class StopTorque:
+    """What a stop may ask of the joints' torques.
 
-    trajectory: Stop
-    acceleration: float
-    """Limit it keeps [rad/s^2]."""
-    limited: bool
-    """Whether that is not what was wanted."""
-
-
-def plan_stop(
-    description: RobotDescription,
-    dynamics: InverseDynamics,
-    state: Target,
-    wanted: float | None,
-    period: float,
-) -> StopPlan:
-    """The shortest stop whose torque stays within its share of the joints' limits.
-
-    Gravity alone takes most of a stretched arm's torque, so the deceleration left depends on the pose:
-    it is lowered by steps until the torque along the whole stop, by inverse dynamics of the rigid arm, is
-    inside, and inside the limits themselves with what the flexible arm swings beyond it at both ends of the stop.
-    Where the motion already takes more, the stop may too. A stop so gentle that it would end beyond a joint's
-    range is made as hard as one without a wish.
-
-    Args:
-        description: The robot.
-        dynamics: Its inverse dynamics with the declared payload.
-        state: Where the shaped reference is and how it moves.
-        wanted: Deceleration asked for [rad/s^2]; None for as much as possible.
-        period: Tick [s].
-    """
-    limits = description.limits
-    highest = min(limits.acceleration)
-    acceleration = highest if wanted is None else min(max(wanted, GENTLEST_STOP), highest)
-    torque = _Room(dynamics, state, np.array(limits.torque))
-
-    def stop(acceleration: float) -> Stop:
-        return Stop(
-            state.q, state.qd, state.qdd, acceleration=acceleration, jerk=min(limits.jerk), period=period
-        )
-
-    trajectory = stop(acceleration)
-    if acceleration > GENTLEST_STOP and not torque.holds(trajectory):
-        steps = math.ceil(math.log(acceleration / GENTLEST_STOP) / math.log(1.0 / STEP))
-        ladder = [max(acceleration * STEP**step, GENTLEST_STOP) for step in range(1, steps + 1)]
-        # Halve: what one step holds, a gentler one does; the gentlest of all need not be asked.
-        rung = bisect_left(range(len(ladder) - 1), True, key=lambda k: torque.holds(stop(ladder[k])))
-        acceleration = ladder[rung]
-        trajectory = stop(acceleration)
-    if wanted is not None and (np.abs(trajectory.at(trajectory.duration)[0]) > limits.position).any():
-        hardest = plan_stop(description, dynamics, state, None, period)
-        return replace(hardest, limited=True)
-    return StopPlan(trajectory, acceleration, wanted is not None and acceleration != wanted)
-
-
-class _Room:
-    """What a stop may ask for.
+    Every torque of the rigid arm along the stop stays within its share of the limit. Where the motion already takes
+    more at this moment, or would take more later if it were not stopped, the stop may, too.
 
     Args:
         dynamics: Inverse dynamics with the declared payload.
-        state: Where it begins: where the motion already takes more, the stop may too.
+        state: Where the stop begins.
         limits: Of the joints' torque, shape (n,) [N m].
+        asked: Largest that the motion itself would ask from now on, shape (n,) [N m]; None where that is not known.
     """
 
-    def __init__(self, dynamics: InverseDynamics, state: Target, limits: Floats) -> None:
+    def __init__(
+        self, dynamics: InverseDynamics, state: Target, limits: Floats, asked: Floats | None = None
+    ) -> None:
         self._dynamics = dynamics
         present = dynamics.effort(state.q, state.qd, state.qdd)
+        if asked is not None:
+            present = np.maximum(present, asked)
         self._share, self._most = np.maximum(TORQUE_SHARE * limits, present), np.maximum(limits, present)
         self._before = dynamics.torque(state.q, state.qd, state.qdd) - dynamics.gravity(state.q)
 
-    def holds(self, trajectory: Stop) -> bool:
+    def holds(self, stop: Stop | LineStop, *, rebound: bool = True) -> bool:
         """Whether a stop keeps to it.
 
         The very start is what the motion already asks for: only what follows is the stop's own doing. Thirty-two
         moments, since torque peaks where a joint's ramp ends; widely spread ones first, which soon show an excess.
-        """
-        times = np.linspace(0.0, trajectory.duration, 33)[1:].reshape(4, 8).T.ravel()
-        return all(self._holds(*trajectory.at(time)) for time in times)
 
-    def _holds(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
+        Args:
+            stop: The stop.
+            rebound: Whether the limits themselves must hold for what the flexible arm swings beyond the rigid one, at
+                both ends of the stop.
+        """
+        times = np.linspace(0.0, stop.duration, 33)[1:].reshape(4, 8).T.ravel()
+        return all(self._holds(*stop.at(time), rebound=rebound) for time in times.tolist())
+
+    def _holds(self, q: Floats, qd: Floats, qdd: Floats, *, rebound: bool) -> bool:
         dynamics = self._dynamics
-        torque, gravity = dynamics.torque(q, qd, qdd), dynamics.gravity(q)
+        torque = dynamics.torque(q, qd, qdd)
         effort = dynamics.effort(q, qd, qdd) if dynamics.changing else np.abs(torque)
         if (effort > self._share).any():
             return False
+        if not rebound:
+            return True
+        gravity = dynamics.gravity(q)
         motion = torque - gravity
         begun = np.abs(torque + REBOUND * (motion - self._before))
         ended = np.abs(gravity - REBOUND * motion)
         return bool((np.maximum(begun, ended) <= self._most).all())
+
+
+def largest_torque(
+    dynamics: InverseDynamics, start: Floats, way: Floats, velocity: float, acceleration: float
+) -> Floats:
+    """Upper bound of the torques of a straight motion, whatever its profile, shape (n,) [N m].
+
+    Along q(s) = start + s way the torque is m(s) s̈ + c(s) ṡ² + g(s): it is largest at one of the corners of the
+    range of ṡ² and s̈. Seventeen places on the way are looked at.
+
+    Args:
+        dynamics: Inverse dynamics with the declared payload.
+        start: Joint positions, shape (n,) [rad].
+        way: To the end, shape (n,) [rad].
+        velocity: Limit for every joint [rad/s].
+        acceleration: Limit for every joint [rad/s^2].
+    """
+    most = np.zeros_like(start)
+    for resting, pushed in _on_way(dynamics, start, way, velocity, acceleration):
+        most = np.maximum(most, resting + acceleration * pushed)
+    return most
+
+
+def acceleration_on_way(
+    dynamics: InverseDynamics, start: Floats, way: Floats, velocity: float, limits: Floats
+) -> float:
+    """Largest acceleration of the joint that turns most with which torques stay within their share [rad/s^2].
+
+    Args:
+        dynamics: Inverse dynamics with the declared payload.
+        start: Joint positions, shape (n,) [rad].
+        way: To the end of a straight way, shape (n,) [rad].
+        velocity: Largest there [rad/s].
+        limits: Of the joints' torque, shape (n,) [N m].
+    """
+    room = math.inf
+    for resting, pushed in _on_way(dynamics, start, way, velocity, math.inf):
+        room = min(room, float(((TORQUE_SHARE * limits - resting) / np.maximum(pushed, 1e-9)).min()))
+    return max(room, 0.0)
+
+
+def _on_way(
+    dynamics: InverseDynamics, start: Floats, way: Floats, velocity: float, acceleration: float
+) -> Iterator[tuple[Floats, Floats]]:
+    """Torques at places on a straight way: without acceleration, and more for each rad/s^2 [N m]."""
+    farthest, still = float(np.abs(way).max()), np.zeros_like(start)
+    along = way / farthest if farthest > 0.0 else still
+    speed = min(velocity, math.sqrt(acceleration * farthest)) * along
+    for share in np.linspace(0.0, 1.0, 17):
+        q = start + share * way
+        gravity = dynamics.gravity(q)
+        resting = np.maximum(np.abs(gravity), np.abs(dynamics.torque(q, speed, still)))
+        yield resting, np.abs(dynamics.torque(q, still, along) - gravity)
+
+
+def torque_to_come(dynamics: InverseDynamics, ahead: Floats, period: float) -> Floats:
+    """Largest torques from each tick on of references that are known, shape (k, n) [N m].
+
+    Args:
+        dynamics: Inverse dynamics with the declared payload.
+        ahead: References, one a tick, shape (k + 2, n) [rad]: derivatives are central differences.
+        period: Tick [s].
+    """
+    qd = (ahead[2:] - ahead[:-2]) / (2.0 * period)
+    qdd = np.diff(ahead, 2, axis=0) / period**2
+    last = len(qd) - 1
+    looked = np.unique(np.append(np.arange(0, last, LOOK_EVERY), last))
+    states = zip(ahead[1:-1][looked], qd[looked], qdd[looked], strict=True)
+    efforts = np.array([dynamics.effort(*state) for state in states])
+    to_come = np.maximum.accumulate(efforts[::-1], axis=0)[::-1]
+    following: Floats = to_come[np.searchsorted(looked, np.arange(last + 1))]
+    return following

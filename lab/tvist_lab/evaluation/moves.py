@@ -150,9 +150,7 @@ def is_free(collision: CollisionModel, move: Move) -> bool:
 def meeting(collision: CollisionModel, move: Move) -> str | None:
     """What meets what on a move, in words; None where nothing does."""
     start, target = np.array(move.start), np.array(move.target)
-    found = collision.on_way(
-        lambda share: start + share * (target - start), float(np.abs(target - start).sum())
-    )
+    found = collision.on_line(start, target)
     if found is None:
         return None
     share, pair = found

@@ -1,5 +1,8 @@
 """Velocity and acceleration of the shaped reference."""
 
+import copy
+from typing import Self
+
 import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
@@ -36,10 +39,19 @@ class Differentiator:
         """Start anew at rest."""
         self._before = self._middle = self._last = np.array(q, dtype=float)
 
+    def fork(self) -> Self:
+        """An independent copy that goes on from here."""
+        return copy.copy(self)
+
     def update(self, q: Floats) -> Target:
         """Take the reference of this tick; target of the tick before."""
-        h = self._period
         self._before, self._middle, self._last = self._middle, self._last, q
+        return self.published
+
+    @property
+    def published(self) -> Target:
+        """State of motion a tick before the newest reference, where central differences are exact to h²."""
+        h = self._period
         # Differences of neighbours first: their rounding does not grow with the position.
         rise, fall = self._last - self._middle, self._middle - self._before
         return Target(q=self._middle, qd=(rise + fall) / (2.0 * h), qdd=(rise - fall) / (h * h))
@@ -50,7 +62,14 @@ class Differentiator:
 
         A motion continued from these derivatives has the second difference q̈ at its first tick.
         """
+        return self._state(self._before, self._middle, self._last)
+
+    def after(self, q: Floats) -> Target:
+        """What `newest` will be if this is the next reference."""
+        return self._state(self._middle, self._last, q)
+
+    def _state(self, before: Floats, middle: Floats, last: Floats) -> Target:
         h = self._period
-        rise, fall = self._last - self._middle, self._middle - self._before
+        rise, fall = last - middle, middle - before
         qdd = (rise - fall) / (h * h)
-        return Target(q=self._last, qd=rise / h + 0.5 * h * qdd, qdd=qdd)
+        return Target(q=last, qd=rise / h + 0.5 * h * qdd, qdd=qdd)

@@ -1,7 +1,9 @@
 """What every source of references is."""
 
+import copy
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +23,18 @@ class Limits:
     """[rad/s^3]."""
 
 
+@dataclass(frozen=True)
+class Line:
+    """What is known of a trajectory along a straight line without running it: how soon and how hard it will brake."""
+
+    direction: Floats
+    """Of the line in joint space; its largest entry is 1 or -1, shape (n,)."""
+    braking: float
+    """Largest deceleration to come, of the joint that turns most [rad/s^2]."""
+    steady: float
+    """Time for which it does not slow down yet [s]; 0 where that is not known."""
+
+
 class Trajectory(ABC):
     """A reference, one position a tick."""
 
@@ -32,6 +46,20 @@ class Trajectory(ABC):
     @abstractmethod
     def finished(self) -> bool:
         """Whether the last reference was the final one: from now on it stays where it is."""
+
+    @property
+    def standing(self) -> bool:
+        """Whether it stays where it is until it is told otherwise: finished, or paused."""
+        return self.finished
+
+    @property
+    def line(self) -> Line | None:
+        """The straight line that it goes along; None where it goes along none."""
+        return None
+
+    def fork(self) -> Self:
+        """An independent copy that goes on from here, to see what this one is going to do."""
+        return copy.copy(self)
 
 
 class Rest(Trajectory):

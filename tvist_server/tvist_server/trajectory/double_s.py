@@ -1,13 +1,22 @@
 """Point to point with a double-S velocity profile."""
 
+import copy
+from typing import Self
+
 import numpy as np
 import ruckig
 
-from tvist_server.trajectory.base import Floats, Limits, Trajectory
+from tvist_server.trajectory.base import Floats, Limits, Line, Trajectory
 from tvist_server.trajectory.pace import Pace
 
 LOOK_AHEAD = 2.0
 """Ticks by which the path is looked ahead of when its pace changes."""
+
+SOONER = 25
+"""Ticks by which a pause must be over sooner than the motion, to be worth it."""
+
+SURELY = 0.3
+"""A pause that has this much time more than it needs until the motion brakes is sooner for certain [s]."""
 
 
 class DoubleS(Trajectory):
@@ -47,6 +56,12 @@ class DoubleS(Trajectory):
                 f"velocity {limits.velocity:g}, acceleration {limits.acceleration:g}, jerk {limits.jerk:g}"
             ) from error
         self._target = np.array(target, dtype=float)
+        way = self._target - start
+        farthest = float(np.abs(way).max())
+        self._direction = way / farthest if farthest > 0.0 else np.zeros(n)
+        # From rest to rest it is the same forwards and backwards: it brakes for as long as it accelerates.
+        leading = self._trajectory.profiles[0][int(np.argmax(np.abs(way)))]
+        self._brakes_at = self.duration - sum(leading.t[:3])
         self._period = period
         self.limits = limits
         """That it keeps."""
@@ -87,9 +102,64 @@ class DoubleS(Trajectory):
         return np.array(self._trajectory.at_time(self._time)[0])
 
     @property
+    def target(self) -> Floats:
+        """Where it ends, shape (n,) [rad]."""
+        return self._target
+
+    @property
     def rate(self) -> float:
         """Rate at which its time goes [-]."""
         return self._pace.rate
+
+    @property
+    def standing(self) -> bool:
+        """Whether it has reached its target, or is paused and has come to a standstill."""
+        return self.finished or (self.speed == self.rate == 0.0 and self._pace.steady(0.0))
+
+    @property
+    def line(self) -> Line:
+        """Its way; how soon it brakes is known where its rate does not change."""
+        time, rate = self._time, self._pace.rate
+        known = rate > 0.0 and self._pace.steady(self.speed)
+        return Line(
+            self._direction,
+            self.limits.acceleration,
+            max(self._brakes_at - time, 0.0) / rate if known else 0.0,
+        )
+
+    @property
+    def velocity(self) -> float:
+        """Of the joint that turns most, now [rad/s]."""
+        return float(np.abs(self._trajectory.at_time(self._time)[1]).max()) * self._pace.rate
+
+    def hold(self, acceleration: float) -> bool:
+        """Pause, where that lets it stand noticeably sooner than if it were let go on.
+
+        Near its end there is hardly any acceleration left to pause with: a pause would only draw the end out.
+
+        Args:
+            acceleration: Limit for every joint while it slows down, no more than the motion's own [rad/s^2].
+
+        Returns:
+            Whether it pauses.
+        """
+        paused = self.fork()
+        paused.speed, paused._pace.acceleration = 0.0, acceleration  # noqa: SLF001  one of its own kind
+        lasts = self.velocity / acceleration + self.limits.acceleration / self.limits.jerk
+        if self.line.steady < lasts + SURELY and not _stands_sooner(paused, self.fork()):
+            return False
+        self.speed, self._pace.acceleration = 0.0, acceleration
+        return True
+
+    def release(self, speed: float) -> None:
+        """Go on after a pause, at a rate [-]."""
+        self.speed, self._pace.acceleration = speed, self.limits.acceleration
+
+    def fork(self) -> Self:
+        """An independent copy that goes on from here, with a pace of its own."""
+        other = copy.copy(self)
+        other._pace = self._pace.fork()  # noqa: SLF001  one of its own kind
+        return other
 
     @property
     def _time(self) -> float:
@@ -99,3 +169,12 @@ class DoubleS(Trajectory):
     def finished(self) -> bool:
         """Whether the target was reached."""
         return self._time >= self.duration
+
+
+def _stands_sooner(paused: DoubleS, free: DoubleS) -> bool:
+    while not (paused.standing or free.standing):
+        paused.next()
+        free.next()
+    for _ in range(SOONER):
+        free.next()
+    return paused.standing and not free.standing

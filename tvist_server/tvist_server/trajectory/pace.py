@@ -1,6 +1,8 @@
 """How fast a trajectory's own time passes: the speed slider, pause and resume."""
 
+import copy
 from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 import ruckig
@@ -26,10 +28,21 @@ class Pace:
 
     def __init__(self, limits: Limits, period: float, rate: float) -> None:
         self._limits, self._period = limits, period
+        self.acceleration = limits.acceleration
+        """Limit for every joint [rad/s^2]: the motion's, or less."""
         self.rate, self._slope = rate, 0.0
-        self._generator = ruckig.Ruckig(1, period)
+        self._open()
+
+    def _open(self) -> None:
+        self._generator = ruckig.Ruckig(1, self._period)
         self._request, self._result = ruckig.InputParameter(1), ruckig.OutputParameter(1)
         self._request.control_interface = ruckig.ControlInterface.Velocity
+
+    def fork(self) -> Self:
+        """An independent copy that goes on from here."""
+        other = copy.copy(self)
+        other._open()  # noqa: SLF001  one of its own kind
+        return other
 
     def steady(self, target: float) -> bool:
         """Whether the rate is at its target and stays there."""
@@ -69,7 +82,7 @@ class Pace:
             if abs(velocity) < 1e-9:
                 continue
             ends = sorted(
-                (sign * self._limits.acceleration - acceleration) / velocity for sign in (-1.0, 1.0)
+                (sign * self.acceleration - acceleration) / velocity for sign in (-1.0, 1.0)
             )
             lowest, highest = max(lowest, ends[0]), min(highest, ends[1])
         return lowest, highest

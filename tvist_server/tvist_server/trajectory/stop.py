@@ -31,6 +31,10 @@ class Stop(Trajectory):
         request.max_acceleration, request.max_jerk = [acceleration] * n, [jerk] * n
         self._trajectory = ruckig.Trajectory(n)
         ruckig.Ruckig(n).calculate(request, self._trajectory)
+        self.acceleration = acceleration
+        """Limit that it keeps [rad/s^2]."""
+        self.jerk = jerk
+        """Limit that it keeps [rad/s^3]."""
         self._period = period
         self._ticks = 0
 
@@ -43,6 +47,11 @@ class Stop(Trajectory):
         """Position, velocity and acceleration at a time after the start [s], each of shape (n,)."""
         position, velocity, acceleration = self._trajectory.at_time(min(time, self.duration))[:3]
         return np.array(position), np.array(velocity), np.array(acceleration)
+
+    @property
+    def end(self) -> Floats:
+        """Where it rests, shape (n,) [rad]."""
+        return self.at(self.duration)[0]
 
     def next(self) -> Floats:
         """Position one tick further."""

@@ -1,0 +1,122 @@
+"""Changes while the arm moves: payload, shaper, estimator, speed, reduced speed, in moves and streams."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tvist_lab.recordings import Floats
+from tvist_lab.safety import stops, streams
+from tvist_lab.safety.subject import Subject, disc
+from tvist_plant.description import RobotDescription
+from tvist_plant.plant import PERIOD
+from tvist_protocol import commands as c
+from tvist_protocol.replies import Refused
+from tvist_protocol.values import Payload
+from tvist_server.collision import CLEARANCE, CollisionModel
+from tvist_server.setup import body
+
+Change = tuple[type, dict[str, object]]
+
+
+@dataclass(frozen=True)
+class ChangeOutcome:
+    """What came of it."""
+
+    seed: int
+    what: str
+    """The command and how it was answered."""
+    near: float
+    """How much nearer than the clearance two bodies came after it, by the reference; to be 0 or less [m]."""
+    refused: bool
+    """Whether the change was refused for what it would meet."""
+
+    @property
+    def kept(self) -> bool:
+        """Whether the promise was kept."""
+        return self.near <= 0.0
+
+
+def judge(description: RobotDescription, seed: int) -> ChangeOutcome:
+    """Change something at a random moment of a motion, now and then stop it afterwards, and watch."""
+    random = np.random.default_rng([seed, 14])
+    robot, replies = _under_way(description, seed, random), []
+    before = len(robot.references)
+    resting = robot.controller.cycle.at_rest
+    kind, fields = _draw(description, random)
+    reply = robot.send(kind, **fields)
+    replies.append(reply)
+    later = int(random.integers(0, 600))
+    for tick in range(3000):
+        if tick == later and random.random() < 0.5:
+            robot.send(c.Stop, deceleration=float(random.choice([1.0, 40.0])))
+        if robot.controller.motion.streaming:
+            robot.setpoint(10_000 + tick, robot.references[-1])
+            if tick == later:
+                robot.send(c.ServoStop)
+        robot.tick()
+        if robot.resting and not robot.controller.motion.streaming:
+            break
+    collisions = CollisionModel(description, body(robot.controller.declared))
+    said = reply.code if isinstance(reply, Refused) else "done"
+    return ChangeOutcome(
+        seed=seed,
+        what=f"{kind.__name__}: {said}",
+        # At rest any payload may be declared: nothing travels along with it.
+        near=-1.0 if resting else CLEARANCE - collisions.nearest(np.array(robot.references[before:])),
+        refused=isinstance(reply, Refused) and reply.code == "collision",
+    )
+
+
+def search(description: RobotDescription, count: int, seed: int) -> Iterator[ChangeOutcome]:
+    """Many of them."""
+    for number in range(count):
+        yield judge(description, seed * 1_000_000 + number)
+
+
+def far_payload(random: np.random.Generator, rated: float) -> Payload:
+    """A payload within the rating, its centre of mass up to .3 m out."""
+    mass = float(random.uniform(0.1, rated))
+    direction = random.normal(size=3)
+    com: Floats = direction / np.linalg.norm(direction) * random.uniform(0.0, 0.3)
+    moment = 0.002 * mass
+    return Payload(mass=mass, com=(com[0], com[1], com[2]), inertia=(moment, 0.0, 0.0, moment, 0.0, moment))
+
+
+def _draw(description: RobotDescription, random: np.random.Generator) -> Change:
+    payload = far_payload(random, description.limits.payload)
+    one: Change = (c.SetPayload, {"mass": payload.mass, "com": payload.com, "inertia": payload.inertia})
+    others: list[Change] = [
+        (c.SetShaper, {"name": str(random.choice(stops.SHAPERS))}),
+        (c.SetEstimator, {"name": "fixed", "f_d": (float(random.uniform(4, 20)),), "zeta": (0.1,)}),
+        (c.SetSpeed, {"fraction": float(random.uniform(0.0, 1.0))}),
+        (c.SetTcp, {"offset": (0.0, 0.0, float(random.uniform(0.0, 0.3)), 0.0, 0.0, 0.0)}),
+        (c.SimulationInject, {"fault": "reduced"}),
+    ]
+    return one if random.random() < 0.6 else others[int(random.integers(len(others)))]
+
+
+def _under_way(description: RobotDescription, seed: int, random: np.random.Generator) -> Subject:
+    """A robot in a move, in a stream, or in what follows one of them."""
+    if random.random() < 0.6:
+        case = stops.draw(description, seed)
+        robot = stops.moving(description, case)
+        robot.tick(case.moment)
+    else:
+        stream = streams.draw(description, seed)
+        robot = Subject(description, stream.start, disc(description, stream.mass), shaper=stream.shaper)
+        robot.send(c.ServoStart, velocity=stream.velocity, acceleration=stream.acceleration, jerk=2000.0)
+        way = stream.towards - stream.start
+        duration = float(np.abs(way).max()) / stream.velocity + 0.1
+        for tick in range(int(random.integers(20, 500))):
+            share = min(tick * PERIOD / duration, 1.0)
+            robot.setpoint(tick, stream.start + share * share * (3.0 - 2.0 * share) * way)
+            robot.tick()
+    match int(random.integers(6)):
+        case 0:
+            robot.send(c.Stop, deceleration=1.0)
+        case 1:
+            robot.send(c.ServoStop)
+        case 2:
+            robot.send(c.Pause)
+    return robot

@@ -1,0 +1,197 @@
+"""Stops of every kind at random moments of accepted moves, against the same moves left alone."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tvist_lab.recordings import Floats
+from tvist_lab.safety.subject import CLIENT, Subject, disc, last_move, refused, torques
+from tvist_lab.workspace import WORKSPACE
+from tvist_plant.description import RobotDescription
+from tvist_protocol import commands as c
+from tvist_protocol.values import Payload
+from tvist_server.collision import CLEARANCE, CollisionModel
+from tvist_server.safety import TORQUE_SHARE
+from tvist_server.setup import body
+
+ROUNDING = 1e-9
+"""Difference of two positions that counts as none [rad]."""
+TORQUE_ROUNDING = 1e-3
+"""Share by which a torque may be beyond its bound, between the moments that a plan looks at [-]."""
+SHAPERS = ("none", "zv", "zvd", "ei3", "auto")
+
+Halt = Callable[[Subject, np.random.Generator], object]
+
+KINDS: dict[str, Halt] = {
+    "plain": lambda robot, _: robot.send(c.Stop),
+    "gentle": lambda robot, random: robot.send(c.Stop, deceleration=float(10 ** random.uniform(-2, 1))),
+    "stranger's": lambda robot, _: robot.send(c.Stop, token=None, deceleration=1.0),
+    "token gone": lambda robot, _: robot.controller.client_gone(CLIENT),
+    "lease over": lambda robot, _: robot.send(c.ReleaseControl),
+    "power off": lambda robot, _: robot.send(c.PowerOff),
+    "protective": lambda robot, _: robot.send(c.SimulationInject, fault="protective_stop"),
+    "safeguard": lambda robot, _: robot.send(c.SimulationInject, fault="safeguard_stop"),
+    "emergency": lambda robot, _: robot.send(c.SimulationInject, fault="emergency_stop"),
+    "pause": lambda robot, _: robot.send(c.Pause),
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One stop."""
+
+    seed: int
+    kind: str
+    start: Floats
+    target: Floats
+    mass: float
+    shaper: str
+    velocity: float
+    acceleration: float
+    jerk: float
+    speed: float
+    moment: int
+    """Tick of the move at which it is stopped."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of it; everything but the penetration is to be 0 or less."""
+
+    case: Case
+    ahead: float
+    """Farthest that the stop was along the way beyond the move left alone [rad]."""
+    off: float
+    """Farthest off the line [rad]."""
+    late: int
+    """Ticks that it rested later."""
+    torque: float
+    """Share by which the rigid torque was beyond the larger of its 90 % and what the move would have asked [-]."""
+    near: float
+    """How much nearer than the clearance two bodies came, by the reference [m]."""
+    penetration: float
+    """The same by the flexible arm [m]; nan where it was not simulated."""
+    rested: float
+    """How much sooner than the move left alone it rested [s]."""
+    duration: float
+    """From the stop until it rested [s]."""
+    left: float
+    """From that moment until the move left alone rested [s]."""
+    told: tuple[float | None, float | None]
+    """Duration [s] and way [rad] that the event told."""
+    way: float
+    """That the joint that turned most turned [rad]."""
+
+    @property
+    def kept(self) -> bool:
+        """Whether the promise was kept."""
+        return (
+            self.ahead <= ROUNDING
+            and self.off <= ROUNDING
+            and self.late <= 0
+            and self.torque <= TORQUE_ROUNDING
+            and self.near <= 0.0
+        )
+
+
+def draw(description: RobotDescription, seed: int, kinds: tuple[str, ...] = tuple(KINDS)) -> Case:
+    """A case by its number; its move is accepted."""
+    random = np.random.default_rng([seed, 11])
+    collisions = CollisionModel(description, body(disc(description, 0.0)))
+    n = description.joints
+    while True:
+        mass = float(random.choice([0.0, 5.0, random.uniform(0.0, 5.0)]))
+        collisions.carry(body(disc(description, mass)))
+        start, target = WORKSPACE.random(2, n, int(random.integers(2**31)))
+        start[4:], target[4:] = random.uniform(-2, 2, n - 4), random.uniform(-2, 2, n - 4)
+        if random.random() < 0.3:  # short moves have no cruise
+            target = start + random.uniform(0.02, 0.3) * (target - start)
+        if collisions.meeting(start) is None and collisions.on_line(start, target) is None:
+            break
+    case = Case(
+        seed=seed,
+        kind=str(random.choice(kinds)),
+        start=start,
+        target=target,
+        mass=mass,
+        shaper=str(random.choice(SHAPERS)),
+        velocity=float(random.uniform(1.5, 3.14)),
+        acceleration=float(random.uniform(2.0, 8.0)),
+        jerk=float(random.choice([100.0, 500.0, 2000.0])),
+        speed=float(random.choice([1.0, 1.0, 1.0, random.uniform(0.1, 1.0)])),
+        moment=0,
+    )
+    moved = last_move(_left_alone(description, case))
+    return Case(**{**vars(case), "moment": int(random.integers(1, max(moved, 2)))})
+
+
+def judge(description: RobotDescription, case: Case, *, flexible: bool = False) -> Outcome:
+    """Stop the move, and compare with the one left alone."""
+    payload = disc(description, case.mass)
+    alone = _left_alone(description, case)
+    robot = moving(description, case, flexible=flexible)
+    robot.tick(case.moment)
+    robot.events.clear()
+    KINDS[case.kind](robot, np.random.default_rng(case.seed))
+    robot.until_rest()
+    robot.tick(100)
+    stopped, end = np.array(robot.references), len(robot.references)
+    alone = np.vstack([alone, np.repeat(alone[-1:], max(end - len(alone), 0), axis=0)])
+    way = case.target - case.start
+    along = way / np.linalg.norm(way)
+    shares = [(path - case.start) @ along for path in (stopped, alone)]
+    off = np.abs(stopped - case.start - shares[0][:, None] * along).max()
+    after = slice(case.moment, None)  # from the newest reference at the stop
+    limits = TORQUE_SHARE * np.array(description.limits.torque)
+    asked = np.abs(torques(description, payload, alone[case.moment - 1 :])).max(axis=0)
+    taken = np.abs(torques(description, payload, stopped[case.moment - 1 :])).max(axis=0)
+    collisions = CollisionModel(description, body(payload))
+    penetration = float("nan")
+    if flexible:
+        penetration = CLEARANCE - collisions.nearest(np.array(robot.actual[case.moment - 1 :]))
+    ends = last_move(stopped), last_move(alone)
+    told = next((e for e in robot.events if e.duration is not None), None)
+    return Outcome(
+        case=case,
+        ahead=float((shares[0][after] - shares[1][after][: len(shares[0][after])]).max()),
+        off=float(off),
+        late=ends[0] - ends[1],
+        torque=float((taken / np.maximum(limits, asked)).max() - 1.0),
+        near=CLEARANCE - collisions.nearest(stopped[after]),
+        penetration=penetration,
+        rested=0.002 * (ends[1] - ends[0]),
+        duration=0.002 * max(ends[0] - case.moment, 0),
+        left=0.002 * (ends[1] - case.moment),
+        told=(None, None) if told is None else (told.duration, told.way),
+        way=float(np.abs(stopped[-1] - stopped[case.moment]).max()),
+    )
+
+
+def search(
+    description: RobotDescription, count: int, seed: int, *, flexible: bool = False
+) -> Iterator[Outcome]:
+    """Many of them."""
+    for number in range(count):
+        yield judge(description, draw(description, seed * 1_000_000 + number), flexible=flexible)
+
+
+def moving(description: RobotDescription, case: Case, *, flexible: bool = False) -> Subject:
+    """A robot that has just accepted the case's move."""
+    robot = Subject(
+        description, case.start, disc(description, case.mass), shaper=case.shaper, flexible=flexible
+    )
+    robot.send(c.SetSpeed, fraction=case.speed)
+    reply = robot.send(
+        c.MoveJ, q=tuple(case.target.tolist()),
+        velocity=case.velocity, acceleration=case.acceleration, jerk=case.jerk,
+    )  # fmt: skip
+    assert not refused(reply), reply
+    return robot
+
+
+def _left_alone(description: RobotDescription, case: Case) -> Floats:
+    robot = moving(description, case, flexible=False)
+    robot.until_rest()
+    robot.tick(200)  # at rest counts from 1e-7 rad a tick: what is left of the filter still creeps
+    return np.array(robot.references)

@@ -1,0 +1,157 @@
+"""Streams of set-points at the floor, at the arm itself and at limits, cut or ended at random."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tvist_lab.recordings import Floats
+from tvist_lab.safety.stops import SHAPERS
+from tvist_lab.safety.subject import CLIENT, Subject, disc, refused
+from tvist_lab.workspace import WORKSPACE
+from tvist_plant.description import RobotDescription
+from tvist_plant.plant import PERIOD
+from tvist_protocol import commands as c
+from tvist_server.collision import CLEARANCE, CollisionModel
+from tvist_server.setup import body
+
+LENGTH = 3.0
+"""Of a stream that nobody ends [s]."""
+
+ENDS: dict[str, Callable[[Subject], object]] = {
+    "silence": lambda _: None,
+    "servo_stop": lambda robot: robot.send(c.ServoStop),
+    "stop": lambda robot: robot.send(c.Stop),
+    "stranger's stop": lambda robot: robot.send(c.Stop, token=None, deceleration=1.0),
+    "token gone": lambda robot: robot.controller.client_gone(CLIENT),
+    "power off": lambda robot: robot.send(c.PowerOff),
+    "protective stop": lambda robot: robot.send(c.SimulationInject, fault="protective_stop"),
+    "emergency stop": lambda robot: robot.send(c.SimulationInject, fault="emergency_stop"),
+    "safeguard stop": lambda robot: robot.send(c.SimulationInject, fault="safeguard_stop"),
+}
+"""How a stream is ended."""
+
+
+@dataclass(frozen=True)
+class StreamCase:
+    """One stream."""
+
+    seed: int
+    start: Floats
+    towards: Floats
+    mass: float
+    shaper: str
+    period: float
+    velocity: float
+    acceleration: float
+    end: str
+    ends_at: float
+    """When it is ended [s]."""
+    lost: float
+    """Share of the set-points that never come [-]."""
+    wave: float
+    """Amplitude of a sine on top [rad]."""
+
+
+@dataclass(frozen=True)
+class StreamOutcome:
+    """What came of it."""
+
+    case: StreamCase
+    near: float
+    """How much nearer than the clearance two bodies came, by the reference; to be 0 or less [m]."""
+    penetration: float
+    """The same by the flexible arm [m]; nan where it was not simulated."""
+    stopped: bool
+    """Whether the robot itself ended the stream since something would have met."""
+    beyond: float
+    """Farthest beyond a joint's range; to be 0 or less [rad]."""
+
+    @property
+    def kept(self) -> bool:
+        """Whether the promise was kept."""
+        return self.near <= 0.0 and self.beyond <= 0.0
+
+
+def draw(description: RobotDescription, seed: int) -> StreamCase:
+    """A case by its number: most of them lead to where something meets."""
+    random = np.random.default_rng([seed, 12])
+    collisions = CollisionModel(description, body(disc(description, 0.0)))
+    n = description.joints
+    mass = float(random.choice([0.0, 5.0, random.uniform(0.0, 5.0)]))
+    collisions.carry(body(disc(description, mass)))
+    while True:
+        start, towards = WORKSPACE.random(2, n, int(random.integers(2**31)))
+        start[4:], towards[4:] = random.uniform(-2, 2, n - 4), random.uniform(-2, 2, n - 4)
+        if random.random() < 0.5:  # at the floor, past it
+            towards[1] = start[1] + random.choice([-1.0, 1.0]) * random.uniform(1.0, 3.0)
+        if collisions.meeting(start) is not None:
+            continue
+        if random.random() < 0.2 or collisions.on_line(start, towards) is not None:
+            break
+    return StreamCase(
+        seed=seed,
+        start=start,
+        towards=towards,
+        mass=mass,
+        shaper=str(random.choice(SHAPERS)),
+        period=float(random.choice([0.002, 0.002, 0.008, 0.02])),
+        velocity=float(random.uniform(0.3, 3.14)),
+        acceleration=float(random.choice([random.uniform(0.5, 8.0), random.uniform(8.0, 40.0)])),
+        end=str(random.choice(list(ENDS))),
+        ends_at=float(random.uniform(0.05, LENGTH)),
+        lost=float(random.choice([0.0, 0.0, 0.05, 0.3])),
+        wave=float(random.choice([0.0, 0.05])),
+    )
+
+
+def judge(description: RobotDescription, case: StreamCase, *, flexible: bool = False) -> StreamOutcome:
+    """Send it and watch."""
+    random = np.random.default_rng([case.seed, 13])
+    robot = Subject(
+        description, case.start, disc(description, case.mass), shaper=case.shaper, flexible=flexible,
+        clock="realtime",
+    )  # fmt: skip
+    reply = robot.send(
+        c.ServoStart, period=case.period, velocity=case.velocity, acceleration=case.acceleration, jerk=2000.0
+    )
+    assert not refused(reply), reply
+    way, every = case.towards - case.start, max(round(case.period / PERIOD), 1)
+    duration = float(np.abs(way).max()) / case.velocity * random.uniform(0.8, 2.0) + 0.1
+    reach = np.array(description.limits.position)
+    for tick in range(round(LENGTH / PERIOD)):
+        if tick == round(case.ends_at / PERIOD):
+            ENDS[case.end](robot)
+            if case.end == "silence":
+                break
+        if not robot.controller.motion.streaming:
+            break
+        if tick % every == 0 and random.random() >= case.lost:
+            time = tick * PERIOD
+            share = min(time / duration, 1.0)
+            bump = case.wave * np.sin(20.0 * time) * min(5.0 * time, 1.0)
+            q = case.start + share * share * (3.0 - 2.0 * share) * way + bump
+            robot.setpoint(tick // every, np.clip(q, -reach, reach))
+        robot.tick()
+    robot.until_rest(5000)
+    robot.tick(20)
+    references = np.array(robot.references)
+    collisions = CollisionModel(description, body(disc(description, case.mass)))
+    penetration = float("nan")
+    if flexible:
+        penetration = CLEARANCE - collisions.nearest(np.array(robot.actual))
+    return StreamOutcome(
+        case=case,
+        near=CLEARANCE - collisions.nearest(references),
+        penetration=penetration,
+        stopped=any(event.code == "collision" for event in robot.events),
+        beyond=float((np.abs(references) - reach).max()),
+    )
+
+
+def search(
+    description: RobotDescription, count: int, seed: int, *, flexible: bool = False
+) -> Iterator[StreamOutcome]:
+    """Many of them."""
+    for number in range(count):
+        yield judge(description, draw(description, seed * 1_000_000 + number), flexible=flexible)

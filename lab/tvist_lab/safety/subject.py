@@ -1,0 +1,153 @@
+"""The robot that is searched: a controller in this process, driven a tick at a time, and what it did."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tvist_lab.recordings import Floats
+from tvist_plant.description import RobotDescription
+from tvist_plant.drives import DriveCommand
+from tvist_plant.plant import PERIOD, Measurement
+from tvist_protocol import commands as c
+from tvist_protocol.replies import Accepted, Refused, Reply
+from tvist_protocol.stream import Event
+from tvist_protocol.values import Payload
+from tvist_server.calibrations import load
+from tvist_server.collision import CollisionModel
+from tvist_server.control.inverse_dynamics import InverseDynamics
+from tvist_server.controller import Controller
+from tvist_server.cycle import ControlCycle
+from tvist_server.stops import STILL
+from tvist_server.setup import Setup, body, paper_payload
+
+CLIENT = "searcher"
+
+
+class RigidArm:
+    """Stands for the arm where only references matter: it is where it is told to be, and feels nothing."""
+
+    def __init__(self, cycle: ControlCycle) -> None:
+        self.payload = cycle.arm.payload
+        self._joints = cycle.description.joints
+
+    def step(self, command: DriveCommand) -> Measurement:
+        """Be there."""
+        return Measurement(command.q, command.qd, np.zeros(self._joints), np.zeros(3))
+
+    def reset(self, command: DriveCommand, *, payload: Any = None, seed: int = 0) -> Measurement:  # noqa: ARG002
+        """Be there."""
+        self.payload = self.payload if payload is None else payload
+        return self.step(command)
+
+    def push(self, torque: Floats) -> None:
+        """Nothing pushes it."""
+
+    def spoil(self) -> None:
+        """Nothing spoils it."""
+
+
+@dataclass
+class Subject:
+    """A robot under search.
+
+    Args:
+        description: The robot.
+        q: Where it rests [rad].
+        payload: Declared and carried.
+        shaper: Its shaper.
+        flexible: Whether the flexible arm is simulated, or only the references.
+        clock: Whether leases run out.
+    """
+
+    description: RobotDescription
+    q: Floats
+    payload: Payload
+    shaper: str = "zv"
+    flexible: bool = False
+    clock: str = "free"
+    lease_s: float = 3600.0
+    events: list[Event] = field(default_factory=list)
+    references: list[Floats] = field(default_factory=list)
+    """Shaped references played, one a tick; the first is where it rests."""
+    actual: list[Floats] = field(default_factory=list)
+    """Where the links were, one a tick."""
+
+    def __post_init__(self) -> None:
+        """Build it and take control."""
+        setup = Setup(
+            description=self.description,
+            q=tuple(self.q.tolist()),
+            payload=self.payload,
+            calibration=load("ur5e_5kg"),
+            shaper=self.shaper,
+            clock=self.clock,  # type: ignore[arg-type]
+        )
+        self.controller = Controller(setup)
+        if not self.flexible:
+            self.controller.cycle.arm = RigidArm(self.controller.cycle)  # type: ignore[assignment]
+        self.controller.client_seen(CLIENT)
+        reply = self.controller.receive(c.TakeControl(client=CLIENT, lease_s=self.lease_s))
+        assert isinstance(reply, Accepted)
+        self.token = str(reply.token)
+        self.references.append(np.array(self.q))
+
+    def send(self, kind: type[Any], **fields: Any) -> Reply:
+        """Send a command with the token, unless it is given."""
+        if "token" in kind.__struct_fields__:
+            fields.setdefault("token", self.token)
+        return self.controller.receive(kind(**fields))
+
+    def setpoint(self, sequence: int, q: Floats) -> None:
+        """Send a set-point."""
+        self.controller.receive_setpoint(
+            c.Setpoint(token=self.token, sequence=sequence, q=tuple(q.tolist()))
+        )
+
+    def tick(self, count: int = 1) -> None:
+        """Let time pass."""
+        for _ in range(count):
+            state, events = self.controller.tick()
+            self.references.append(self.controller.cycle.position)
+            self.actual.append(np.array(state.actual_q))
+            self.events += events
+
+    def until_rest(self, most: int = 20_000) -> bool:
+        """Let time pass until the shaped reference has rested for a tick; whether it came to that."""
+        for _ in range(most):
+            if self.resting:
+                return True
+            self.tick()
+        return False
+
+    @property
+    def resting(self) -> bool:
+        """Whether the shaped reference moves no more: at rest, or paused."""
+        q = self.references
+        cycle = self.controller.cycle
+        still = len(q) > 2 and max(np.abs(q[-1] - q[-2]).max(), np.abs(q[-2] - q[-3]).max()) <= STILL
+        return cycle.at_rest or (still and cycle.trajectory.standing)
+
+
+def disc(description: RobotDescription, mass: float) -> Payload:
+    """The robot file's payload scaled to a mass [kg]; none at all where that is 0."""
+    return paper_payload(description, mass)
+
+
+def torques(description: RobotDescription, payload: Payload, references: Floats) -> Floats:
+    """Torques of the rigid arm for references, one a tick, by central differences, shape (k - 2, n) [N m]."""
+    dynamics = InverseDynamics(description, body(payload))
+    qd = (references[2:] - references[:-2]) / (2.0 * PERIOD)
+    qdd = np.diff(references, 2, axis=0) / PERIOD**2
+    return np.array([dynamics.torque(*state) for state in zip(references[1:-1], qd, qdd, strict=True)])
+
+
+def last_move(references: Floats) -> int:
+    """Index of the last reference that differs from the one before; 0: none does."""
+    moved = np.flatnonzero(np.abs(np.diff(references, axis=0)).max(axis=1) > STILL)
+    return int(moved[-1]) + 1 if len(moved) else 0
+
+
+def refused(reply: Reply) -> bool:
+    """Whether a command was refused."""
+    return isinstance(reply, Refused)

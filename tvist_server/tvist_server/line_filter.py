@@ -1,0 +1,101 @@
+"""The filter on the control line, and the way from one filter to the next."""
+
+import copy
+from typing import Self
+
+import numpy as np
+
+from tvist_server.control.differentiator import Floats
+from tvist_server.trajectory import Limits
+from tvist_shaping.base import Filter
+from tvist_shaping.fade import Fade
+
+
+class LineFilter:
+    """Shapes with the filter that was chosen last; in motion the one before fades into it.
+
+    Args:
+        tvist: The first filter.
+        limits: Of the motion that is shaped.
+    """
+
+    def __init__(self, tvist: Filter, limits: Limits) -> None:
+        self.tvist = tvist
+        """The filter chosen last: in force, or about to be."""
+        self.limits = limits
+        """Of the present motion."""
+        self._fade: Fade | None = None
+
+    @property
+    def fading(self) -> bool:
+        """Whether one filter is giving way to another."""
+        return self._fade is not None
+
+    @property
+    def peak(self) -> float:
+        """By what factor the shaped acceleration may exceed the reference's, see `Filter.peak`."""
+        fade = self._fade
+        return self.tvist.peak if fade is None else max(self.tvist.peak, fade.old.peak, fade.new.peak)
+
+    def filter(self, reference: Floats) -> Floats:
+        """Shaped reference, on the way from one filter to another where there is one."""
+        fade = self._fade
+        if fade is None:
+            return self.tvist.filter(reference)
+        shaped = fade.filter(reference)
+        if fade.new is not self.tvist:  # it waits for its turn
+            self.tvist.filter(reference)
+        if fade.finished:
+            self._fade = None if fade.new is self.tvist else self._fade_to(fade.new, self.tvist)
+        return shaped
+
+    def use(self, tvist: Filter) -> None:
+        """Change the filter within the limits of the motion.
+
+        While one change is under way the next waits for its turn; of several that wait the newest does.
+
+        Args:
+            tvist: The filter to come; its joints and period are the present one's.
+        """
+        fade = self._fade
+        if fade is None or fade.share == 0.0:
+            self._fade = self._fade_to(self.tvist if fade is None else fade.old, tvist)
+        else:
+            tvist.take_over(self.tvist)
+        self.tvist = tvist
+
+    def cut(self) -> None:
+        """Be bypassed: what fades is dropped, and the next use begins from rest."""
+        self._fade = None
+
+    def begin(self, tvist: Filter, q: Floats) -> None:
+        """Use a filter from rest at q, shape (n,) [rad]."""
+        self.tvist, self._fade = tvist, None
+        tvist.reset(q)
+
+    def fork(self) -> Self:
+        """An independent copy that goes on from here."""
+        other, fade = copy.copy(self), self._fade
+        if fade is None:
+            other.tvist = self.tvist.fork()
+        else:
+            other._fade = fade.fork()  # noqa: SLF001  one of its own kind
+            waits = fade.new is not self.tvist
+            other.tvist = self.tvist.fork() if waits else other._fade.new  # noqa: SLF001  likewise
+        return other
+
+    def rehearse(self, q: Floats) -> None:
+        """Filter a sample through a fade and take it back: the first time loads compiled code, for many ticks."""
+        self._fade = self._fade_to(self.tvist.with_estimator(self.tvist.estimator), self.tvist)
+        for _ in range(3):
+            self.filter(q)
+        self.begin(self.tvist, q)
+
+    def window(self) -> Floats:
+        """Samples that the filters may still read, the oldest first, shape (k, n) [rad]."""
+        filters = [self.tvist] if self._fade is None else [self._fade.old, self._fade.new, self.tvist]
+        return np.concatenate([tvist.window() for tvist in filters])
+
+    def _fade_to(self, old: Filter, new: Filter) -> Fade:
+        limits = self.limits
+        return Fade(old, new, velocity=limits.velocity, acceleration=limits.acceleration, jerk=limits.jerk)

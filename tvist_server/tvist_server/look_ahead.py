@@ -1,0 +1,143 @@
+"""Streams of set-points: nothing is played from which no stop would be clear."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tvist_server.collision import CollisionModel, Meeting
+from tvist_server.control.differentiator import Floats, Target
+from tvist_server.safety import GENTLEST_STOP
+from tvist_server.trajectory import Stop
+
+MARGIN = 0.8
+"""Share of the acceleration that the torque leaves where a stop begins, with which it is made: what it leaves changes
+on the way [-]."""
+
+
+class LookAhead:
+    """Looks at the stop from the state of motion that a reference would lead to.
+
+    As long as that stop is clear along its whole way, the reference may be played. Otherwise the stop from the state
+    before is made, which was looked at a tick ago: so there always is one that is clear.
+
+    Where everything is far away a bound of the stop's way is enough: no point of the arm travels farther than the
+    angles turned times its reach. What room there is around a posture is remembered until it is used up.
+
+    Args:
+        collisions: Where the arm would meet something.
+        gentle: From position [rad] and velocity [rad/s] to an acceleration that the torque allows there in every
+            direction [rad/s^2].
+        quickest: The quickest stop from a state that is clear, by what it is given to tell; None where there is none.
+        jerk: Of stops [rad/s^3].
+        period: Tick [s].
+    """
+
+    def __init__(
+        self,
+        collisions: CollisionModel,
+        gentle: Callable[[Floats, Floats], float],
+        quickest: Callable[[Target, Callable[[Stop], bool]], Stop | None],
+        *,
+        jerk: float,
+        period: float,
+    ) -> None:
+        self._collisions = collisions
+        self._gentle, self._quickest = gentle, quickest
+        self._jerk, self._period = jerk, period
+        self._centre: Floats | None = None
+        self._room = 0.0
+        self._carried = collisions.carried
+        self._before: tuple[Target, float | Stop] | None = None
+        self.met: Meeting | None = None
+        """What the reference that was refused last would have led to."""
+
+    def begin(self, state: Target) -> None:
+        """Start from rest."""
+        self._before, self.met = (state, GENTLEST_STOP), None
+
+    def __call__(self, state: Target) -> Stop | None:
+        """Whether a reference may be played.
+
+        Args:
+            state: State of motion that it would lead to.
+
+        Returns:
+            None: it may. Otherwise the stop to be made instead, from the state before.
+        """
+        found = self._permitted(state)
+        if found is None:
+            return self.fallback()
+        self._before = state, found
+        return None
+
+    def take(self, state: Target, stop: Stop) -> None:
+        """From now on this is the stop that is known to be clear, from the state of the newest reference."""
+        self._before = state, stop
+
+    def fallback(self) -> Stop:
+        """The stop from the state of motion of the reference that was played last, which is known to be clear."""
+        assert self._before is not None, "begin comes first"
+        state, stop = self._before
+        return stop if isinstance(stop, Stop) else self._stop(state, stop)
+
+    def clear(self, stop: Stop) -> bool:
+        """Whether nothing meets on the whole way of a stop."""
+        q, qd, qdd = stop.at(0.0)
+        if self.is_spacious(q, self.turned(qd, qdd, stop.acceleration)):
+            return True
+        self.met = self.meeting(stop)
+        return self.met is None
+
+    def meeting(self, stop: Stop) -> Meeting | None:
+        """The first pair that meets on the way of a stop."""
+        _, qd, qdd = stop.at(0.0)
+        fastest = np.abs(qd) + qdd * qdd / (2.0 * self._jerk)
+        travel = self._collisions.travel(fastest * stop.duration)
+        before = None if self._before is None else self._before[0].q
+        found = self._collisions.on_way(
+            lambda share: stop.at(share * stop.duration)[0], travel, before=before
+        )
+        return None if found is None else found[1]
+
+    def _permitted(self, state: Target) -> float | Stop | None:
+        """The limit of a stop that is clear, or the stop; None where there is none."""
+        if self.is_spacious(state.q, self.turned(state.qd, state.qdd, GENTLEST_STOP)):
+            return GENTLEST_STOP
+        acceleration = max(MARGIN * self._gentle(state.q, state.qd), GENTLEST_STOP)
+        if self.is_spacious(state.q, self.turned(state.qd, state.qdd, acceleration)):
+            return acceleration
+        stop = self._stop(state, acceleration)
+        if self.clear(stop):
+            return stop
+        return self._quickest(state, self.clear)
+
+    def is_spacious(self, q: Floats, turned: Floats) -> bool:
+        """Whether there is certainly room around q to turn the joints by so much."""
+        collisions = self._collisions
+        if self._carried is not collisions.carried:
+            self._carried, self._centre = collisions.carried, None
+        way = collisions.travel(turned)
+        if self._centre is not None and way + collisions.travel(q - self._centre) < self._room:
+            return True
+        if self._centre is not q:
+            self._centre, self._room = q, collisions.room(q)
+        return way < self._room
+
+    def turned(self, qd: Floats, qdd: Floats, acceleration: float, jerk: float | None = None) -> Floats:
+        """Upper bound of what each joint turns in a stop, shape (n,) [rad].
+
+        Args:
+            qd: Velocities where it begins, shape (n,) [rad/s].
+            qdd: Accelerations there, shape (n,) [rad/s^2].
+            acceleration: Its limit [rad/s^2].
+            jerk: Its limit [rad/s^3]; None for that of the joints.
+        """
+        jerk = self._jerk if jerk is None else jerk
+        fastest = np.abs(qd) + qdd * qdd / (2.0 * jerk)
+        ramps = (acceleration + np.abs(qdd)) / jerk
+        return fastest * (fastest / (2.0 * acceleration) + ramps + self._period)
+
+    def _stop(self, state: Target, acceleration: float) -> Stop:
+        return Stop(
+            state.q, state.qd, state.qdd, acceleration=acceleration, jerk=self._jerk, period=self._period
+        )

@@ -1,0 +1,192 @@
+"""How to come to rest: what decision 13 calls a permitted stop, and the quickest of them."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from tvist_plant.description import RobotDescription
+from tvist_server.control.differentiator import Floats, Target
+from tvist_server.control.inverse_dynamics import InverseDynamics
+from tvist_server.safety import GENTLEST_STOP, StopTorque, torque_to_come
+from tvist_server.trajectory import Line, LineStop, Stop
+
+STEP = 0.8
+"""From one deceleration that is tried to the next [-]."""
+HARDER = 1.05
+"""A stop that is harder than the motion's own braking by this is ahead of it nowhere, although a filter that varies
+may brake a little harder than its reference [-]."""
+COUNTED = 0.9
+"""Share of the present velocity that a motion is counted on to keep until it brakes [-]."""
+STILL = 1e-7
+"""A reference that moves less than this between two ticks is at rest [rad]."""
+ROUNDING = 1e-12
+"""Difference of two positions that is none [rad]."""
+
+
+def resting_after(ahead: Floats) -> int:
+    """Index of the last of some references, one a tick and of shape (k, n), that has moved; 0: none has."""
+    moves = np.flatnonzero(np.abs(np.diff(ahead, axis=0)).max(axis=1) > STILL)
+    return int(moves[-1]) + 1 if len(moves) else 0
+
+
+@dataclass(frozen=True)
+class StopPlan:
+    """A stop and what limits it."""
+
+    trajectory: Stop | LineStop | None
+    """None: what is under way runs out by itself."""
+    acceleration: float | None
+    """Limit it keeps [rad/s^2]; None: the motion's own."""
+    limited: bool
+    """Whether that is not what was wanted."""
+    duration: float | None
+    """Until it rests [s]; None where that is too far ahead to say."""
+    way: float | None
+    """Until it rests, of the joint that turns most [rad]; likewise."""
+
+
+class StopPlanner:
+    """Finds the quickest permitted stop.
+
+    Args:
+        description: The robot.
+        dynamics: Its inverse dynamics with the declared payload.
+        period: Tick [s].
+    """
+
+    def __init__(self, description: RobotDescription, dynamics: InverseDynamics, period: float) -> None:
+        limits = description.limits
+        self._dynamics, self._period = dynamics, period
+        self._torque, self._position = np.array(limits.torque), np.array(limits.position)
+        self._highest, self._jerk = min(limits.acceleration), min(limits.jerk)
+
+    def on_line(
+        self, state: Target, line: Line, wanted: float | None, asked: Floats | None = None
+    ) -> LineStop | None:
+        """The quickest stop along the line of a motion that is certain to be permitted.
+
+        Never ahead of the motion, and never later at rest, is a stop that brakes harder than the motion ever will;
+        and a gentler one that is over before the motion, braking as hard as it may, could be.
+
+        Args:
+            state: A tick before the newest shaped reference.
+            line: What is known of the motion.
+            wanted: Deceleration asked for [rad/s^2]; None for as much as possible.
+            asked: Largest torques that the motion itself would ask from now on [N m]; None where not known.
+
+        Returns:
+            None where none is certain, or the motion is about to rest by itself.
+        """
+        leading = int(np.argmax(np.abs(line.direction)))
+        sign = float(np.sign(line.direction[leading]))
+        speed, rise = sign * float(state.qd[leading]), sign * float(state.qdd[leading])
+        if rise < 0.0 and speed <= 1.1 * rise * rise / (2.0 * self._jerk):
+            return None  # it is about to rest: nothing within the limits is any sooner
+        in_time = line.steady + COUNTED * max(speed, 0.0) / line.braking
+
+        def permitted(stop: LineStop) -> bool:
+            return stop.acceleration >= HARDER * line.braking or stop.duration <= in_time
+
+        return self._quickest_on_line(state, line, wanted, asked, permitted)
+
+    def under(
+        self, ahead: Floats, state: Target, line: Line, wanted: float | None
+    ) -> tuple[LineStop | None, Floats]:
+        """The quickest stop along the line of a motion whose rest is known.
+
+        Args:
+            ahead: The two shaped references played last, and those to come until it rests, one a tick, shape
+                (k, n) [rad].
+            state: As in `on_line`.
+            line: As in `on_line`.
+            wanted: As in `on_line`.
+
+        Returns:
+            The stop, None where none is permitted but to let the motion run out; largest torques that the motion
+            itself would ask, shape (n,) [N m].
+        """
+        asked = torque_to_come(self._dynamics, ahead, self._period)[0]
+        leading = int(np.argmax(np.abs(line.direction)))
+        along = (ahead[2:, leading] - state.q[leading]) * np.sign(line.direction[leading])
+        last = resting_after(ahead)
+
+        def permitted(stop: LineStop) -> bool:
+            if math.ceil(stop.duration / self._period) > last:
+                return False
+            shares = (stop.share((number + 2) * self._period) for number in range(len(along)))
+            return all(share <= limit + ROUNDING for share, limit in zip(shares, along.tolist(), strict=True))
+
+        return self._quickest_on_line(state, line, wanted, asked, permitted), asked
+
+    def by_joints(
+        self, state: Target, wanted: float | None, clear: Callable[[Stop], bool]
+    ) -> Stop | None:
+        """The quickest stop of every joint by itself that is clear all along and keeps the torque.
+
+        Args:
+            state: Of the newest shaped reference.
+            wanted: Deceleration asked for [rad/s^2]; None for as much as possible.
+            clear: Whether nothing meets on its way.
+
+        Returns:
+            None where there is none.
+        """
+        torque = StopTorque(self._dynamics, state, self._torque)
+        stops = [self._stop(state, acceleration) for acceleration in self._ladder(wanted)]
+        stops = [stop for stop in stops if (np.abs(stop.end) <= self._position).all()]
+        fits = cache(clear)
+        for rebound in (True, False):
+            for stop in stops:
+                if torque.holds(stop, rebound=rebound) and fits(stop):
+                    return stop
+        return None
+
+    def hardest(self, state: Target) -> Stop:
+        """The hardest stop of every joint by itself, whatever it asks for."""
+        return self._stop(state, self._highest)
+
+    def _stop(self, state: Target, acceleration: float) -> Stop:
+        return Stop(
+            state.q, state.qd, state.qdd, acceleration=acceleration, jerk=self._jerk, period=self._period
+        )
+
+    def _quickest_on_line(
+        self,
+        state: Target,
+        line: Line,
+        wanted: float | None,
+        asked: Floats | None,
+        permitted: Callable[[LineStop], bool],
+    ) -> LineStop | None:
+        torque = StopTorque(self._dynamics, state, self._torque, asked)
+        stops = [
+            LineStop(
+                state.q, state.qd, state.qdd, line.direction,
+                acceleration=acceleration, jerk=self._jerk, period=self._period,
+            )
+            for acceleration in self._ladder(wanted)
+        ]  # fmt: skip
+        stops = [stop for stop in stops if permitted(stop)]
+        for rebound in (True, False):
+            for stop in stops:
+                if torque.holds(stop, rebound=rebound):
+                    return stop
+        return None
+
+    def _ladder(self, wanted: float | None) -> Iterator[float]:
+        """Decelerations in the order in which they are tried: down from the wanted one, then up from it."""
+        first = self._highest if wanted is None else min(max(wanted, GENTLEST_STOP), self._highest)
+        down = first
+        while down > GENTLEST_STOP:
+            yield down
+            down *= STEP
+        yield GENTLEST_STOP
+        up = first / STEP
+        while up < self._highest:
+            yield up
+            up /= STEP
+        if first < self._highest:
+            yield self._highest

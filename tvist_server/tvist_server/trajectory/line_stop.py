@@ -1,0 +1,90 @@
+"""To rest on a straight line, all joints in phase."""
+
+import numpy as np
+import ruckig
+
+from tvist_server.trajectory.base import Floats, Line, Trajectory
+
+
+class LineStop(Trajectory):
+    """Shortest stop along a straight line within limits of acceleration and jerk.
+
+    Nothing that comes to rest on the same line from the same state, within the same limits and without turning
+    back, is slower at any moment or rests sooner: there the acceleration is the lowest there is until it has to be
+    taken back. So a stop that is at least as hard as anything the motion itself would have done never gets ahead of
+    the motion.
+
+    It begins one tick before the newest reference, at the state of motion that central differences give there
+    without error, so that its first step already brakes.
+
+    Args:
+        q: Position a tick before the newest reference, shape (n,) [rad].
+        qd: Velocity there, along the line, shape (n,) [rad/s].
+        qdd: Acceleration there, along the line, shape (n,) [rad/s^2].
+        direction: Of the line; its largest entry is 1 or -1, shape (n,).
+        acceleration: Limit for the joint that turns most [rad/s^2].
+        jerk: Limit for the joint that turns most [rad/s^3].
+        period: Tick [s].
+    """
+
+    def __init__(
+        self,
+        q: Floats,
+        qd: Floats,
+        qdd: Floats,
+        direction: Floats,
+        *,
+        acceleration: float,
+        jerk: float,
+        period: float,
+    ) -> None:
+        self._origin, self._direction = q, direction
+        self.acceleration = acceleration
+        """Limit that it keeps [rad/s^2]."""
+        leading = int(np.argmax(np.abs(direction)))
+        sign = float(direction[leading])
+        request = ruckig.InputParameter(1)
+        request.control_interface = ruckig.ControlInterface.Velocity
+        request.current_position, request.current_velocity = [0.0], [sign * float(qd[leading])]
+        request.current_acceleration = [sign * float(qdd[leading])]
+        request.target_velocity, request.target_acceleration = [0.0], [0.0]
+        request.max_acceleration, request.max_jerk = [acceleration], [jerk]
+        self._trajectory = ruckig.Trajectory(1)
+        ruckig.Ruckig(1).calculate(request, self._trajectory)
+        self._period = period
+        self._ticks = 1
+
+    @property
+    def duration(self) -> float:
+        """From its beginning until it rests [s]."""
+        return float(self._trajectory.duration)
+
+    def share(self, time: float) -> float:
+        """How far the joint that turns most has turned at a time after the beginning [rad]."""
+        return float(self._trajectory.at_time(min(time, self.duration))[0][0])
+
+    def at(self, time: float) -> tuple[Floats, Floats, Floats]:
+        """Position, velocity and acceleration at a time after the beginning [s], each of shape (n,)."""
+        position, velocity, acceleration = self._trajectory.at_time(min(time, self.duration))[:3]
+        along = self._direction
+        return self._origin + position[0] * along, velocity[0] * along, acceleration[0] * along
+
+    def next(self) -> Floats:
+        """Position one tick further."""
+        self._ticks += 1
+        return self.at(self._ticks * self._period)[0]
+
+    @property
+    def finished(self) -> bool:
+        """Whether it rests."""
+        return self._ticks * self._period >= self.duration
+
+    @property
+    def line(self) -> Line:
+        """Its way: it brakes from the beginning."""
+        return Line(self._direction, self.acceleration, 0.0)
+
+    @property
+    def end(self) -> Floats:
+        """Where it rests, shape (n,) [rad]."""
+        return self.at(self.duration)[0]

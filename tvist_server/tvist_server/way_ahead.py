@@ -1,0 +1,123 @@
+"""The rest of what moves: whether it stays clear, and how long it lasts."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tvist_plant.plant import PERIOD
+from tvist_server.collision import CollisionModel, Meeting
+from tvist_server.control.differentiator import Floats
+from tvist_server.cycle import ControlCycle
+from tvist_server.look_ahead import LookAhead
+from tvist_server.safety import TorqueRoom
+from tvist_server.stops import StopPlan, resting_after
+from tvist_server.trajectory import DoubleS, LineStop, SetpointStream, Stop
+from tvist_shaping.base import Filter
+
+
+class WayAhead:
+    """Looks at what the control line is going to do.
+
+    Args:
+        cycle: The control line.
+        collisions: Where the arm would meet something.
+    """
+
+    def __init__(self, cycle: ControlCycle, collisions: CollisionModel) -> None:
+        self._cycle, self._collisions = cycle, collisions
+        room = TorqueRoom(cycle.description, cycle.inverse_dynamics)
+        self._guard = LookAhead(
+            collisions,
+            room.acceleration,
+            lambda state, clear: cycle.stops.by_joints(state, None, clear),
+            jerk=min(cycle.description.limits.jerk),
+            period=PERIOD,
+        )
+
+    @property
+    def met(self) -> Meeting | None:
+        """What the last reference that was not played would have led to."""
+        return self._guard.met
+
+    def begin(self) -> None:
+        """Watch a stream that begins from rest."""
+        self._guard.begin(self._cycle.newest)
+        self._cycle.guard = self._guard
+
+    def stop(self, deceleration: float | None) -> StopPlan | None:
+        """Stop as soon as is permitted; as `ControlCycle.stop`."""
+        cycle = self._cycle
+        if cycle.guard is None:
+            return cycle.stop(deceleration)
+        return cycle.stop(deceleration, clear=self._guard.clear, otherwise=self._guard.fallback)
+
+    def until_rest(self, plan: StopPlan | None = None) -> tuple[float | None, float | None]:
+        """How long it takes until the shaped reference rests [s], and how far the joint that turns most turns [rad].
+
+        Args:
+            plan: A stop that has begun; None for whatever is under way.
+
+        Returns:
+            None and None where it is too far ahead to say.
+        """
+        if plan is not None:
+            return plan.duration, plan.way
+        ahead = self._cycle.foresee()
+        if ahead is None:
+            return None, None
+        last = resting_after(ahead)
+        return max(last - 1, 0) * PERIOD, float(np.abs(ahead[-1] - ahead[1]).max())
+
+    def after_stream(self, end: Stop) -> Meeting | None:
+        """What would meet while a stream comes to rest through the filter.
+
+        Args:
+            end: Its reference.
+        """
+        if self._tail_is_spacious(end):
+            return None
+        return self._on(self._cycle.foresee(trajectory=end))
+
+    def rest_of_way(self, tvist: Filter | None) -> Meeting | None:
+        """What would meet on the rest of what moves; of a stream, in the quickest stop from here.
+
+        Args:
+            tvist: A filter to come; None for the present one.
+        """
+        cycle, collisions = self._cycle, self._collisions
+        if cycle.at_rest:
+            return None
+        trajectory = cycle.trajectory
+        if isinstance(trajectory, SetpointStream) and not cycle.stopping:
+            stop = cycle.stops.by_joints(cycle.newest, None, self._guard.clear)
+            if stop is None:
+                return self._guard.met
+            self._guard.take(cycle.newest, stop)
+            return None
+        if isinstance(trajectory, DoubleS):
+            found = collisions.on_line(cycle.position, trajectory.target)
+            return None if found is None else found[1]
+        if isinstance(trajectory, LineStop):
+            found = collisions.on_line(cycle.position, trajectory.end)
+            return None if found is None else found[1]
+        return self._on(cycle.foresee(None if tvist is None else tvist.fork()))
+
+    def _tail_is_spacious(self, end: Stop) -> bool:
+        """Whether there is room for whatever a filter makes of the references that it may still read."""
+        cycle = self._cycle
+        if cycle.tvist.peak > 1.0:
+            return False
+        q = cycle.position
+        window = np.abs(cycle.window() - q).max(axis=0)
+        _, qd, qdd = end.at(0.0)
+        return self._guard.is_spacious(q, window + self._guard.turned(qd, qdd, end.acceleration, end.jerk))
+
+    def _on(self, ahead: Floats | None) -> Meeting | None:
+        """The first pair that meets on references that are known, one a tick, shape (k, n)."""
+        if ahead is None:
+            return None
+        steps = np.abs(np.diff(ahead, axis=0)).max(axis=0)
+        last = len(ahead) - 1
+        way: Callable[[float], Floats] = lambda share: ahead[round(share * last)]  # noqa: E731
+        found = self._collisions.on_way(way, self._collisions.travel(steps * last))
+        return None if found is None else found[1]
