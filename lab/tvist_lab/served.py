@@ -13,7 +13,7 @@ from tvist_client.robot import Robot
 
 _BIND = "import os, sys; os.sched_setaffinity(0, {int(sys.argv[1])}); os.execv(sys.argv[2], sys.argv[2:])"
 """Binds itself to a processor, and becomes the program behind."""
-PATIENCE = 60.0
+PATIENCE = 300.0
 """How long a robot may take to answer at first [s]: a cold start compiles."""
 
 
