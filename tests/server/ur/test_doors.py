@@ -254,7 +254,7 @@ async def test_what_everybody_is_told_reaches_who_is_far_behind_in_lockstep_alon
     (connection,) = desk.doors._connections
     writer.transport.pause_reading()
     connection._transport.pause_reading()
-    connection._transport.write(bytes(20_000_000))
+    connection._transport.write(bytes(5_000_000))
     desk.doors.robot.tell(b"news")
     connection.close()
     writer.transport.resume_reading()
