@@ -13,8 +13,8 @@ from tvist_client.robot import Robot
 
 _BIND = "import os, sys; os.sched_setaffinity(0, {int(sys.argv[1])}); os.execv(sys.argv[2], sys.argv[2:])"
 """Binds itself to a processor, and becomes the program behind."""
-PATIENCE = 60.0
-"""How long a robot may take to answer at first [s]: a cold start compiles."""
+PATIENCE = 300.0
+"""How long a robot may take to answer at first [s]: a cold start compiles, on a slow machine for minutes."""
 
 
 class ServedError(RuntimeError):
@@ -47,7 +47,12 @@ class Served:
 
 @asynccontextmanager
 async def served(
-    options: Sequence[str], name: str = "ur5e", *, several: bool = False, core: int | None = None
+    options: Sequence[str],
+    name: str = "ur5e",
+    *,
+    several: bool = False,
+    core: int | None = None,
+    patience: float = PATIENCE,
 ) -> AsyncIterator[Served]:
     """`tvist serve` with options, and a client of it; SIGTERM and a clean exit at the end.
 
@@ -56,6 +61,7 @@ async def served(
         name: The robot's name, or that of one of several.
         several: Whether the options name the robots.
         core: Processor the server is bound to.
+        patience: How long it may take to answer at first [s].
 
     Raises:
         ServedError: It does not answer, or its exit code is not 0.
@@ -71,7 +77,7 @@ async def served(
     told: list[bytes] = []
     reading = asyncio.create_task(_read(process.stderr, told))
     try:
-        async with await _connect(process, endpoint, name, told) as robot:
+        async with await _connect(process, endpoint, name, told, patience) as robot:
             yield Served(endpoint, process.pid, loop.time() - began, robot)
     finally:
         if process.returncode is None:
@@ -93,8 +99,10 @@ async def served_robot(options: Sequence[str], name: str = "ur5e") -> AsyncItera
         yield server.robot, server.endpoint
 
 
-async def _connect(process: asyncio.subprocess.Process, endpoint: str, name: str, told: list[bytes]) -> Robot:
-    deadline = asyncio.get_running_loop().time() + PATIENCE
+async def _connect(
+    process: asyncio.subprocess.Process, endpoint: str, name: str, told: list[bytes], patience: float
+) -> Robot:
+    deadline = asyncio.get_running_loop().time() + patience
     while True:
         try:
             return await Robot.connect(endpoint, name)

@@ -310,7 +310,7 @@ def note():
     async def wait_for(served, wanted):
         seen = []
         while wanted not in seen:
-            seen.append(await asyncio.to_thread(served.robot.notes.get, timeout=10.0))
+            seen.append(await asyncio.to_thread(served.robot.notes.get, timeout=60.0))
         return seen
 
     return wait_for

@@ -58,7 +58,7 @@ except KeyboardInterrupt:
 @pytest.mark.parametrize("program", [ASYNCHRONOUS, ABANDONED, BLOCKING, FAILING])
 def test_a_program_that_forgets_to_close_ends_all_the_same(realtime, endpoint, program):
     ended = subprocess.run(
-        [sys.executable, "-c", program, endpoint], capture_output=True, text=True, timeout=30, check=False
+        [sys.executable, "-c", program, endpoint], capture_output=True, text=True, timeout=100, check=False
     )
     assert "end of main" in ended.stdout + ended.stderr
     assert "Traceback" not in ended.stderr
@@ -76,6 +76,6 @@ def test_an_interrupted_program_gives_control_back_and_ends(realtime, endpoint):
         realtime.post(lambda: realtime.robot.end_stream("it waits"))
         assert program.stdout.readline() == "it waits\n"
         program.send_signal(signal.SIGINT)
-        out, err = program.communicate(timeout=30.0)
+        out, err = program.communicate(timeout=100.0)
     assert (out.splitlines()[-1], err, program.returncode) == ("interrupted", "", 0)
     assert realtime.robot.holder is None

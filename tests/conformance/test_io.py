@@ -17,9 +17,9 @@ def test_a_change_is_told_before_the_state_of_its_tick_and_then_once_a_second(st
     assert {**again, "tick": io["tick"]} == io
 
 
-def test_who_comes_late_is_told_within_a_second_or_so(live):
+def test_who_comes_late_is_told_all_the_same(live):
     live.listen("io")
-    io = live.wait("io", timeout=5.0)
+    io = live.wait("io")
     assert io["tcp_offset"] == [0.0] * 6
     assert io["payload"]["mass"] == 5.0
     assert io["target_speed_fraction"] == 1.0

@@ -9,8 +9,8 @@ import msgpack
 import zenoh
 from zenoh.handlers import Callback
 
-PATIENCE = 15.0
-"""How long to wait for what must come [s]; the machine may be busy."""
+PATIENCE = 100.0
+"""After how long what must come is taken to be lost [s], on the slowest of machines."""
 TICK = 0.002
 STATE_FIELDS = {
     "type", "tick", "timestamp", "robot_mode", "safety_mode", "runtime_state", "setpoint_sequence", "reference_q",

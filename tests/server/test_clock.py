@@ -7,7 +7,7 @@ import pytest
 
 from tvist_server.clock import PRIORITY, Driven, Lockstep, Realtime
 
-WAIT = 30.0
+WAIT = 100.0
 PERIOD = 0.002
 
 

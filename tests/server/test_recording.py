@@ -103,7 +103,7 @@ def test_equal_runs_make_equal_files_whatever_the_threads_do(tmp_path):
 def test_what_finds_the_queue_full_is_dropped_and_counted_and_the_rest_keeps_its_order(path, gate):
     recorder = Recorder(path, INFO, {}, queue_size=5)
     recorder.state(state(0))
-    assert gate.reached.wait(10)
+    assert gate.reached.wait(60)
     for tick in range(1, 11):
         recorder.state(state(tick))
     recorder.event(Event(tick=10, kind="warning"))
@@ -119,7 +119,7 @@ def test_what_finds_the_queue_full_is_dropped_and_counted_and_the_rest_keeps_its
 def test_recording_goes_on_after_a_full_queue(path, gate):
     recorder = Recorder(path, INFO, {}, queue_size=2)
     recorder.state(state(0))
-    assert gate.reached.wait(10)
+    assert gate.reached.wait(60)
     for tick in range(1, 5):
         recorder.state(state(tick))
     assert recorder.dropped == 2
@@ -259,7 +259,7 @@ def test_a_message_that_cannot_be_written_stops_the_recording_not_the_robot(path
     told = threading.Event()
     recorder = Recorder(path, INFO, {}, on_error=lambda _: told.set())
     recorder.state(msgspec.structs.replace(STATE, actual_q=[object()]))
-    assert told.wait(10)
+    assert told.wait(60)
     recorder.close()
     assert "object" in recorder.error
 
@@ -273,7 +273,7 @@ def test_on_error_may_close(path):
 
     recorder = Recorder(path, INFO, {}, on_error=on_error)
     recorder.state(msgspec.structs.replace(STATE, tick=-1))
-    assert told.wait(10)
+    assert told.wait(60)
     recorder.close()
     assert recorder.error is not None
 
@@ -331,7 +331,7 @@ def test_a_file_that_may_grow_no_further_is_readable_up_to_there(path):
     with recording_process(path, size=10**9, limit=100_000) as process:
         assert process.stdout.readline().endswith("is incomplete: File too large\n")
         process.stdin.close()
-        assert process.wait(10) == 0
+        assert process.wait(60) == 0
     found = read_file(path)
     assert not found.complete
     assert [s.tick for s in found.states] == list(range(1, len(found.states) + 1))

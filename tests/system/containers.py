@@ -143,7 +143,6 @@ class Contained(Served):
         self.engine, self.name = engine, f"robot-{time.monotonic_ns()}"
         self.endpoint, self.lines = free_endpoint(), []
         port = self.endpoint.rpartition(":")[2]
-        self.began = time.monotonic()
         self._news = threading.Condition()
         self.process = subprocess.Popen(
             [
@@ -162,17 +161,15 @@ class Contained(Served):
         return self.engine.inspect(self.name)["State"]["Pid"]
 
     def end(self, number=signal.SIGTERM):
-        """Send a signal to the first process and wait for its end; exit code, and how long it took [s]."""
+        """Send a signal to the first process and wait for its end; the exit code."""
         watch = os.pidfd_open(self.pid)
         try:
-            sent = time.monotonic()
             signal.pidfd_send_signal(watch, number)
             ended, _, _ = select.select([watch], [], [], PATIENCE)
-            took = time.monotonic() - sent
         finally:
             os.close(watch)
-        assert ended, f"still there {took:.0f} s after {signal.Signals(number).name}"
-        return self.wait(), took
+        assert ended, f"still there {PATIENCE:.0f} s after {signal.Signals(number).name}"
+        return self.wait()
 
     def kill(self):
         """Make sure that it is gone, and its network with it."""

@@ -25,7 +25,7 @@ def main(endpoint, what, *options):
         token = wire.command("take_control", client="dying", lease_s=lease_s)["token"]
         wire.listen("state")
         if what == "move":
-            assert wire.command("move_j", token=token, q=[2.0, *Q1[1:]])["type"] == "accepted"
+            assert wire.command("move_j", token=token, q=[2.0, *Q1[1:]], velocity=0.6)["type"] == "accepted"
         else:
             answer = wire.command("servo_start", token=token, period=0.008)
             assert answer == {"type": "done"}, answer

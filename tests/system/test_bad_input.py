@@ -283,6 +283,7 @@ class TestSetpoints:
         good = {"token": token, "sequence": 0, "q": Q1}
 
         def puts():
+            wire.put(MEGABYTES)  # which may take longer than a stream waits for its first set-point
             assert wire.command("servo_start", token=token) == {"type": "done"}
             for spoilt in (
                 {"token": "stale"}, {"token": 3}, {"q": Q1[:5]}, {"q": [*Q1, 0.0]}, {"q": unless(0, NAN)},
@@ -294,7 +295,6 @@ class TestSetpoints:
                 b"",
                 b"\xc1",
                 pack("setpoint", **good)[:-3],
-                MEGABYTES,
                 pack("stop"),
                 pack("move_j", q=Q1),
             ):

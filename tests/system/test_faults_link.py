@@ -52,8 +52,7 @@ def test_a_link_cut_for_3_s_ends_control_and_motion_at_once_and_the_client_is_ba
         measured("from the cut to lease_lost [s of tick time]", round((lost["tick"] - cut) * TICK, 3))
         stopped = bystander.event("motion_stopped")
         assert (stopped["id"], stopped["tick"]) == (motion, lost["tick"])
-        assert (lost["tick"] - cut) * TICK < 0.3
-        assert "far" in lost["why"]
+        assert lost["why"] == "client 'far' is gone"  # its lease would have lasted
         bystander.until(cut + DOWN)
         proxy.restore()
         restored = bystander.until_later()["tick"]
@@ -94,13 +93,11 @@ def test_the_python_client_says_that_the_link_is_gone_and_is_back_by_itself(prox
 
 
 @pytest.mark.slow
-def test_a_link_that_stands_still_for_3_s_ends_the_stream_and_loses_states_but_no_event(
-    proxy, bystander, measured
-):
+def test_a_link_that_stands_still_ends_the_stream_and_loses_states_but_no_event(proxy, bystander, measured):
     """A cable that is pulled and put back: both ends keep the connection."""
     with Wire(proxy.endpoint) as wire:
         wire.listen("state", "event")
-        token = wire.command("take_control", client="far", lease_s=10.0)["token"]
+        token = wire.command("take_control", client="far", lease_s=60.0)["token"]
         assert wire.command("servo_start", token=token, period=0.008) == {"type": "done"}
         tick = wire.state()["tick"]
         for sequence in range(50):
@@ -108,13 +105,16 @@ def test_a_link_that_stands_still_for_3_s_ends_the_stream_and_loses_states_but_n
             wire.setpoint(token=token, sequence=sequence, q=Q1)
         bystander.wait("state", lambda state: (state["setpoint_sequence"] or 0) >= 49)
         proxy.hold()
-        held = bystander.until_later()["tick"]
+        held = bystander.state()["tick"]
         for sequence in range(50, 100):  # on their way when it stood still
             wire.setpoint(token=token, sequence=sequence, q=FAR)
         stopped = bystander.event("stream_stopped")
-        assert stopped["tick"] - held <= 130
+        arrived = [state for state in bystander.received["state"] if state["tick"] <= stopped["tick"]]
+        newest = max(state["setpoint_sequence"] or 0 for state in arrived)
+        played = min(state["tick"] for state in arrived if state["setpoint_sequence"] == newest)
+        assert 0 < stopped["tick"] - played <= 130
         at = bystander.next("state", lambda state: state["runtime_state"] == STOPPED)["target_q"]
-        before = bystander.until(held + DOWN) and bystander.next("telemetry")
+        before = bystander.until(held + DOWN // 3) and bystander.next("telemetry")
         proxy.flow()
         # The same session and the same lease; events that waited are told late, and set-points move nothing.
         assert wire.command("keep_alive", token=token) == {"type": "done"}
@@ -128,7 +128,7 @@ def test_a_link_that_stands_still_for_3_s_ends_the_stream_and_loses_states_but_n
         wire.until(refused["tick"])
         ticks = [state["tick"] for state in wire.received["state"]]
         assert all(later > earlier for earlier, later in pairwise(ticks))
-        measured("states missing after 3 s", ticks[-1] - ticks[0] + 1 - len(ticks))
+        measured("states missing", ticks[-1] - ticks[0] + 1 - len(ticks))
         assert wire.command("release_control", token=token) == {"type": "done"}
     assert proxy.connections == 1
     bystander.assert_undisturbed()
@@ -189,7 +189,7 @@ def test_a_router_in_the_middle_that_is_killed_ends_control_and_the_next_one_bri
             bystander.assert_undisturbed()
 
 
-def test_a_link_of_50_ms_each_way_brings_everything_50_ms_late(proxy, bystander):
+def test_a_link_of_50_ms_each_way_brings_everything_50_ms_late(proxy, bystander, measured):
     proxy.delay = 0.05
     with Wire(proxy.endpoint) as wire:
         wire.listen("state", "event")
@@ -199,7 +199,8 @@ def test_a_link_of_50_ms_each_way_brings_everything_50_ms_late(proxy, bystander)
             assert done["id"] == motion
             wire.until(done["tick"] + 50)
         ticks = [state["tick"] for state in wire.received["state"]]
-        assert ticks == list(range(ticks[0], ticks[-1] + 1))
+        assert all(later > earlier for earlier, later in pairwise(ticks))
+        measured("states missing", ticks[-1] - ticks[0] + 1 - len(ticks))
     bystander.assert_undisturbed()
 
 
@@ -209,7 +210,7 @@ def test_on_a_link_for_two_fifths_of_the_states_the_others_are_dropped_and_answe
 ):
     with Wire(proxy.endpoint) as wire:
         wire.listen("state", "event")
-        with wire.control("far", lease_s=10.0) as token:
+        with wire.control("far", lease_s=60.0) as token:
             proxy.rate = 200_000  # bytes a second; the states need half a million
             began = bystander.until_later(1500)["tick"]
             motion = wire.command("move_j", token=token, q=[0.1, *Q1[1:]])["id"]
@@ -217,15 +218,16 @@ def test_on_a_link_for_two_fifths_of_the_states_the_others_are_dropped_and_answe
             bystander.until(began + 1500)
             asked = bystander.until_later()["tick"]
             assert wire.command("keep_alive", token=token) == {"type": "done"}
-            late = bystander.received["state"][-1]["tick"] - wire.received["state"][-1]["tick"]
+            newest, came = bystander.received["state"][-1]["tick"], len(wire.received["state"])
             measured(
                 "from a command to its answer [s of tick time]",
                 (bystander.until_later()["tick"] - asked) * TICK,
             )
-            measured("how late states are [s of tick time]", late * TICK)
-            assert late < 1250  # were nothing dropped, they would be 1800 late, and more from tick to tick
             proxy.rate = None
             wire.until(bystander.until_later()["tick"])
+            under_way = sum(state["tick"] <= newest for state in wire.received["state"][came:])
+            measured("states under way", under_way)
+            assert under_way < 1000  # were nothing dropped, there would be 1800, and more from tick to tick
         ticks = [state["tick"] for state in wire.received["state"]]
         assert all(later > earlier for earlier, later in pairwise(ticks))
         measured("states dropped for this client", ticks[-1] - ticks[0] + 1 - len(ticks))

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 from importlib.util import find_spec
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -28,21 +27,25 @@ HOUR = 3600
 class TestFrozen:
     """SIGSTOP, and a second later SIGCONT: as when the machine sleeps, or a virtual one is moved."""
 
+    @staticmethod
+    def freeze(served, bystander):
+        """For a second or more."""
+        served.process.send_signal(signal.SIGSTOP)
+        with pytest.raises(AssertionError, match="no such state"):
+            bystander.next("state", lambda _: False, timeout=1.0)
+        served.process.send_signal(signal.SIGCONT)
+
     def test_time_stands_still_inside_and_the_missed_ticks_are_counted(self, measured):
         with Served() as served, Bystander(served.endpoint) as bystander:
-            # A lease shorter than the freeze, which the freeze does not use up.
-            token = bystander.command("take_control", client="mover", lease_s=0.7)["token"]
+            token = bystander.command("take_control", client="mover")["token"]
             motion = bystander.command("move_j", token=token, q=[0.2, *Q1[1:]])["id"]
             before = bystander.next("state", lambda state: state["target_qd"][0] > 0.05)
-            served.process.send_signal(signal.SIGSTOP)
-            with pytest.raises(AssertionError, match="no such state"):  # a second in which none comes
-                bystander.wait("state", lambda state: state["tick"] > before["tick"] + 200, timeout=1.0)
-            served.process.send_signal(signal.SIGCONT)
+            self.freeze(served, bystander)
             assert bystander.command("keep_alive", token=token) == {"type": "done"}
-            after = bystander.next("telemetry")
-            missed = after["missed_ticks"] - before["missed_ticks"]
-            measured("missed ticks of 1 s", missed)
-            assert missed >= 400
+            # All but those that it makes up for.
+            least = before["missed_ticks"] + round(1.0 / TICK) - CATCH_UP
+            after = bystander.next("telemetry", lambda told: told["missed_ticks"] >= least)
+            measured("missed ticks of 1 s", after["missed_ticks"] - before["missed_ticks"])
             # The stream of states shows them, and is complete: what was left out never was.
             # Telemetry goes another way, and may be there before the states of its tick.
             shown = bystander.next("state", lambda state: state["tick"] >= after["tick"])
@@ -50,9 +53,14 @@ class TestFrozen:
             done = bystander.event("motion_done")
             assert done["id"] == motion
             bystander.assert_undisturbed()
-            # A burst of no more than CATCH_UP ticks, and it is on time again: what follows is missed no more.
-            later = bystander.next("telemetry", lambda told: told["tick"] > after["tick"] + CATCH_UP)
-            assert later["missed_ticks"] - after["missed_ticks"] < 200
+
+    def test_a_lease_that_is_shorter_ends_on_its_tick_all_the_same(self):
+        with Served() as served, Bystander(served.endpoint) as bystander:
+            before = bystander.info()["tick"]
+            bystander.command("take_control", client="sleepy", lease_s=0.7)
+            granted = bystander.info()["tick"]
+            self.freeze(served, bystander)
+            assert before + 350 <= bystander.event("lease_lost")["tick"] <= granted + 355
 
 
 @pytest.mark.slow
@@ -91,11 +99,15 @@ from tvist_server.server import Server
 
 run = Server.run
 
+def ticks(self):
+    return self.robots[0].controller.tick_number
+
 async def busy(self, ready):
     async def block():
         while True:
-            end = time.monotonic() + 0.05
-            {how}
+            end = ticks(self) + 25
+            while ticks(self) < end:
+                {how}
             await asyncio.sleep(0.05)
     blocking = asyncio.ensure_future(block())
     await run(self, ready)
@@ -106,19 +118,15 @@ sys.argv = ["tvist", "serve", *sys.argv[1:]]
 from tvist_cli.main import main
 main()
 """
-"""The event loop is blocked for 50 ms after every 50 ms."""
+"""The event loop is blocked again and again, each time until 25 ticks have passed."""
 
 
-@pytest.mark.parametrize("how", ["time.sleep(0.05)", "while time.monotonic() < end: pass"])
-def test_an_event_loop_blocked_for_50_ms_makes_no_tick_50_ms_late(how, measured):
-    """Asleep, or busy and in want of the interpreter. A tick that waited for the loop would be 25 periods late."""
+@pytest.mark.parametrize("how", ["time.sleep(0.05)", "pass"])
+def test_ticks_pass_while_the_event_loop_is_blocked(how):
+    """Asleep, or busy and in want of the interpreter. Ticks that waited for the loop would wait for ever."""
     with Running(BUSY_LOOP.format(how=how)) as served, Bystander(served.endpoint) as bystander:
-        told = [bystander.next("telemetry") for _ in range(4)]
-        best = min(told[1:], key=lambda telemetry: telemetry["late_max_us"])
-        measured(f"latest tick of a second, {how} [us]", round(best["late_max_us"]))
-        # Ten blocks a second; of three seconds, one in which the machine itself was on time.
-        assert best["late_max_us"] < 25_000
-        assert min(b["missed_ticks"] - a["missed_ticks"] for a, b in pairwise(told)) < 50
+        for _ in range(3):  # the loop's own work is done meanwhile, too
+            bystander.next("telemetry")
         bystander.assert_undisturbed()
 
 
@@ -130,23 +138,24 @@ class TestWallClock:
             monkeypatch.setenv(name, value)
         with Served() as served, Bystander(served.endpoint) as bystander:
             assert system.in_force(served.process.pid)
-            token = bystander.command("take_control", client="mover", lease_s=2.0)["token"]
+            token = bystander.command("take_control", client="mover")["token"]
             motion = bystander.command("move_j", token=token, q=[0.5, *Q1[1:]])["id"]
             bystander.next("state", lambda state: state["target_qd"][0] > 0.2)
             was = system.wall_clock_of_a_process()
             system.set_wall_clock(seconds)
             assert abs(system.wall_clock_of_a_process() - was - seconds) < 60.0
             assert bystander.command("keep_alive", token=token) == {"type": "done"}
-            kept = bystander.info()["tick"]
             assert bystander.event("motion_done")["id"] == motion
             # The deadman goes by ticks, the lease, too.
+            before = bystander.info()["tick"]
             assert bystander.command("servo_start", token=token) == {"type": "done"}
-            begun = bystander.info()["tick"]
-            stopped = bystander.event("stream_stopped")
-            assert 0 < stopped["tick"] - begun <= 130
-            lost = bystander.event("lease_lost")
-            assert lost["tick"] - kept > 1000
-            assert lost["tick"] - begun <= 1005
+            after = bystander.info()["tick"]
+            assert before + 125 <= bystander.event("stream_stopped")["tick"] <= after + 130
+            assert bystander.command("release_control", token=token) == {"type": "done"}
+            before = bystander.info()["tick"]
+            bystander.command("take_control", client="sleepy", lease_s=1.0)
+            after = bystander.info()["tick"]
+            assert before + 500 <= bystander.event("lease_lost")["tick"] <= after + 505
             for state in bystander.received["state"]:
                 assert state["timestamp"] == pytest.approx(state["tick"] * TICK, abs=1e-9)
             with Wire(served.endpoint) as late, late.control("late"):

@@ -43,7 +43,7 @@ def test_too_few_measurements_are_a_sentence_and_no_file(arguments, named, tmp_p
 def test_a_few_ring_downs_make_a_calibration(tmp_path):
     path = tmp_path / "mine.json"
     options = ("--model", "modal", "--ring-downs", 5, "--output", path, "--json")
-    said = tvist("identify", *options, timeout=110).assert_done().json
+    said = tvist("identify", *options).assert_done().json
     assert said.keys() >= KEYS
     assert said["ring_downs"] == 5
     assert said["payloads_kg"] == [0.0, 5.0]
@@ -58,7 +58,7 @@ def test_a_few_ring_downs_make_a_calibration(tmp_path):
 @pytest.mark.nightly
 def test_people_get_tables_of_springs_and_of_errors(tmp_path):
     ended = tvist(
-        "identify", "--model", "modal", "--ring-downs", 4, "--payloads", "5", cwd=tmp_path, timeout=110
+        "identify", "--model", "modal", "--ring-downs", 4, "--payloads", "5", cwd=tmp_path
     ).assert_done()
     for words in ("gear stiffness", "assumed", "95 %", "true modes", "calibration.json"):
         assert words in ended.out
@@ -70,7 +70,7 @@ def test_it_finds_the_same_over_the_network_as_in_process(lockstep, tmp_path):
     found = []
     for name, endpoint in (("network", (lockstep.endpoint,)), ("process", ())):
         path = tmp_path / f"{name}.json"
-        tvist("identify", *endpoint, *options, "--output", path, timeout=110).assert_done()
+        tvist("identify", *endpoint, *options, "--output", path).assert_done()
         found.append(json.loads(path.read_text(encoding="utf-8"))["modal"]["parameters"])
     for there, here in zip(*found, strict=True):
         assert there["value"] == pytest.approx(here["value"], rel=0.02)
@@ -79,10 +79,10 @@ def test_it_finds_the_same_over_the_network_as_in_process(lockstep, tmp_path):
 @pytest.mark.slow
 def test_the_payload_of_a_served_robot_is_found_and_declared(lockstep):
     options = ("--payload", "--poses", 3, "--json")
-    said = tvist("identify", lockstep.endpoint, *options, "--declare", timeout=110).assert_done().json
+    said = tvist("identify", lockstep.endpoint, *options, "--declare").assert_done().json
     assert said["mass_kg"] == pytest.approx(5.0, abs=0.05)
     assert said["com_m"] == pytest.approx([0.0, 0.0, 0.0405], abs=0.003)
     assert said["declared"] is True
-    again = tvist("identify", *options[:1], lockstep.endpoint, *options[1:], timeout=110).assert_done().json
+    again = tvist("identify", *options[:1], lockstep.endpoint, *options[1:]).assert_done().json
     assert again["declared_kg"] == pytest.approx(said["mass_kg"])
     assert again["set_payload"]["mass"] == again["mass_kg"]

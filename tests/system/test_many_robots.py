@@ -50,9 +50,10 @@ def test_each_says_its_own_name_and_both_are_found(served, one, two):
 def test_two_clients_move_two_robots_at_once(one, two):
     with one.control("anna") as first, two.control("otto") as second:
         motions = [
-            wire.command("move_j", token=token, q=FAR)["id"] for wire, token in ((one, first), (two, second))
+            wire.command("move_j", token=token, q=FAR, velocity=0.5)["id"]
+            for wire, token in ((one, first), (two, second))
         ]
-        both = [wire.next("state", lambda state: state["target_qd"][0] > 0.2) for wire in (one, two)]
+        both = [wire.wait("state", lambda state: state["target_qd"][0] > 0.2) for wire in (one, two)]
         assert {state["runtime_state"] for state in both} == {PLAYING}
         for wire, motion in zip((one, two), motions, strict=True):
             done(wire, motion)
@@ -64,7 +65,7 @@ def test_a_stop_and_a_client_that_goes_concern_one_robot_alone(served, one, two)
         with Wire(served.endpoint, "ur5e-1") as leaving:
             leaving.announce("anna")
             token = leaving.command("take_control", client="anna")["token"]
-            leaving.command("move_j", token=token, q=FAR)
+            leaving.command("move_j", token=token, q=FAR, velocity=0.5)
             motion = two.command("move_j", token=second, q=FAR)["id"]
             one.next("state", lambda state: state["target_qd"][0] > 0.2)
             assert one.command("stop")["type"] == "done"
@@ -125,11 +126,7 @@ def test_each_is_recorded_into_a_file_of_its_own_that_replays_equal(tmp_path):
             token = wire.command("take_control", client="mover")["token"]
             wire.command("move_j", token=token, q=FAR)
             wire.until(wire.state()["tick"] + 300)
-        code, took = served.end()
-        assert code == 0
-        assert (
-            took < 5.0
-        )  # how fast is for the bench and the 200 ends: here robots with recorders end in order
+        assert served.end() == 0
     assert not path.exists()
     first, second = (read(tmp_path / f"out-ur5e-{number}.mcap") for number in (1, 2))
     assert [recorded.robot for recorded in (first, second)] == ["ur5e-1", "ur5e-2"]

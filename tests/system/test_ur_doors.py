@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from tests.conformance.served import Served
+from tests.conformance.served import PATIENCE, Served
 
 
 def address(last):
@@ -16,7 +16,10 @@ def address(last):
 
 def asked(host, *lines, port=29999):
     """What the dashboard answers, after its greeting."""
-    with socket.create_connection((host, port), 10) as stream, stream.makefile("rw", newline="\n") as talk:
+    with (
+        socket.create_connection((host, port), PATIENCE) as stream,
+        stream.makefile("rw", newline="\n") as talk,
+    ):
         assert talk.readline().startswith("Connected")
         said = []
         for line in lines:
@@ -31,21 +34,21 @@ def test_each_of_several_robots_has_doors_of_its_own():
         first, second = (asked(address(last), "get serial number", "power off") for last in (1, 2))
         assert first[0] != second[0]
         assert first[1] == second[1] == "Powering off"
-        assert served.end()[0] == 0
+        assert served.end() == 0
 
 
 def test_a_client_at_a_door_does_not_keep_the_robot_from_ending():
-    with Served("--ur", "--ur-address", address(9)) as served:
-        with socket.create_connection((address(9), 30003), 10) as stream:
-            assert len(stream.recv(1220, socket.MSG_WAITALL)) == 1220
-            code, took = served.end()
-        assert code == 0
-        assert took < 5.0
+    with (
+        Served("--ur", "--ur-address", address(9)) as served,
+        socket.create_connection((address(9), 30003), PATIENCE) as stream,
+    ):
+        assert len(stream.recv(1220, socket.MSG_WAITALL)) == 1220
+        assert served.end() == 0
 
 
 def test_without_the_option_nothing_listens():
     with Served() as served, pytest.raises(ConnectionError):
-        socket.create_connection(("127.0.0.1", 29999), 1).close()
+        socket.create_connection(("127.0.0.1", 29999), PATIENCE).close()
     assert "30004" not in served.said
 
 
@@ -64,7 +67,7 @@ def test_what_is_wrong_is_said_in_a_sentence(options, code, named):
         [sys.executable, "-m", "tvist_cli", "serve", "--listen", "tcp/127.0.0.1:0", *options],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
         check=False,
     )
     assert ended.returncode == code, ended.stderr

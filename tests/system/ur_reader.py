@@ -1,14 +1,15 @@
 """Reads a UR robot with ur-rtde, in a process of its own, since its threads may outlive it.
 
-python ur_reader.py ADDRESS SECONDS [MOST]
+python ur_reader.py ADDRESS
 
-Prints, as JSON, the value of every getter of RTDEReceiveInterface at one tick after another, of so many ticks at most.
+Says `reading`, and reads until its standard input ends. Then it prints, as JSON, the value of every getter of
+RTDEReceiveInterface at one tick after another.
 """
 
 import json
 import os
 import sys
-import time
+import threading
 
 from rtde_receive import RTDEReceiveInterface
 
@@ -31,21 +32,21 @@ def values(robot, getters):
     return found if robot.getTimestamp() == began else None
 
 
-def main(address, seconds, most):
+def main(address):
+    ended = threading.Event()
+    threading.Thread(target=lambda: sys.stdin.read() or ended.set(), daemon=True).start()
     robot = RTDEReceiveInterface(address, 500.0)
     names = [name for name in dir(robot) if name.startswith(("get", "is")) and name != "isConnected"]
     getters = {name: getattr(robot, name) for name in names}
-    first, began, read = robot.getTimestamp(), time.monotonic(), []
-    while time.monotonic() - began < seconds:
+    print("reading", flush=True)  # noqa: T201  whoever started it waits for that
+    read = []
+    while not ended.is_set():
         found = values(robot, getters)
-        new = found is not None and (not read or found["getTimestamp"] != read[-1]["getTimestamp"])
-        if new and len(read) < most:
+        if found is not None and (not read or found["getTimestamp"] != read[-1]["getTimestamp"]):
             read.append(found)
-    ticks, took = round((robot.getTimestamp() - first) / 0.002), time.monotonic() - began
-    connected = robot.isConnected()
-    json.dump({"connected": connected, "ticks": ticks, "seconds": took, "read": read}, sys.stdout)
+    json.dump({"connected": robot.isConnected(), "read": read}, sys.stdout)
     sys.stdout.flush()
     os._exit(0)
 
 
-main(sys.argv[1], float(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else 100_000)
+main(*sys.argv[1:])

@@ -62,7 +62,8 @@ async def worst_share(number: int, seconds: float) -> float:
             loop.call_soon_threadsafe(enough.set)
 
     try:
-        async with served(["--robots", f"ur5e*{number}"], name, several=True, core=core) as server:
+        options = ["--robots", f"ur5e*{number}"]
+        async with served(options, name, several=True, core=core, patience=60.0) as server:
             session = await asyncio.to_thread(open_session, server.endpoint)
             session.declare_subscriber(f"{keys.PREFIX}/*/state", Callback(_ignore, indirect=False))
             session.declare_subscriber(f"{keys.PREFIX}/*/telemetry", Callback(on_telemetry, indirect=False))

@@ -43,12 +43,15 @@ async def one_robot(seconds: float, tell: Callable[[str], None]) -> dict[str, An
                 tell("commands")
                 commands = await _commands(arm)
             memory = rss_mb(server.pid)
+            ending = time.monotonic()
+        end_s = time.monotonic() - ending
     return {
         "tick": tick,
         "setpoint_to_state_ms": _percentiles(setpoints),
         "command_ms": _percentiles(commands),
         "cpu_share": share,
         "start_s": start_s,
+        "end_s": end_s,
         "rss_mb": memory,
     }
 

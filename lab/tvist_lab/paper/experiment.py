@@ -101,10 +101,10 @@ async def table_1(robot: Robot, arm: Arm) -> dict[str, dict[str, float]]:
     table = {}
     await arm.set_estimator("polynomial")
     for name in ("Q1", "Q2", "Q3"):
-        await arm.reset(q=pose(name))
+        reset = await arm.reset(q=pose(name)) or 0
         with collect(robot) as collected:
             await robot.advance(5)
-        state = collected.states[-1]
+            state = await robot.until(reset + 5)
         table[name] = {"f_d_hz": state.estimated_f_d[0], "zeta": state.estimated_zeta[0]}
         if collected.truths:
             truth = collected.truths[-1]
@@ -119,8 +119,9 @@ async def run(robot: Robot, arm: Arm, motion: str, method: Method, seed: int) ->
     await arm.reset(q=start, seed=seed)
     await robot.advance(1)
     jerk = await method.prepare(robot, arm, end)
-    await arm.reset(q=start, seed=seed)
+    reset = await arm.reset(q=start, seed=seed) or 0
     await robot.advance(1)
+    await robot.until(reset + 1)  # an answer may overtake states of before
     with collect(robot) as collected:
         await robot.advance(round(BEFORE / period))
         await arm.move_j(end, jerk=jerk)
