@@ -9,6 +9,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_server.controller import Controller
 from tvist_server.cycle import ControlCycle
+from tvist_server.outlook import Outlook
 from tvist_server.setup import Setup, body, paper_payload
 from tvist_server.trajectory import Limits
 from tvist_shaping.catalogue import SHAPERS, shaper
@@ -94,6 +95,13 @@ def cycle(name: str = "zv", q=Q1, estimator=None, seed: int = 0) -> ControlCycle
     payload = body(paper_payload(UR5E))
     tvist = TvistFilter(shaper(name), estimator or Polynomial(**POLYNOMIAL), joints=6)
     return ControlCycle(UR5E, tvist, q=np.array(q), declared=payload, carried=payload, seed=seed)
+
+
+def stop(line: ControlCycle, deceleration: float | None):
+    """Stop a line; what is done, or None where a stop goes on."""
+    if not hasattr(line, "outlook"):
+        line.outlook = Outlook(line)
+    return line.outlook.stop(deceleration)
 
 
 class NoArm:

@@ -17,7 +17,23 @@ from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.estimators.polynomial import Polynomial
 from tvist_shaping.filter import TvistFilter
 
-from .robots import FITTING, PAPER, POLYNOMIAL, Q1, Q2, Q3, UR5E, H, Robot, calibration, cycle, without_arm
+from tvist_server.outlook import Outlook
+
+from .robots import (
+    FITTING,
+    PAPER,
+    POLYNOMIAL,
+    Q1,
+    Q2,
+    Q3,
+    UR5E,
+    H,
+    Robot,
+    calibration,
+    cycle,
+    stop,
+    without_arm,
+)
 
 DISC = paper_payload(UR5E)
 TOLERANCE = 5e-3
@@ -121,7 +137,7 @@ def test_a_change_that_has_not_begun_to_count_gives_way_to_the_next():
         line.step()
     line.use(TvistFilter(shaper("none"), Fixed([6.7], [0.1]), joints=6))
     line.use(newest := TvistFilter(shaper("ei3"), Fixed([6.7], [0.1]), joints=6))
-    assert line._filter._fade.new is newest
+    assert line.line_filter._fade.new is newest
 
 
 def test_a_stream_at_its_limit_keeps_it_through_a_change():
@@ -144,7 +160,7 @@ def test_a_stream_at_its_limit_keeps_it_through_a_change():
     shaped = np.array(shaped)
     own = np.abs(np.diff(shaped, 2, axis=0)) / H**2
     assert (own / alone.bound(2, PAPER.acceleration, len(shaped))).max() < 1.0 + TOLERANCE
-    assert line._filter._fade is None
+    assert line.line_filter._fade is None
     line.start(line.end_of(stream))
     while not line.at_rest:
         line.step()
@@ -161,7 +177,7 @@ def test_paused_a_change_is_made_where_nothing_moves():
     robot.tick(5)
     held = robot.column("target_q")[-100:]
     assert (held == held[0]).all()
-    assert robot.controller.cycle._filter._fade is None
+    assert robot.controller.cycle.line_filter._fade is None
     robot.send(c.Resume)
     robot.until_rest()
     assert robot.kinds()[-1] == "motion_done"
@@ -176,15 +192,15 @@ def test_a_stop_during_a_change_is_a_stop_and_the_new_filter_is_in_force_after_i
         if tick == 500:
             line.use(new)
         line.step()
-    assert 0.0 < line._filter._fade.share < 1.0
+    assert 0.0 < line.line_filter._fade.share < 1.0
     before = line.newest
-    line.stop(None)
+    stop(line, None)
     line.step()
     assert line.newest.q == pytest.approx(before.q + H * before.qd, abs=1e-4)
     while not line.at_rest:
         line.step()
     assert line.tvist is new
-    assert line._filter._fade is None
+    assert line.line_filter._fade is None
     assert (line.tvist.filter(line.reference) == line.reference).all()
 
 
@@ -246,13 +262,13 @@ def test_a_stop_while_the_payload_changes_is_safe_with_either(masses):
         if tick == 150:
             line.declare(body(paper_payload(UR5E, masses[1])))
         line.step()
-    state, stop = line.newest, line.plan_stop(None).trajectory
+    state, planned = line.newest, Outlook(line).plan_stop(None).trajectory
     for mass in masses:
         dynamics = InverseDynamics(UR5E, body(paper_payload(UR5E, mass)))
         present = line.inverse_dynamics.effort(state.q, state.qd, state.qdd)
         limit = np.maximum(TORQUE_SHARE * np.array(UR5E.limits.torque), present)
-        for time in np.linspace(0.0, stop.duration, 49)[1:]:
-            assert (np.abs(dynamics.torque(*stop.at(time))) <= limit + 1e-9).all()
+        for time in np.linspace(0.0, planned.duration, 49)[1:]:
+            assert (np.abs(dynamics.torque(*planned.at(time))) <= limit + 1e-9).all()
 
 
 def test_a_payload_swapped_in_place_collides_as_one_built_anew():

@@ -8,7 +8,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted
 from tvist_server.trajectory import DoubleS, Limits, LineStop, Stop
 
-from .robots import PAPER, Q1, Q2, Q3, ROUNDING, UR5E, H, Robot, cycle, without_arm
+from .robots import PAPER, Q1, Q2, Q3, ROUNDING, UR5E, H, Robot, cycle, stop, without_arm
 
 def run(line, ticks):
     """Published targets of some ticks."""
@@ -77,7 +77,7 @@ def test_after_a_stop_a_move_is_what_it_is_of_a_fresh_line(name):
     line = without_arm(cycle(name))
     line.start(line.plan(Q3, PAPER))
     run(line, 431)
-    line.stop(None)
+    stop(line, None)
     end = until_rest(line)[-1, 0]
     run(line, 3)
     fresh = without_arm(cycle(name, q=end))
@@ -92,7 +92,7 @@ def test_a_stop_while_the_shaper_lets_a_finished_trajectory_out_is_a_stop_too():
     while not motion.finished:
         run(line, 1)
     assert not line.at_rest
-    line.stop(None)
+    stop(line, None)
     end = until_rest(line)[-1, 0]
     assert (np.abs(end - (Q1 + 0.1)) > 1e-3).all()
     assert (run(line, 300)[:, 0] == end).all()
@@ -104,7 +104,7 @@ def test_a_harder_stop_takes_over_from_a_gentle_one():
         line.start(line.plan(Q2, PAPER))
         run(line, 450)
         for deceleration in decelerations:
-            line.stop(deceleration)
+            stop(line, deceleration)
             run(line, 20)
         return until_rest(line)[-1, 0, 0]
 
@@ -117,9 +117,9 @@ def test_a_harder_stop_keeps_the_acceleration_within_its_limit():
     line = without_arm(cycle())
     line.start(line.plan(Q2, PAPER))
     run(line, 450)
-    line.stop(2.0)
+    stop(line, 2.0)
     run(line, 30)
-    plan = line.stop(None)
+    plan = stop(line, None)
     assert np.abs(until_rest(line)[:, 2]).max() <= plan.acceleration + ROUNDING
 
 
@@ -130,7 +130,7 @@ def test_a_repeated_stop_changes_nothing():
         run(line, 300)
         out = []
         for _ in range(times):
-            line.stop(None)
+            stop(line, None)
             out.append(run(line, 1)[0])
         return np.array([*out, *until_rest(line)])
 

@@ -1,6 +1,5 @@
 """One control period: the paper's Figure 6, left to right."""
 
-import math
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -14,18 +13,13 @@ from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.control.joint_controllers import JointControllers
 from tvist_server.line_filter import LineFilter
 from tvist_server.safety import TorqueRoom
-from tvist_server.stops import STILL, StopPlan, StopPlanner
-from tvist_server.trajectory import DoubleS, Limits, Line, LineStop, Rest, SetpointStream, Stop, Trajectory
+from tvist_server.trajectory import DoubleS, Limits, Rest, SetpointStream, Stop, Trajectory
 from tvist_shaping.base import Filter
 
 T = TypeVar("T", bound=Trajectory)
 
-MOST_AHEAD = 4000
-"""Ticks that a motion is run ahead at most to see how it will end."""
-
-
-def _anywhere(_: Stop) -> bool:
-    return True
+STILL = 1e-7
+"""A reference that moves less than this between two ticks is at rest [rad]."""
 
 
 class Sample(Struct, frozen=True, eq=False, gc=False):
@@ -68,12 +62,11 @@ class ControlCycle:
         self.description = description
         limits = description.limits
         most = Limits(min(limits.velocity), min(limits.acceleration), min(limits.jerk))
-        self._filter = LineFilter(tvist, most)
+        self.line_filter = LineFilter(tvist, most)
         self.arm = Plant(description, carried)
         self.inverse_dynamics = InverseDynamics(description, declared)
         self._joint_controllers = JointControllers(description, PERIOD)
         self._differentiator = Differentiator(q, PERIOD)
-        self.stops = StopPlanner(description, self.inverse_dynamics, PERIOD)
         self.trajectory: Trajectory = Rest(q)
         self.reference = q
         """Newest one before shaping, shape (n,) [rad]."""
@@ -85,10 +78,9 @@ class ControlCycle:
         """Whether what was under way comes to rest by itself, since no stop is quicker."""
         self.guard: Callable[[Target], Stop | None] | None = None
         """Asked before each shaped reference is played; where it answers with a stop, that is made instead."""
-        self._deceleration = math.inf
         self.reset(q, carried=carried, seed=seed)
         # The first steps load compiled code, which lasts many ticks: they are made here, and taken back.
-        self._filter.rehearse(q)
+        self.line_filter.rehearse(q)
         for _ in range(3):
             self.step()
         self.reset(q, seed=seed)
@@ -96,12 +88,12 @@ class ControlCycle:
     @property
     def tvist(self) -> Filter:
         """The filter chosen last: in force, or about to be."""
-        return self._filter.tvist
+        return self.line_filter.tvist
 
     def step(self) -> Sample:
         """One tick."""
         reference = self.trajectory.next()  # q [rad]
-        shaped = reference if self.stopping else self._filter.filter(reference)  # q* [rad]
+        shaped = reference if self.stopping else self.line_filter.filter(reference)  # q* [rad]
         if self.guard is not None:
             reference, shaped = self._guarded(self.guard, reference, shaped)
         self.reference = reference
@@ -121,7 +113,7 @@ class ControlCycle:
         stop = None if self.stopping else guard(self._differentiator.after(shaped))
         if stop is None:
             return reference, shaped
-        self._bypass(stop)
+        self.bypass(stop)
         reference = stop.next()
         return reference, reference
 
@@ -134,18 +126,18 @@ class ControlCycle:
             tvist: The filter to come; its joints and period are the present one's.
         """
         if self.at_rest or self.stopping:
-            self._filter.begin(tvist, self.reference)
+            self.line_filter.begin(tvist, self.reference)
         else:
-            self._filter.use(tvist)
+            self.line_filter.use(tvist)
 
     def _settle(self, reference: Floats, target: Target) -> None:
         """Notice the end of a motion: its trajectory is over and the shaped reference rests on it."""
         trajectory = self.trajectory
         if self.at_rest or not (trajectory.finished or (self.running_out and trajectory.standing)):
             return
-        self.at_rest = not self._filter.fading and _rests(reference, target)
+        self.at_rest = not self.line_filter.fading and rests(reference, target)
         if self.at_rest and self.stopping:  # the delay line starts anew from where the stop ended
-            self._filter.begin(self.tvist, reference)
+            self.line_filter.begin(self.tvist, reference)
         if self.at_rest and not trajectory.finished:  # what ran out was paused: it goes no further
             self.trajectory = Rest(reference)
         if self.at_rest:
@@ -182,7 +174,7 @@ class ControlCycle:
         """Follow a trajectory that begins where the reference is."""
         self.trajectory = trajectory
         if isinstance(trajectory, DoubleS | SetpointStream):
-            self._filter.limits = trajectory.limits
+            self.line_filter.limits = trajectory.limits
         self.at_rest = False
         return trajectory
 
@@ -196,134 +188,27 @@ class ControlCycle:
         """State of motion of the newest shaped reference."""
         return self._differentiator.newest
 
-    def foresee(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Floats | None:
-        """Run the references ahead: what they will be if nothing is commanded.
+    @property
+    def published(self) -> Target:
+        """State of motion a tick before, as the last target says it."""
+        return self._differentiator.published
+
+    def fork(self) -> tuple[Trajectory, LineFilter, Differentiator]:
+        """Copies of the line's parts that make targets, to be run ahead."""
+        return self.trajectory.fork(), self.line_filter.fork(), self._differentiator.fork()
+
+    def run_out(self) -> None:
+        """Come to rest by letting what is under way go on: where it is paused it goes no further."""
+        self.running_out = True
+
+    def bypass(self, stop: Trajectory) -> None:
+        """Come to rest past the filter; nothing in the delay line plays on.
 
         Args:
-            tvist: A filter to change to now; None for no change.
-            trajectory: One to follow from now on; None for the present one.
-
-        Returns:
-            The two shaped references played last and those to come until they rest, one a tick, shape (k, n) [rad];
-            None where that takes more than `MOST_AHEAD` ticks.
+            stop: Continues the shaped reference.
         """
-        trajectory = (self.trajectory if trajectory is None else trajectory).fork()
-        line_filter, differentiator = self._filter.fork(), self._differentiator.fork()
-        if tvist is not None and not self.stopping:
-            line_filter.use(tvist)
-        ahead = [differentiator.published.q, differentiator.newest.q]
-        for _ in range(MOST_AHEAD):
-            reference = trajectory.next()
-            shaped = reference if self.stopping else line_filter.filter(reference)
-            target = differentiator.update(shaped)
-            ahead.append(shaped)
-            if trajectory.standing and not line_filter.fading and _rests(reference, target):
-                return np.array(ahead)
-        return None
-
-    def window(self) -> Floats:
-        """References that the filter may still read, shape (k, n) [rad]."""
-        return self._filter.window()
-
-    def plan_stop(
-        self,
-        deceleration: float | None,
-        *,
-        clear: Callable[[Stop], bool] = _anywhere,
-        otherwise: Callable[[], Stop] | None = None,
-        asked: Floats | None = None,
-    ) -> StopPlan | None:
-        """The quickest permitted stop from here; see `StopPlanner`.
-
-        Args:
-            deceleration: As of `stop`.
-            clear: As of `stop`.
-            otherwise: As of `stop`.
-            asked: As of `stop`.
-
-        Returns:
-            None where a stop under way is as quick already.
-        """
-        line = self.trajectory.line
-        if line is None:
-            quickest = self.stops.by_joints(self.newest, deceleration, clear)
-            if quickest is None and self.stopping:
-                return None
-            if quickest is None:
-                quickest = self.stops.hardest(self.newest) if otherwise is None else otherwise()
-            return self._plan(quickest, deceleration, quickest.duration, quickest.end)
-        state, line = self._differentiator.published, self._shaped(line)
-        found = self.stops.on_line(state, line, deceleration, asked)
-        if found is None and self.stopping:
-            return None
-        if found is not None:
-            return self._plan(found, deceleration, found.duration - PERIOD, found.end)
-        ahead = self.foresee()
-        if ahead is None:
-            return StopPlan(None, None, deceleration is not None, None, None)
-        found, _ = self.stops.under(ahead, state, line, deceleration)
-        if found is None:
-            return self._plan(None, deceleration, (len(ahead) - 2) * PERIOD, ahead[-1])
-        return self._plan(found, deceleration, found.duration - PERIOD, found.end)
-
-    def _plan(
-        self, stop: Stop | LineStop | None, wanted: float | None, duration: float, end: Floats
-    ) -> StopPlan:
-        kept = None if stop is None else stop.acceleration
-        way = float(np.abs(end - self.position).max())
-        return StopPlan(stop, kept, wanted is not None and kept != wanted, max(duration, 0.0), way)
-
-    def _shaped(self, line: Line) -> Line:
-        """What is known of a line after the filter."""
-        if self.stopping:
-            return line
-        peak = self._filter.peak
-        known = peak == 1.0 and not self._filter.fading
-        return Line(line.direction, peak * line.braking, line.steady if known else 0.0)
-
-    def stop(
-        self,
-        deceleration: float | None,
-        *,
-        clear: Callable[[Stop], bool] = _anywhere,
-        otherwise: Callable[[], Stop] | None = None,
-        asked: Floats | None = None,
-    ) -> StopPlan | None:
-        """Come to rest as soon as is permitted: past the filter, nothing in the delay line plays on.
-
-        A motion stays on its way, never further along it than if it had not been stopped, and rests no later.
-        Where no stop does that within the torque, the motion runs out through the filter.
-
-        Args:
-            deceleration: Wanted limit [rad/s^2]; None for what the torque allows.
-            clear: Whether nothing meets on the way of a stop that leaves the way of the motion, as that of a stream.
-            otherwise: A stop for where none is clear and keeps the torque; None for the hardest.
-            asked: Largest torques that the motion itself would ask from now on [N m]; None where not known.
-
-        Returns:
-            What is done; None where a stop under way is as hard already, and goes on.
-        """
-        wanted = math.inf if deceleration is None else deceleration
-        if (self.stopping or self.running_out) and wanted <= self._deceleration:
-            return None
-        plan = self.plan_stop(deceleration, clear=clear, otherwise=otherwise, asked=asked)
-        self._deceleration = wanted
-        if plan is None:
-            return None
-        if plan.trajectory is None:
-            self.running_out = True
-        else:
-            self._bypass(plan.trajectory)
-        return plan
-
-    def brake(self, trajectory: Trajectory) -> None:
-        """Follow the arm while its brakes bring it to rest, past the filter."""
-        self._bypass(trajectory)
-        self._deceleration = math.inf
-
-    def _bypass(self, trajectory: Trajectory) -> None:
-        self.start(trajectory)
-        self._filter.cut()
+        self.start(stop)
+        self.line_filter.cut()
         self.stopping, self.running_out = True, False
 
     def reset(self, q: Floats, *, carried: Payload | None = None, seed: int = 0) -> None:
@@ -331,7 +216,7 @@ class ControlCycle:
         self.trajectory, self.reference = Rest(q), q
         self.at_rest, self.stopping, self.running_out, self.guard = True, False, False, None
         self.inverse_dynamics.settle()
-        self._filter.begin(self.tvist, q)
+        self.line_filter.begin(self.tvist, q)
         self._differentiator.reset(q)
         self._joint_controllers.reset()
         still = np.zeros_like(q)
@@ -344,8 +229,13 @@ class ControlCycle:
         self.inverse_dynamics.declare(payload)
 
 
-def _rests(reference: Floats, target: Target) -> bool:
-    """Whether a shaped reference rests on its reference, by the target that was made of it."""
+def rests(reference: Floats, target: Target) -> bool:
+    """Whether a shaped reference rests on its reference, by the target that was made of it.
+
+    Args:
+        reference: Before shaping, shape (n,) [rad].
+        target: That was made of it.
+    """
     # What central differences make of q*ᵢ - q*ᵢ₋₁.
     step = PERIOD * (target.qd - 0.5 * PERIOD * target.qdd)
     return bool(max(np.abs(step).max(), np.abs(reference - target.q).max()) <= STILL)

@@ -18,12 +18,13 @@ from tvist_protocol.values import ResetMode
 from tvist_server.brakes import brake
 from tvist_server.collision import CLEARANCE, CollisionModel, Meeting
 from tvist_server.control.differentiator import Floats
-from tvist_server.cycle import ControlCycle, Sample
+from tvist_server.cycle import STILL, ControlCycle, Sample
+from tvist_server.outlook import Outlook
 from tvist_server.overload import Overload
 from tvist_server.refusal import RefusalError, out_of_turn
 from tvist_server.safety import REDUCED_SHARE, acceleration_on_way, largest_torque, torque_to_come
 from tvist_server.safety_system import Emergency, Latched, SafetySystem
-from tvist_server.stops import STILL, StopPlan
+from tvist_server.stops import StopPlan
 from tvist_server.trajectory import DoubleS, Limits, SetpointStream
 from tvist_server.way_ahead import WayAhead
 from tvist_shaping.base import Filter
@@ -91,7 +92,8 @@ class MotionControl:
         self.safety = SafetySystem()
         """What the safety system allows."""
         self._emit = emit
-        self._ahead = WayAhead(cycle, collisions)
+        self._outlook = Outlook(cycle)
+        self._ahead = WayAhead(cycle, self._outlook, collisions)
         limits = cycle.description.limits
         self._overload = Overload(limits.torque)
         self._reduced_velocity = REDUCED_SHARE * min(limits.velocity)
@@ -161,7 +163,7 @@ class MotionControl:
         )
         if (most <= allowed).all():
             return
-        ahead = cycle.foresee()
+        ahead = self._outlook.foresee()
         if ahead is None:
             return
         most = torque_to_come(cycle.inverse_dynamics, ahead, PERIOD)[0]
@@ -319,7 +321,7 @@ class MotionControl:
             stop = brake(cycle.description, cycle.arm.payload, cycle.newest, PERIOD)
             way = float(np.abs(stop.end - cycle.position).max())
             plan = replace(plan, duration=stop.duration, way=way)
-            cycle.brake(stop)
+            self._outlook.brake(stop)
         self._tell_end(plan, why, None, "safety_stop", 0)
 
     def restart_safety(self) -> None:

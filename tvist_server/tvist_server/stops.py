@@ -20,16 +20,8 @@ HARDER = 1.05
 may brake a little harder than its reference [-]."""
 COUNTED = 0.9
 """Share of the present velocity that a motion is counted on to keep until it brakes [-]."""
-STILL = 1e-7
-"""A reference that moves less than this between two ticks is at rest [rad]."""
 ROUNDING = 1e-12
 """Difference of two positions that is none [rad]."""
-
-
-def resting_after(ahead: Floats) -> int:
-    """Index of the last of some references, one a tick and of shape (k, n), that has moved; 0: none has."""
-    moves = np.flatnonzero(np.abs(np.diff(ahead, axis=0)).max(axis=1) > STILL)
-    return int(moves[-1]) + 1 if len(moves) else 0
 
 
 @dataclass(frozen=True)
@@ -64,7 +56,7 @@ class StopPlanner:
         self._highest, self._jerk = min(limits.acceleration), min(limits.jerk)
 
     def on_line(
-        self, state: Target, line: Line, wanted: float | None, asked: Floats | None = None
+        self, state: Target, line: Line, wanted: float | None
     ) -> LineStop | None:
         """The quickest stop along the line of a motion that is certain to be permitted.
 
@@ -75,7 +67,6 @@ class StopPlanner:
             state: A tick before the newest shaped reference.
             line: What is known of the motion.
             wanted: Deceleration asked for [rad/s^2]; None for as much as possible.
-            asked: Largest torques that the motion itself would ask from now on [N m]; None where not known.
 
         Returns:
             None where none is certain, or the motion is about to rest by itself.
@@ -90,36 +81,35 @@ class StopPlanner:
         def permitted(stop: LineStop) -> bool:
             return stop.acceleration >= HARDER * line.braking or stop.duration <= in_time
 
-        return self._quickest_on_line(state, line, wanted, asked, permitted)
+        return self._quickest_on_line(state, line, wanted, None, permitted)
 
     def under(
-        self, ahead: Floats, state: Target, line: Line, wanted: float | None
-    ) -> tuple[LineStop | None, Floats]:
+        self, ahead: Floats, rests: int, state: Target, line: Line, wanted: float | None
+    ) -> LineStop | None:
         """The quickest stop along the line of a motion whose rest is known.
 
         Args:
             ahead: The two shaped references played last, and those to come until it rests, one a tick, shape
                 (k, n) [rad].
+            rests: Index of the last of them that moves.
             state: As in `on_line`.
             line: As in `on_line`.
             wanted: As in `on_line`.
 
         Returns:
-            The stop, None where none is permitted but to let the motion run out; largest torques that the motion
-            itself would ask, shape (n,) [N m].
+            None where none is permitted but to let the motion run out.
         """
         asked = torque_to_come(self._dynamics, ahead, self._period)[0]
         leading = int(np.argmax(np.abs(line.direction)))
         along = (ahead[2:, leading] - state.q[leading]) * np.sign(line.direction[leading])
-        last = resting_after(ahead)
 
         def permitted(stop: LineStop) -> bool:
-            if math.ceil(stop.duration / self._period) > last:
+            if math.ceil(stop.duration / self._period) > rests:
                 return False
             shares = (stop.share((number + 2) * self._period) for number in range(len(along)))
             return all(share <= limit + ROUNDING for share, limit in zip(shares, along.tolist(), strict=True))
 
-        return self._quickest_on_line(state, line, wanted, asked, permitted), asked
+        return self._quickest_on_line(state, line, wanted, asked, permitted)
 
     def by_joints(
         self, state: Target, wanted: float | None, clear: Callable[[Stop], bool]

@@ -9,8 +9,9 @@ from tvist_server.collision import CollisionModel, Meeting
 from tvist_server.control.differentiator import Floats
 from tvist_server.cycle import ControlCycle
 from tvist_server.look_ahead import LookAhead
+from tvist_server.outlook import Outlook, resting_after
 from tvist_server.safety import TorqueRoom
-from tvist_server.stops import StopPlan, resting_after
+from tvist_server.stops import StopPlan
 from tvist_server.trajectory import DoubleS, LineStop, SetpointStream, Stop
 from tvist_shaping.base import Filter
 
@@ -20,16 +21,18 @@ class WayAhead:
 
     Args:
         cycle: The control line.
+        outlook: On it.
         collisions: Where the arm would meet something.
     """
 
-    def __init__(self, cycle: ControlCycle, collisions: CollisionModel) -> None:
+    def __init__(self, cycle: ControlCycle, outlook: Outlook, collisions: CollisionModel) -> None:
         self._cycle, self._collisions = cycle, collisions
+        self._outlook = outlook
         room = TorqueRoom(cycle.description, cycle.inverse_dynamics)
         self._guard = LookAhead(
             collisions,
             room.acceleration,
-            lambda state, clear: cycle.stops.by_joints(state, None, clear),
+            lambda state, clear: outlook.stops.by_joints(state, None, clear),
             jerk=min(cycle.description.limits.jerk),
             period=PERIOD,
         )
@@ -45,11 +48,13 @@ class WayAhead:
         self._cycle.guard = self._guard
 
     def stop(self, deceleration: float | None) -> StopPlan | None:
-        """Stop as soon as is permitted; as `ControlCycle.stop`."""
+        """Stop as soon as is permitted; as `Outlook.stop`."""
         cycle = self._cycle
         if cycle.guard is None:
-            return cycle.stop(deceleration)
-        return cycle.stop(deceleration, clear=self._guard.clear, otherwise=self._guard.fallback)
+            return self._outlook.stop(deceleration)
+        return self._outlook.stop(
+            deceleration, clear=self._guard.clear, otherwise=self._guard.fallback
+        )
 
     def until_rest(self, plan: StopPlan | None = None) -> tuple[float | None, float | None]:
         """How long it takes until the shaped reference rests [s], and how far the joint that turns most turns [rad].
@@ -62,7 +67,7 @@ class WayAhead:
         """
         if plan is not None:
             return plan.duration, plan.way
-        ahead = self._cycle.foresee()
+        ahead = self._outlook.foresee()
         if ahead is None:
             return None, None
         last = resting_after(ahead)
@@ -76,7 +81,7 @@ class WayAhead:
         """
         if self._tail_is_spacious(end):
             return None
-        return self._on(self._cycle.foresee(trajectory=end))
+        return self._on(self._outlook.foresee(trajectory=end))
 
     def rest_of_way(self, tvist: Filter | None) -> Meeting | None:
         """What would meet on the rest of what moves; of a stream, in the quickest stop from here.
@@ -89,7 +94,7 @@ class WayAhead:
             return None
         trajectory = cycle.trajectory
         if isinstance(trajectory, SetpointStream) and not cycle.stopping:
-            stop = cycle.stops.by_joints(cycle.newest, None, self._guard.clear)
+            stop = self._outlook.stops.by_joints(cycle.newest, None, self._guard.clear)
             if stop is None:
                 return self._guard.met
             self._guard.take(cycle.newest, stop)
@@ -100,7 +105,7 @@ class WayAhead:
         if isinstance(trajectory, LineStop):
             found = collisions.on_line(cycle.position, trajectory.end)
             return None if found is None else found[1]
-        return self._on(cycle.foresee(None if tvist is None else tvist.fork()))
+        return self._on(self._outlook.foresee(tvist))
 
     def _tail_is_spacious(self, end: Stop) -> bool:
         """Whether there is room for whatever a filter makes of the references that it may still read."""
@@ -108,7 +113,7 @@ class WayAhead:
         if cycle.tvist.peak > 1.0:
             return False
         q = cycle.position
-        window = np.abs(cycle.window() - q).max(axis=0)
+        window = np.abs(cycle.line_filter.window() - q).max(axis=0)
         _, qd, qdd = end.at(0.0)
         return self._guard.is_spacious(q, window + self._guard.turned(qd, qdd, end.acceleration, end.jerk))
 

@@ -14,8 +14,7 @@ from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import PERIOD, Plant
 from tvist_server.control.differentiator import Target
-from tvist_server.cycle import ControlCycle
-from tvist_server.stops import STILL
+from tvist_server.cycle import STILL, ControlCycle
 from tvist_server.trajectory import DoubleS, Limits, Trajectory
 from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.fixed import Fixed

@@ -9,7 +9,7 @@ import numpy as np
 from tvist_lab.evaluation.line import LONGEST
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
-from tvist_server.stops import STILL
+from tvist_server.cycle import STILL
 
 WATCHED = 0.5
 """Time for which a shaped reference that has ended is watched for a tail [s]."""

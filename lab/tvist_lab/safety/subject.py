@@ -17,8 +17,7 @@ from tvist_server.calibrations import load
 from tvist_server.collision import CollisionModel
 from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.controller import Controller
-from tvist_server.cycle import ControlCycle
-from tvist_server.stops import STILL
+from tvist_server.cycle import STILL, ControlCycle
 from tvist_server.setup import Setup, body, paper_payload
 
 CLIENT = "searcher"

@@ -1,0 +1,161 @@
+"""What the control line is going to do, and the quickest way to end it."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from tvist_plant.plant import PERIOD
+from tvist_server.control.differentiator import Floats
+from tvist_server.cycle import STILL, ControlCycle, rests
+from tvist_server.stops import StopPlan, StopPlanner
+from tvist_server.trajectory import Line, LineStop, Stop, Trajectory
+from tvist_shaping.base import Filter
+
+MOST_AHEAD = 4000
+"""Ticks that a motion is run ahead at most to see how it will end."""
+
+
+def _anywhere(_: Stop) -> bool:
+    return True
+
+
+class Outlook:
+    """Looks ahead on a control line, and stops it.
+
+    Args:
+        cycle: The control line.
+    """
+
+    def __init__(self, cycle: ControlCycle) -> None:
+        self._cycle = cycle
+        self.stops = StopPlanner(cycle.description, cycle.inverse_dynamics, PERIOD)
+        """Plans stops."""
+        self._wanted = math.inf
+
+    def foresee(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Floats | None:
+        """Run the references ahead: what they will be if nothing is commanded.
+
+        Args:
+            tvist: A filter to change to now; None for no change.
+            trajectory: One to follow from now on; None for the present one.
+
+        Returns:
+            The two shaped references played last and those to come until they rest, one a tick, shape (k, n) [rad];
+            None where that takes more than `MOST_AHEAD` ticks.
+        """
+        stopping = self._cycle.stopping
+        present, line_filter, differentiator = self._cycle.fork()
+        trajectory = present if trajectory is None else trajectory.fork()
+        if tvist is not None and not stopping:
+            line_filter.use(tvist.fork())
+        ahead = [differentiator.published.q, differentiator.newest.q]
+        for _ in range(MOST_AHEAD):
+            reference = trajectory.next()
+            shaped = reference if stopping else line_filter.filter(reference)
+            target = differentiator.update(shaped)
+            ahead.append(shaped)
+            if trajectory.standing and not line_filter.fading and rests(reference, target):
+                return np.array(ahead)
+        return None
+
+    def stop(
+        self,
+        deceleration: float | None,
+        *,
+        clear: Callable[[Stop], bool] = _anywhere,
+        otherwise: Callable[[], Stop] | None = None,
+    ) -> StopPlan | None:
+        """Come to rest as soon as is permitted.
+
+        A motion stays on its way, never further along it than if it had not been stopped, and rests no later.
+        Where no stop does that within the torque, the motion runs out through the filter.
+
+        Args:
+            deceleration: Wanted limit [rad/s^2]; None for what the torque allows.
+            clear: Whether nothing meets on the way of a stop that leaves the way of the motion, as that of a stream.
+            otherwise: A stop for where none is clear and keeps the torque; None for the hardest.
+
+        Returns:
+            What is done; None where a stop under way is as quick already, and goes on.
+        """
+        cycle, wanted = self._cycle, math.inf if deceleration is None else deceleration
+        if (cycle.stopping or cycle.running_out) and wanted <= self._wanted:
+            return None
+        plan = self.plan_stop(deceleration, clear=clear, otherwise=otherwise)
+        self._wanted = wanted
+        if plan is None:
+            return None
+        if plan.trajectory is None:
+            cycle.run_out()
+        else:
+            cycle.bypass(plan.trajectory)
+        return plan
+
+    def brake(self, trajectory: Trajectory) -> None:
+        """Follow the arm while its brakes bring it to rest; no stop takes their place."""
+        self._cycle.bypass(trajectory)
+        self._wanted = math.inf
+
+    def plan_stop(
+        self,
+        deceleration: float | None,
+        *,
+        clear: Callable[[Stop], bool] = _anywhere,
+        otherwise: Callable[[], Stop] | None = None,
+    ) -> StopPlan | None:
+        """The quickest permitted stop from here; as `stop`, but nothing is done."""
+        line = self._cycle.trajectory.line
+        if line is None:
+            return self._by_joints(deceleration, clear, otherwise)
+        return self._on_line(line, deceleration)
+
+    def _by_joints(
+        self, deceleration: float | None, clear: Callable[[Stop], bool], otherwise: Callable[[], Stop] | None
+    ) -> StopPlan | None:
+        cycle, present = self._cycle, self._cycle.trajectory
+        stop = self.stops.by_joints(cycle.newest, deceleration, clear)
+        if cycle.stopping and (
+            stop is None or (isinstance(present, Stop) and stop.acceleration <= present.acceleration)
+        ):
+            return None
+        if stop is None:
+            stop = self.stops.hardest(cycle.newest) if otherwise is None else otherwise()
+        return self._plan(stop, deceleration, stop.duration, stop.end)
+
+    def _on_line(self, line: Line, deceleration: float | None) -> StopPlan | None:
+        cycle, line = self._cycle, self._shaped(line)
+        stop = self.stops.on_line(cycle.published, line, deceleration)
+        if stop is None:
+            if cycle.stopping:
+                return None
+            ahead = self.foresee()
+            if ahead is None:
+                return StopPlan(None, None, deceleration is not None, None, None)
+            last = resting_after(ahead)
+            stop = self.stops.under(ahead, last, cycle.published, line, deceleration)
+            if stop is None:
+                return self._plan(None, deceleration, (last - 1) * PERIOD, ahead[-1])
+        return self._plan(stop, deceleration, stop.duration - PERIOD, stop.end)
+
+    def _plan(
+        self, stop: Stop | LineStop | None, wanted: float | None, duration: float, end: Floats
+    ) -> StopPlan:
+        kept = None if stop is None else stop.acceleration
+        way = float(np.abs(end - self._cycle.position).max())
+        return StopPlan(stop, kept, wanted is not None and kept != wanted, max(duration, 0.0), way)
+
+    def _shaped(self, line: Line) -> Line:
+        """What is known of a line after the filter."""
+        cycle = self._cycle
+        if cycle.stopping:
+            return line
+        peak = cycle.line_filter.peak
+        known = peak == 1.0 and not cycle.line_filter.fading
+        return Line(line.direction, peak * line.braking, line.steady if known else 0.0)
+
+
+def resting_after(ahead: Floats) -> int:
+    """Index of the last of some references, one a tick and of shape (k, n), that has moved; 0: none has."""
+    moves = np.flatnonzero(np.abs(np.diff(ahead, axis=0)).max(axis=1) > STILL)
+    return int(moves[-1]) + 1 if len(moves) else 0
