@@ -1,5 +1,6 @@
 """What every filter is: a delay line, an estimator, and weights that follow the modes."""
 
+import copy
 from abc import ABC, abstractmethod
 from typing import Self
 
@@ -121,6 +122,24 @@ class Filter(ABC):
         self._line.push(q_ref)
         self._weigh()
         return self._q_star.copy()
+
+    def fork(self) -> Self:
+        """An independent copy that goes on from here.
+
+        For the same samples it gives the same bits as this filter, and whatever it is given changes nothing here:
+        so one can run ahead to see what this one is going to do.
+
+        Returns:
+            The copy, with an estimator of its own; use it in the thread of the original.
+        """
+        other = copy.copy(self)
+        other._part()  # noqa: SLF001  one of its own kind
+        return other
+
+    def _part(self) -> None:
+        """Replace what is changed in place by copies: a new copy of the filter shares it still."""
+        self.estimator, self._line = self.estimator.fork(), self._line.fork()
+        self._q_star = self._q_star.copy()
 
     def take_over(self, other: "Filter") -> None:
         """Go on where another filter is: with the reference it was given, from the shaped one it gave.

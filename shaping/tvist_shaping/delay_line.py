@@ -6,6 +6,9 @@ delay may change every tick without a transient, and it reproduces cubics exactl
 fractional delays is Laakso et al., 1996).
 """
 
+import copy
+from typing import Self
+
 import numpy as np
 import numpy.typing as npt
 
@@ -151,6 +154,12 @@ class DelayLine:
         self._buffer[:kept] = samples
         self._newest = kept - 1
 
+    def fork(self) -> Self:
+        """An independent copy that holds the same samples."""
+        other = copy.copy(self)
+        other._part()  # noqa: SLF001  one of its own kind
+        return other
+
     def gather(self, A: Floats, delays: Floats, out: Floats) -> None:
         """Convolve the reference with impulses, eq. (10) of the paper.
 
@@ -172,6 +181,9 @@ class DelayLine:
         refused = gather(self._buffer, self._newest, A, delays, self._first, out)
         if refused >= 0:
             raise DelayError(float(delays[refused]), self.max_delay)
+
+    def _part(self) -> None:
+        self._buffer, self._first = self._buffer.copy(), np.empty_like(self._first)
 
     def _sample(self, q: npt.ArrayLike) -> Floats:
         sample = np.asarray(q, dtype=float)

@@ -12,7 +12,9 @@ room that the motion leaves, and no faster than it could be stopped again if the
 jerk limit. Where there is no room it waits; where the reference rests, o and n agree and nothing is left to fade.
 """
 
+import copy
 import math
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -187,6 +189,15 @@ class Fade:
     def finished(self) -> bool:
         """Whether the output is the new filter's, from the last one on."""
         return self.share == 1.0
+
+    def fork(self) -> Self:
+        """An independent copy that goes on from here, with copies of both filters; see `Filter.fork`."""
+        other = copy.copy(self)
+        other.old, other.new = self.old.fork(), self.new.fork()
+        if self.new.estimator is self.old.estimator:  # one that both ask remembers what either asked
+            other.new.estimator = other.old.estimator
+        other._history = self._history.copy()  # noqa: SLF001  one of its own kind
+        return other
 
     def filter(self, q_ref: npt.ArrayLike) -> Floats:
         """Shape one sample.

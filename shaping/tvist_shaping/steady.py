@@ -9,6 +9,7 @@ Taps are designed every few ticks and averaged, three running means one after th
 kinks; the mean of tap vectors of one sum and one mean delay has these, too.
 """
 
+import copy
 import math
 from abc import ABC, abstractmethod
 from typing import Self
@@ -47,6 +48,10 @@ class Design(ABC):
     @abstractmethod
     def copy(self) -> "Design":
         """The same for another filter: a design may remember what it gave last."""
+
+    @abstractmethod
+    def fork(self) -> Self:
+        """The same for another filter, with all that this one remembers: it goes on from here."""
 
     @abstractmethod
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
@@ -97,6 +102,10 @@ class ProductDesign(Design):
     def copy(self) -> "ProductDesign":
         """The same."""
         return ProductDesign(self.mean_delay, modes=self.modes, longest=self._longest, period=self.period)
+
+    def fork(self) -> Self:
+        """Itself: it remembers nothing."""
+        return self
 
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
         """As `go_on`: nothing is carried over."""
@@ -150,6 +159,12 @@ class ShortDesign(Design):
         """The same, from cold."""
         return ShortDesign(self.mean_delay, wanted=self.wanted, period=self.period, name=self.name)
 
+    def fork(self) -> Self:
+        """A copy with the present length and the present solution of the programme."""
+        other = copy.copy(self)
+        other._part()  # noqa: SLF001  one of its own kind
+        return other
+
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
         """Taps of the shortest length at which no more remains than may; as `go_on`."""
         shortest, longest = self.wanted.shortest, self.wanted.longest
@@ -173,6 +188,10 @@ class ShortDesign(Design):
         change = seconds * min(max(GAIN * self._excess(), -QUICKEST), QUICKEST)
         self._length = min(max(self._length + change, self.wanted.shortest), self.wanted.longest)
         return self._solved and (self._length < self.wanted.longest or self._excess() <= 0.0)
+
+    def _part(self) -> None:
+        self._dual, self._found, self._remains = self._dual.copy(), self._found.copy(), self._remains.copy()
+        self._rows, self._hessian = np.empty_like(self._rows), np.empty_like(self._hessian)
 
     def _solve(self, f_d: Floats, zeta: Floats, taps: Floats) -> None:
         """New taps; where none are found the old ones stand, whose mean delay is the right one."""
@@ -247,6 +266,12 @@ class SteadyFilter(Filter):
         other = type(self)(self.design.copy(), estimator, joints=self.joints, smooth=self._smooth)
         other.take_over(self)
         return other
+
+    def _part(self) -> None:
+        super()._part()
+        self.design = self.design.fork()
+        self._designed, self._taps = self._designed.copy(), self._taps.copy()
+        self._past, self._sums = self._past.copy(), self._sums.copy()
 
     def _start(self) -> None:
         self.f_d, self.zeta = self.estimator.estimate(self._q_star)

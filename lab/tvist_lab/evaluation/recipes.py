@@ -47,6 +47,9 @@ class Mistaken(Estimator):
         """The other's."""
         return self._right.zeta_max
 
+    def _part(self) -> None:
+        self._right = self._right.fork()
+
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
         """Modes at a configuration; see `Estimator.estimate`."""
         f_d, zeta = self._right.estimate(q)

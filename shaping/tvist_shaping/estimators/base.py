@@ -1,6 +1,8 @@
 """What an estimator is: where the filter learns the modes of the arm from."""
 
+import copy
 from abc import ABC, abstractmethod
+from typing import Self
 
 from tvist_shaping._types import Floats
 
@@ -43,3 +45,16 @@ class Estimator(ABC):
         Returns:
             f_d [Hz] and ζ [-], each of shape (modes,). The estimator will not change them afterwards.
         """
+
+    def fork(self) -> Self:
+        """An independent copy that goes on from here: the same estimates for the same configurations.
+
+        Returns:
+            The copy. It shares what nobody changes; use it in the thread of the original.
+        """
+        other = copy.copy(self)
+        other._part()  # noqa: SLF001  one of its own kind
+        return other
+
+    def _part(self) -> None:  # noqa: B027  most estimators share nothing that changes
+        """Replace what is changed in place, arrays and other objects, by copies: a new copy shares it still."""

@@ -373,6 +373,10 @@ class Modal(Estimator):
         self._go_to(q)
         return self._poles.copy()
 
+    def _part(self) -> None:
+        self._poles, self._shapes = self._poles.copy(), self._shapes.copy()
+        self._scratch, self._q = np.empty_like(self._scratch), self._q.copy()
+
     def _go_to(self, q: Floats) -> None:
         if q.shape != self._q.shape:
             self._begin(q)

@@ -1,0 +1,213 @@
+"""A copy that runs ahead: it does what the original is going to do, and the original never learns of it."""
+
+import numpy as np
+import pytest
+
+from tvist_lab.evaluation.recipes import Mistaken
+from tvist_shaping import DelayLine, Fade, Fixed, Polynomial, TvistFilter, shaper
+from tvist_shaping.aimed import AimedFilter
+from tvist_shaping.estimators.modal import Drivetrain, Modal
+from tvist_shaping.fir import FirDesign
+from tvist_shaping.steady import ProductDesign, ShortDesign, SteadyFilter
+
+H = 0.002
+JOINTS = 2
+THREE = Drivetrain((9e3, 8e3, 5e4), (0.3, 0.2, 0.0), (150.0, 120.0, 0.0), (15.0, 15.0, 0.0), (1.0, 1.0, 5.0))
+
+
+def mass(q):
+    c, d = np.cos(q)
+    return np.array([[4 + 2 * c, 1 + c, 0.2], [1 + c, 1.5, 0.1 * d], [0.2, 0.1 * d, 0.6]])
+
+
+def fixed(modes):
+    return Fixed([6.7, 8.0, 18.0][:modes], [0.3, 0.3, 0.1][:modes])
+
+
+def polynomial(_modes):
+    return Polynomial(
+        joints=[0], basis="angles", degree=1, f_d_coefficients=[8.0, 3.0], zeta_coefficients=[0.3, -0.1],
+        f_d_range=(5.0, 17.0), zeta_range=(0.05, 0.5),
+    )  # fmt: skip
+
+
+def modal(modes):
+    return Modal(mass, THREE, modes=modes, f_d_min=5.0, zeta_max=0.6)
+
+
+def mistaken(modes):
+    return Mistaken(modal(modes), 0.1)
+
+
+ESTIMATORS = {"fixed": fixed, "polynomial": polynomial, "modal": modal, "mistaken": mistaken}
+
+
+def short(modes):
+    return ShortDesign(
+        wanted=FirDesign(*((value,) * modes for value in (0.02, 0.05, 1000.0)), shortest=0.05, longest=0.15)
+    )
+
+
+def product(modes):
+    return ProductDesign(0.09, modes=modes)
+
+
+FILTERS = {
+    "one mode": lambda make: TvistFilter(shaper("ei"), make(1), joints=JOINTS),
+    "product": lambda make: SteadyFilter(product(1), make(1), joints=JOINTS),
+    "short": lambda make: SteadyFilter(short(1), make(1), joints=JOINTS),
+    "aimed": lambda make: AimedFilter(short(1), make(1), joints=JOINTS),
+}
+EVERY = [(kind, make) for kind in FILTERS for make in ESTIMATORS]
+
+
+def path(seed, ticks):
+    """A smooth way through joint space that starts at rest at 0, shape (ticks, joints) [rad]."""
+    random = np.random.default_rng(seed)
+    t = H * np.arange(ticks)[:, None]
+    return np.cumsum(
+        random.uniform(0.5, 1.5, JOINTS) * (1.0 - np.cos(random.uniform(3, 9, JOINTS) * t)) * H, axis=0
+    )
+
+
+def said(tvist):
+    """Everything a filter says of its last tick."""
+    return [*tvist.f_d, *tvist.zeta, tvist.delay, tvist.mean_delay, tvist.clipped]
+
+
+def output(tvist, samples):
+    return np.array([tvist.filter(q) for q in samples])
+
+
+def check(make, runs, seen):
+    """Fork in the middle of a run: it repeats the original to the bit, and what it is given changes nothing there.
+
+    Args:
+        make: Makes one; equal ones run in parallel.
+        runs: Ticks before the fork, and after it.
+        seen: What it tells, as numbers.
+    """
+    whole = path(1, sum(runs))
+    before, after = whole[: runs[0]], whole[runs[0] :]
+    astray = np.random.default_rng(2).uniform(-3.0, 3.0, after.shape)
+    never, forked = make(), make()
+    output(never, before)
+    output(forked, before)
+    one, other = forked.fork(), forked.fork()
+    told = seen(forked)
+    output(other, astray)
+    assert seen(forked) == told
+    for q in after:
+        expected = never.filter(q)
+        np.testing.assert_array_equal(one.filter(q), expected)
+        np.testing.assert_array_equal(forked.filter(q), expected)
+        other.filter(q[::-1])
+        assert seen(one) == seen(forked) == seen(never)
+    # A fork of a fork, from where that one has gone.
+    np.testing.assert_array_equal(output(one.fork(), astray), output(never, astray))
+
+
+@pytest.mark.parametrize("ticks", [0, 1, 90, 402])
+@pytest.mark.parametrize(("kind", "estimator"), EVERY)
+def test_a_filter(kind, estimator, ticks):
+    check(lambda: FILTERS[kind](ESTIMATORS[estimator]), (ticks, 150), said)
+
+
+def test_a_filter_of_several_modes():
+    for make in (fixed, modal, mistaken):
+        check(lambda make=make: TvistFilter(shaper("zv"), make(2), joints=JOINTS), (200, 100), said)
+        check(lambda make=make: SteadyFilter(product(3), make(3), joints=JOINTS), (200, 100), said)
+        check(lambda make=make: SteadyFilter(short(2), make(2), joints=JOINTS), (200, 100), said)
+
+
+def test_an_aimed_filter_that_has_been_told_its_end():
+    def make():
+        tvist = AimedFilter(short(1), modal(1), joints=JOINTS)
+        tvist.aim([1.0, 0.5])
+        return tvist
+
+    check(make, (200, 200), said)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("ticks", [0, 1, 100, 400])
+def test_a_fade(estimator, ticks):
+    """In its first tick, under way, and finished; also where both filters ask one estimator."""
+
+    def make(shared):
+        old = TvistFilter(shaper("zv"), ESTIMATORS[estimator](1), joints=JOINTS)
+        own = old.estimator if shared else ESTIMATORS[estimator](1)
+        new = TvistFilter(shaper("ei"), own, joints=JOINTS)
+        return Fade(old, new, velocity=6.0, acceleration=80.0, jerk=1e4)
+
+    def seen(fade):
+        return [fade.share, fade.finished, *said(fade.old), *said(fade.new)]
+
+    shares = []
+    for shared in (False, True):
+        check(lambda shared=shared: make(shared), (ticks, 200), seen)
+        fade = make(shared)
+        output(fade, path(1, ticks))
+        shares.append(fade.share)
+        assert fade.fork().old is not fade.old
+    assert {0: 0.0, 1: 0.0, 400: 1.0}.get(ticks, shares[0]) == shares[0]
+    assert ticks != 100 or 0.0 < shares[0] < 1.0
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_an_estimator(estimator):
+    whole = path(1, 400)
+    never, forked = (ESTIMATORS[estimator](1) for _ in range(2))
+    for q in whole[:200]:
+        kept = never.estimate(q)
+        forked.estimate(q)
+    one, other = forked.fork(), forked.fork()
+    other.estimate(np.array([2.0, -9.0]))
+    assert forked.clipped == never.clipped
+    assert one.modes == never.modes
+    for q in whole[199:]:
+        kept = np.copy(never.estimate(q))
+        np.testing.assert_array_equal(one.estimate(q), kept)
+        np.testing.assert_array_equal(forked.estimate(q), kept)
+        other.estimate(q[::-1].copy())
+
+
+def test_a_modal_estimator_keeps_following_a_mode_that_is_no_longer_the_lowest():
+    """The copy follows what the original followed; one made anew takes the lowest."""
+    two = Drivetrain((9e3, 9e3), (0.3, 0.3), (150.0, 150.0), (15.0, 15.0))
+    followed = Modal(lambda x: np.diag([1.0 + x[0], 2.0]), two, modes=1)
+    for x in np.linspace(0.0, 2.0, 200):
+        followed.poles(np.array([x]))
+    further = np.array([2.001])
+    ahead, anew = followed.fork().poles(further), Modal(followed._mass_matrix, two, modes=1).poles(further)
+    assert ahead == followed.poles(further)
+    assert ahead.imag > 1.05 * anew.imag
+
+
+def test_a_delay_line():
+    line = DelayLine(JOINTS, 10)
+    samples = np.random.default_rng(0).normal(size=(40, JOINTS))
+    for q in samples[:17]:
+        line.push(q)
+    one, other = line.fork(), line.fork()
+    for q in samples[17:]:
+        other.push(-q)
+    np.testing.assert_array_equal(line.newest(10), samples[7:17])
+    for q in samples[17:]:
+        one.push(q)
+        line.push(q)
+    np.testing.assert_array_equal(one.newest(10), samples[30:])
+    np.testing.assert_array_equal(line.newest(10), samples[30:])
+
+
+def test_reset_and_taking_over_are_the_copy_s_own():
+    """Neither a reset of the copy nor a filter that goes on from it touches the original."""
+    for kind, estimator in EVERY:
+        tvist = FILTERS[kind](ESTIMATORS[estimator])
+        never = FILTERS[kind](ESTIMATORS[estimator])
+        before, after = np.split(path(1, 200), [150])
+        output(tvist, before)
+        output(never, before)
+        tvist.fork().reset([1.0, -1.0])
+        tvist.fork().with_estimator(ESTIMATORS[estimator](1)).filter([0.3, 0.4])
+        np.testing.assert_array_equal(output(tvist, after), output(never, after))
