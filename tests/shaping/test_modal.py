@@ -112,6 +112,16 @@ def test_two_modes_that_are_almost_one_stay_two_at_the_stretched_arm():
         np.testing.assert_allclose(np.sort(f_d[:2]), expected, rtol=1e-6)
 
 
+def test_a_step_away_from_where_two_modes_are_almost_one_finds_both():
+    """There the shapes turn by a right angle in one step, and Newton's first step may vanish by chance."""
+    rng = np.random.default_rng(4)
+    for away in [np.full(6, 0.01), *rng.uniform(-0.02, 0.02, (50, 6))]:
+        estimator, mass, drivetrain = arm()
+        estimator.poles(Q1)
+        found, exact = estimator.poles(Q1 + away), drivetrain.poles(mass(Q1 + away))[0][:4]
+        np.testing.assert_allclose(found[np.argsort(found.imag)], exact, rtol=1e-6)
+
+
 def test_with_the_plant_s_own_parameters_they_are_the_plant_s_modes():
     # without what the estimator leaves out: the integrator and gravity's little stiffness
     drives = msgspec.structs.replace(ROBOT.drives, integral_gain=(0.0,) * 6)

@@ -27,6 +27,8 @@ Complex = npt.NDArray[np.complex128]
 
 STEPS = 12
 """Newton steps for a mode; two or three do from one tick to the next."""
+TURNED = 0.01
+"""Square of the change of a shape, of largest entry 1, above which a step is not the last [-]."""
 CONVERGED = 1e-5
 """Newton step of a pole against its size that is the last: what is left is that squared [-]."""
 APART = 1e-7
@@ -190,9 +192,13 @@ def follow(  # noqa: C901, PLR0912 - one kernel: its branches are loops over coo
             step = shapes[k, largest] / scale
             s -= step
             turn = 1.0 / scale
+            turned = 0.0
             for i in range(L):
-                shapes[k, i] = matrix[i, L] * turn
-            if abs(step) <= CONVERGED * abs(s):
+                v = matrix[i, L] * turn
+                turned += abs(v - shapes[k, i]) ** 2
+                shapes[k, i] = v
+            # The step says nothing where the shape is another one than it was: two modes that are almost one.
+            if abs(step) <= CONVERGED * abs(s) and turned <= TURNED:
                 found = True
                 break
         if not found or s.imag <= 2.0 * np.pi * LOWEST or -s.real >= DAMPED * abs(s):
