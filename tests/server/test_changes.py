@@ -20,8 +20,8 @@ from tvist_shaping.filter import TvistFilter
 from .robots import FITTING, PAPER, POLYNOMIAL, Q1, Q2, Q3, UR5E, H, Robot, calibration, cycle, without_arm
 
 DISC = paper_payload(UR5E)
-TOLERANCE = 5e-3
-"""Share of the limits: 0.3 % was the most in 500 random motions."""
+TOLERANCE = 1e-6
+"""Share of a limit that is rounding."""
 
 
 def a_filter(random, name=None):
