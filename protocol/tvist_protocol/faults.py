@@ -43,9 +43,7 @@ FAULTS: dict[str, Fault] = {
         "the safety system finds a limit violated, category 0: the brakes close; `restart_safety` ends it"
     ),
     "fault": Fault("the safety system itself fails, category 0; `restart_safety` ends it"),
-    "normal": Fault(
-        "the safety system allows full speed again; safeguard and emergency stops are released"
-    ),
+    "normal": Fault("the safety system allows full speed again; safeguard and emergency stops are released"),
     "torque": Fault("something pushes a joint with `value` N m", ("joint", "value", "seconds")),
     "nan": Fault("the simulated arm's state becomes not a number"),
 }

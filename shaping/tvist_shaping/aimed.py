@@ -30,7 +30,7 @@ class AimedFilter(SteadyFilter):
         if q is None:
             self._start()
             return
-        self.f_d, self.zeta = self.estimator.estimate(np.asarray(q, dtype=float))
+        self.f_d, self.zeta = self.estimator.settle(np.asarray(q, dtype=float))
         done = self.design.start(self.f_d, self.zeta, self._designed)
         self.clipped = not done or self.estimator.clipped
         self._taps[:] = self._designed

@@ -59,6 +59,8 @@ class Filter(ABC):
         self.joints, self.period = joints, period
         self.excess, self.clipped = 0.0, False
         self._line = DelayLine(joints, capacity)
+        self._reach = capacity
+        """How many of the newest samples any weights may read."""
         self._q_star: Floats = np.zeros(joints)
 
     @property
@@ -152,6 +154,16 @@ class Filter(ABC):
     def window(self) -> Floats:
         """Samples of the reference that it may still read, the oldest first, shape (k, joints) [rad]."""
         return self._line.newest(self._line.capacity)
+
+    def _modes(self) -> tuple[Floats, Floats]:
+        """Modes at the last shaped reference: followed in motion, anew where any weights give the same.
+
+        Where the line holds one sample as far as weights may reach, and did a tick ago, so that the shaped reference
+        rests on it.
+        """
+        if self._line.still > self._reach:
+            return self.estimator.settle(self._q_star)
+        return self.estimator.estimate(self._q_star)
 
     def take_over(self, other: "Filter") -> None:
         """Go on where another filter is: with the reference it was given, from the shaped one it gave.

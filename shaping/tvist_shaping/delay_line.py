@@ -80,11 +80,14 @@ class DelayLine:
         joints: Entries of a sample.
         capacity: Samples held.
         max_delay: Longest delay that can be read [ticks].
+        still: How many of the newest samples are the same to the last bit, at least 1. It counts on beyond the
+            capacity.
     """
 
     joints: int
     capacity: int
     max_delay: int
+    still: int
 
     def __init__(self, joints: int, capacity: int) -> None:
         """A line filled with zeros.
@@ -106,6 +109,7 @@ class DelayLine:
         self._buffer: Floats = np.zeros((capacity, joints))
         self._first: Floats = np.zeros(joints)
         self._newest = 0
+        self.fill(self._first)
 
     def __repr__(self) -> str:
         return f"DelayLine(joints={self.joints}, capacity={self.capacity})"
@@ -119,7 +123,9 @@ class DelayLine:
         Raises:
             ShapingError: q has another shape.
         """
-        self._buffer[:] = self._sample(q)
+        sample = self._sample(q)
+        self._buffer[:] = sample
+        self.still, self._bits = self.capacity, sample.tobytes()
 
     def push(self, q: npt.ArrayLike) -> None:
         """Append the newest sample; the oldest is forgotten.
@@ -133,6 +139,9 @@ class DelayLine:
         sample = self._sample(q)
         self._newest = (self._newest + 1) % self.capacity
         self._buffer[self._newest] = sample
+        bits = sample.tobytes()  # the quickest way to compare
+        self.still = self.still + 1 if bits == self._bits else 1
+        self._bits = bits
 
     def newest(self, count: int) -> Floats:
         """The last samples, oldest first, shape (count, joints); count is at most the capacity."""
@@ -153,6 +162,14 @@ class DelayLine:
         self.fill(samples[0])
         self._buffer[:kept] = samples
         self._newest = kept - 1
+        self._bits = other._bits  # noqa: SLF001  one of its own kind
+        self.still = other.still if other.still < other.capacity else max(other.still, self.capacity)
+
+    def fork(self) -> Self:
+        """An independent copy that holds the same samples."""
+        other = copy.copy(self)
+        other._part()  # noqa: SLF001  one of its own kind
+        return other
 
     def fork(self) -> Self:
         """An independent copy that holds the same samples."""

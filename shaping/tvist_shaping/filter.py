@@ -89,6 +89,7 @@ class TvistFilter(Filter):
             )
         # One tick more than max_delay, against rounding of τ/h; the rest is what interpolation wants.
         super().__init__(shaper.name, estimator, joints, period, math.ceil(max_delay / period) + 5)
+        self._reach = math.ceil(longest / period) + 3  # the last three are interpolation's
         self.shaper = shaper
         self.max_delay = max_delay
         self.reset(self._q_star)
@@ -121,7 +122,7 @@ class TvistFilter(Filter):
 
         Args:
             shaper: Another shaper; None for the same.
-            estimator: Another estimator; None for the same.
+            estimator: Another estimator; None for a fork of the same.
 
         Returns:
             The new filter; this one is left as it is.
@@ -131,7 +132,7 @@ class TvistFilter(Filter):
         """
         changed = TvistFilter(
             self.shaper if shaper is None else shaper,
-            self.estimator if estimator is None else estimator,
+            self.estimator.fork() if estimator is None else estimator,
             joints=self.joints,
             period=self.period,
             max_delay=self.max_delay,
@@ -144,8 +145,11 @@ class TvistFilter(Filter):
         return self.replace(estimator=estimator)
 
     def _start(self) -> None:
-        """Impulses for the modes at the last shaped reference: the z⁻¹ of Figure 8."""
-        self.f_d, self.zeta = self.estimator.estimate(self._q_star)
+        self._suppress(self.estimator.settle(self._q_star))
+
+    def _suppress(self, modes: tuple[Floats, Floats]) -> None:
+        """Impulses for these modes."""
+        self.f_d, self.zeta = modes
         self.clipped = self.estimator.clipped
         trains = [
             self.shaper.function(f, z) for f, z in zip(self.f_d.tolist(), self.zeta.tolist(), strict=True)
@@ -153,6 +157,6 @@ class TvistFilter(Filter):
         self.impulses = trains[0] if len(trains) == 1 else product(trains)
 
     def _weigh(self) -> None:
-        """Impulses of this tick, and what they gather."""
-        self._start()
+        """Impulses of this tick, for the modes at the last shaped reference: the z⁻¹ of Figure 8; what they gather."""
+        self._suppress(self._modes())
         self._line.gather(self.impulses.A, self.impulses.tau / self.period, self._q_star)

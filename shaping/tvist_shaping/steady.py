@@ -241,6 +241,7 @@ class SteadyFilter(Filter):
             )  # fmt: skip
         super().__init__(design.name, estimator, joints, design.period, design.taps + 4)
         self.design, self.excess = design, EXCESS
+        self._reach = design.taps
         self._smooth = smooth
         self._delays = np.arange(design.taps, dtype=float)
         self._designed, self._taps = np.zeros((2, design.taps))
@@ -274,7 +275,7 @@ class SteadyFilter(Filter):
         self._past, self._sums = self._past.copy(), self._sums.copy()
 
     def _start(self) -> None:
-        self.f_d, self.zeta = self.estimator.estimate(self._q_star)
+        self.f_d, self.zeta = self.estimator.settle(self._q_star)
         done = self.design.start(self.f_d, self.zeta, self._designed)
         self.clipped = not done or self.estimator.clipped
         self._past[:] = self._designed
@@ -284,7 +285,7 @@ class SteadyFilter(Filter):
 
     def _weigh(self) -> None:
         if self._tick % EVERY == 0:
-            self.f_d, self.zeta = self.estimator.estimate(self._q_star)
+            self.f_d, self.zeta = self._modes()
             done = self.design.go_on(self.f_d, self.zeta, EVERY * self.period, self._designed)
             self.clipped = not done or self.estimator.clipped
         self._tick += 1

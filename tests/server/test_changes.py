@@ -9,6 +9,7 @@ from tvist_protocol.replies import Done
 from tvist_server.collision import CollisionModel
 from tvist_server.control.inverse_dynamics import SLEW, InverseDynamics
 from tvist_server.cycle import STILL
+from tvist_server.outlook import Outlook
 from tvist_server.safety import TORQUE_SHARE
 from tvist_server.setup import body, paper_payload
 from tvist_server.trajectory import Limits
@@ -16,8 +17,6 @@ from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.estimators.polynomial import Polynomial
 from tvist_shaping.filter import TvistFilter
-
-from tvist_server.outlook import Outlook
 
 from .robots import (
     FITTING,
@@ -36,8 +35,8 @@ from .robots import (
 )
 
 DISC = paper_payload(UR5E)
-TOLERANCE = 5e-3
-"""Share of the limits: 0.3 % was the most in 500 random motions."""
+TOLERANCE = 1e-6
+"""Share of a limit that is rounding."""
 
 
 def a_filter(random, name=None):

@@ -10,6 +10,7 @@ from tvist_server.trajectory import DoubleS, Limits, LineStop, Stop
 
 from .robots import PAPER, Q1, Q2, Q3, ROUNDING, UR5E, H, Robot, cycle, stop, without_arm
 
+
 def run(line, ticks):
     """Published targets of some ticks."""
     samples = [line.step() for _ in range(ticks)]
@@ -181,4 +182,7 @@ def test_a_stop_on_a_line_is_at_no_moment_ahead_of_any_motion_within_its_limits(
         assert ((stopped - ahead)[:, leading] * direction[leading]).max() <= 1e-12
         off = stopped - Q1 - ((stopped - Q1)[:, leading] / direction[leading])[:, None] * direction
         assert np.abs(off).max() < 1e-14
-        assert np.abs(np.diff(stopped, 2, axis=0)).max() / H**2 <= max(acceleration, np.abs(qdd).max()) + ROUNDING
+        assert (
+            np.abs(np.diff(stopped, 2, axis=0)).max() / H**2
+            <= max(acceleration, np.abs(qdd).max()) + ROUNDING
+        )

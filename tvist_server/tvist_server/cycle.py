@@ -239,4 +239,3 @@ def rests(reference: Floats, target: Target) -> bool:
     # What central differences make of q*ᵢ - q*ᵢ₋₁.
     step = PERIOD * (target.qd - 0.5 * PERIOD * target.qdd)
     return bool(max(np.abs(step).max(), np.abs(reference - target.q).max()) <= STILL)
-

@@ -16,7 +16,7 @@ from tvist_protocol.stream import EventKind
 from tvist_protocol.transitions import Activity, after
 from tvist_protocol.values import ResetMode
 from tvist_server.brakes import brake
-from tvist_server.collision import CLEARANCE, CollisionModel, Meeting
+from tvist_server.collision import CLEARANCE, CollisionModel
 from tvist_server.control.differentiator import Floats
 from tvist_server.cycle import STILL, ControlCycle, Sample
 from tvist_server.outlook import Outlook

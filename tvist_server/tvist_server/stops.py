@@ -55,9 +55,7 @@ class StopPlanner:
         self._torque, self._position = np.array(limits.torque), np.array(limits.position)
         self._highest, self._jerk = min(limits.acceleration), min(limits.jerk)
 
-    def on_line(
-        self, state: Target, line: Line, wanted: float | None
-    ) -> LineStop | None:
+    def on_line(self, state: Target, line: Line, wanted: float | None) -> LineStop | None:
         """The quickest stop along the line of a motion that is certain to be permitted.
 
         Never ahead of the motion, and never later at rest, is a stop that brakes harder than the motion ever will;
@@ -111,9 +109,7 @@ class StopPlanner:
 
         return self._quickest_on_line(state, line, wanted, asked, permitted)
 
-    def by_joints(
-        self, state: Target, wanted: float | None, clear: Callable[[Stop], bool]
-    ) -> Stop | None:
+    def by_joints(self, state: Target, wanted: float | None, clear: Callable[[Stop], bool]) -> Stop | None:
         """The quickest stop of every joint by itself that is clear all along and keeps the torque.
 
         Args:

@@ -52,9 +52,7 @@ class WayAhead:
         cycle = self._cycle
         if cycle.guard is None:
             return self._outlook.stop(deceleration)
-        return self._outlook.stop(
-            deceleration, clear=self._guard.clear, otherwise=self._guard.fallback
-        )
+        return self._outlook.stop(deceleration, clear=self._guard.clear, otherwise=self._guard.fallback)
 
     def until_rest(self, plan: StopPlan | None = None) -> tuple[float | None, float | None]:
         """How long it takes until the shaped reference rests [s], and how far the joint that turns most turns [rad].

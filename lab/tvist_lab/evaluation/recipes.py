@@ -52,8 +52,15 @@ class Mistaken(Estimator):
 
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
         """Modes at a configuration; see `Estimator.estimate`."""
-        f_d, zeta = self._right.estimate(q)
+        return self._wrong(self._right.estimate(q))
+
+    def settle(self, q: Floats) -> tuple[Floats, Floats]:
+        """Modes anew; see `Estimator.settle`."""
+        return self._wrong(self._right.settle(q))
+
+    def _wrong(self, modes: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         self.clipped = self._right.clipped
+        f_d, zeta = modes
         return self._factor * f_d, zeta
 
 

@@ -10,7 +10,6 @@ from tvist_lab.safety.subject import CLIENT, Subject, disc, last_move, refused, 
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import RobotDescription
 from tvist_protocol import commands as c
-from tvist_protocol.values import Payload
 from tvist_server.collision import CLEARANCE, CollisionModel
 from tvist_server.safety import TORQUE_SHARE
 from tvist_server.setup import body

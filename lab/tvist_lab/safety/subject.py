@@ -14,7 +14,6 @@ from tvist_protocol.replies import Accepted, Refused, Reply
 from tvist_protocol.stream import Event
 from tvist_protocol.values import Payload
 from tvist_server.calibrations import load
-from tvist_server.collision import CollisionModel
 from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.controller import Controller
 from tvist_server.cycle import STILL, ControlCycle
@@ -99,9 +98,7 @@ class Subject:
 
     def setpoint(self, sequence: int, q: Floats) -> None:
         """Send a set-point."""
-        self.controller.receive_setpoint(
-            c.Setpoint(token=self.token, sequence=sequence, q=tuple(q.tolist()))
-        )
+        self.controller.receive_setpoint(c.Setpoint(token=self.token, sequence=sequence, q=tuple(q.tolist())))
 
     def tick(self, count: int = 1) -> None:
         """Let time pass."""

@@ -46,6 +46,20 @@ class Estimator(ABC):
             f_d [Hz] and ζ [-], each of shape (modes,). The estimator will not change them afterwards.
         """
 
+    def settle(self, q: Floats) -> tuple[Floats, Floats]:
+        """Estimate the modes anew, where no other estimate can move anything: the arm rests, or a filter begins.
+
+        An estimator that follows its modes from one configuration to the next may take other modes here, and only
+        here: a jump would shake an arm that moves. Others estimate as ever.
+
+        Args:
+            q: As of `estimate`.
+
+        Returns:
+            As of `estimate`.
+        """
+        return self.estimate(q)
+
     def fork(self) -> Self:
         """An independent copy that goes on from here: the same estimates for the same configurations.
 

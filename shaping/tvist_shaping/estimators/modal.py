@@ -27,6 +27,8 @@ Complex = npt.NDArray[np.complex128]
 
 STEPS = 12
 """Newton steps for a mode; two or three do from one tick to the next."""
+TURNED = 0.01
+"""Square of the change of a shape, of largest entry 1, above which a step is not the last [-]."""
 CONVERGED = 1e-5
 """Newton step of a pole against its size that is the last: what is left is that squared [-]."""
 APART = 1e-7
@@ -128,9 +130,7 @@ class Drivetrain:
 
 
 @compiled
-def follow(  # noqa: C901, PLR0912 - one kernel: its branches are loops over coordinates
-    mass: Floats, rows: Floats, poles: Complex, shapes: Complex, matrix: Complex
-) -> bool:
+def follow(mass: Floats, rows: Floats, poles: Complex, shapes: Complex, scratch: Complex) -> bool:
     """Newton's method for every pole, from where it was; poles and shapes are changed in place.
 
     Args:
@@ -138,11 +138,27 @@ def follow(  # noqa: C901, PLR0912 - one kernel: its branches are loops over coo
         rows: `Drivetrain.rows`.
         poles: Shape (k,).
         shapes: Shape (k, L), largest entry 1.
-        matrix: Scratch, shape (L, L + 1).
+        scratch: Shape (L + k, L + 1).
 
     Returns:
-        Whether all converged, to poles of their own.
+        Whether all converged, to poles of their own; where not, all are left as they were.
     """
+    L = mass.shape[0]
+    before = scratch[L:]
+    before[:, 0] = poles
+    before[:, 1:] = shapes
+    if _converge(mass, rows, poles, shapes, scratch[:L]):
+        return True
+    poles[:] = before[:, 0]
+    shapes[:] = before[:, 1:]
+    return False
+
+
+@compiled
+def _converge(  # noqa: C901, PLR0912 - one kernel: its branches are loops over coordinates
+    mass: Floats, rows: Floats, poles: Complex, shapes: Complex, matrix: Complex
+) -> bool:
+    """As `follow`; where it fails, nothing of poles and shapes is of use."""
     L = mass.shape[0]
     for k in range(poles.shape[0]):
         s = poles[k]
@@ -190,9 +206,13 @@ def follow(  # noqa: C901, PLR0912 - one kernel: its branches are loops over coo
             step = shapes[k, largest] / scale
             s -= step
             turn = 1.0 / scale
+            turned = 0.0
             for i in range(L):
-                shapes[k, i] = matrix[i, L] * turn
-            if abs(step) <= CONVERGED * abs(s):
+                v = matrix[i, L] * turn
+                turned += abs(v - shapes[k, i]) ** 2
+                shapes[k, i] = v
+            # The step says nothing where the shape is another one than it was: two modes that are almost one.
+            if abs(step) <= CONVERGED * abs(s) and turned <= TURNED:
                 found = True
                 break
         if not found or s.imag <= 2.0 * np.pi * LOWEST or -s.real >= DAMPED * abs(s):
@@ -282,13 +302,14 @@ def describe(poles: Complex, f_d_min: float, zeta_max: float, f_d: Floats, zeta:
 class Modal(Estimator):
     """Lowest modes of an arm whose mass matrix is known at every configuration, followed by continuity.
 
-    A mode that was among the lowest may end above one that was not. So the lowest are taken anew, from all poles,
-    where nothing moves that a jump could shake: at the second estimate of a configuration. Likewise where q jumps, or
-    a pole is lost.
+    A mode that was among the lowest may end above one that was not. So `settle` takes the lowest anew, from all
+    poles. `estimate` does so only where q jumps as no motion does. Where a pole is lost, because it vibrates no longer
+    or meets another, `estimate` leaves all modes as they were until every one is found again.
 
     Attributes:
         drivetrain: Springs and motors.
-        clipped: Whether a mode of the last estimate was beyond `f_d_min` or `zeta_max`, and held there.
+        clipped: Whether a mode of the last estimate was beyond `f_d_min` or `zeta_max`, and held there; or one was
+            lost.
     """
 
     drivetrain: Drivetrain
@@ -329,9 +350,9 @@ class Modal(Estimator):
         self._rows = drivetrain.rows
         self._poles: Complex = np.zeros(modes, dtype=complex)
         self._shapes: Complex = np.zeros((modes, size), dtype=complex)
-        self._scratch: Complex = np.zeros((size, size + 1), dtype=complex)
+        self._scratch: Complex = np.zeros((size + modes, size + 1), dtype=complex)
         self._q: Floats = np.zeros(0)
-        self._lowest = False
+        self._lowest, self._lost = False, False
 
     def __repr__(self) -> str:
         return f"Modal(modes={self._modes}, f_d_min={self._f_d_min:g}, zeta_max={self._zeta_max:g})"
@@ -364,9 +385,23 @@ class Modal(Estimator):
             EstimatorError: q or the mass matrix does not fit, or the arm has fewer modes that vibrate at q.
         """
         self._go_to(q)
-        f_d, zeta = np.empty(self._modes), np.empty(self._modes)
-        self.clipped = describe(self._poles, self._f_d_min, self._zeta_max, f_d, zeta)
-        return f_d, zeta
+        return self._describe()
+
+    def settle(self, q: Floats) -> tuple[Floats, Floats]:
+        """The lowest modes at a configuration, whatever the last estimate was.
+
+        Args:
+            q: As of `estimate`.
+
+        Returns:
+            As of `estimate`.
+
+        Raises:
+            EstimatorError: As of `estimate`.
+        """
+        if self._lie(q) != RESTING or not self._lowest:
+            self._take_lowest(q, self._mass_matrix(q))
+        return self._describe()
 
     def poles(self, q: Floats) -> Complex:
         """Poles at a configuration [1/s], shape (modes,); as `estimate`, not held inside any range."""
@@ -377,19 +412,32 @@ class Modal(Estimator):
         self._poles, self._shapes = self._poles.copy(), self._shapes.copy()
         self._scratch, self._q = np.empty_like(self._scratch), self._q.copy()
 
-    def _go_to(self, q: Floats) -> None:
+    def _describe(self) -> tuple[Floats, Floats]:
+        f_d, zeta = np.empty(self._modes), np.empty(self._modes)
+        beyond = describe(self._poles, self._f_d_min, self._zeta_max, f_d, zeta)
+        self.clipped = beyond or self._lost
+        return f_d, zeta
+
+    def _lie(self, q: Floats) -> int:
         if q.shape != self._q.shape:
             self._begin(q)
-        how = compare(q, self._q)
-        if how == RESTING and self._lowest:
+        return compare(q, self._q)
+
+    def _go_to(self, q: Floats) -> None:
+        how = self._lie(q)
+        if how == RESTING and not self._lost:
             return
         mass = self._mass_matrix(q)
-        if how == MOVING and follow(mass, self._rows, self._poles, self._shapes, self._scratch):
-            self._lowest = False
+        if how == JUMPED:
+            self._take_lowest(q, mass)
             return
-        if not np.isfinite(mass).all():
-            self._q = np.zeros(0)
-            raise EstimatorError("mass_matrix(q)", mass.tolist(), f"finite, at q = {q.tolist()}")
+        self._lowest = False
+        self._lost = not follow(mass, self._rows, self._poles, self._shapes, self._scratch)
+        if self._lost:
+            self._check(q, mass)
+
+    def _take_lowest(self, q: Floats, mass: Floats) -> None:
+        self._check(q, mass)
         poles, shapes = self.drivetrain.poles(mass)
         if len(poles) < self._modes:
             self._q = np.zeros(0)
@@ -397,7 +445,12 @@ class Modal(Estimator):
                 "modes", self._modes, f"at most {len(poles)}: no more vibrate at {q.tolist()}"
             )
         self._poles[:], self._shapes[:] = poles[: self._modes], shapes[: self._modes]
-        self._lowest = True
+        self._lowest, self._lost = True, False
+
+    def _check(self, q: Floats, mass: Floats) -> None:
+        if not np.isfinite(mass).all():
+            self._q = np.zeros(0)
+            raise EstimatorError("mass_matrix(q)", mass.tolist(), f"finite, at q = {q.tolist()}")
 
     def _begin(self, q: Floats) -> None:
         """Check once what stays as it is, and know no last configuration."""

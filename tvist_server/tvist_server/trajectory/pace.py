@@ -81,8 +81,6 @@ class Pace:
         for velocity, acceleration in zip(qd.tolist(), own.tolist(), strict=True):
             if abs(velocity) < 1e-9:
                 continue
-            ends = sorted(
-                (sign * self.acceleration - acceleration) / velocity for sign in (-1.0, 1.0)
-            )
+            ends = sorted((sign * self.acceleration - acceleration) / velocity for sign in (-1.0, 1.0))
             lowest, highest = max(lowest, ends[0]), min(highest, ends[1])
         return lowest, highest

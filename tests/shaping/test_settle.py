@@ -1,0 +1,157 @@
+"""The lowest modes are taken anew where nothing moves and the delay line holds no motion, and nowhere else."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tvist_shaping import DelayLine, Fixed, TvistFilter, shaper
+from tvist_shaping.estimators.modal import Drivetrain, Modal
+from tvist_shaping.steady import ProductDesign, SteadyFilter
+
+H = 0.002
+TWO = Drivetrain((9e3, 9e3), (0.3, 0.3), (150.0, 150.0), (15.0, 15.0))
+SLOWEST = 4.5
+"""Below every mode of the arm [Hz]."""
+BEND = np.pi / 3
+"""Where the two modes change places [rad]."""
+
+
+def arm():
+    """One joint, two coordinates that know nothing of each other, one as heavy as the joint is bent.
+
+    The lighter one has the higher frequency: the lowest mode is one coordinate's below BEND, the other's above.
+    """
+    return Modal(lambda q: np.diag([1.0 + np.sin(q[0] / 2.0) * 2.0, 2.0]), TWO, modes=1, f_d_min=SLOWEST)
+
+
+FILTERS = {
+    **{name: lambda name=name: TvistFilter(shaper(name), arm(), joints=1) for name in ("zv", "zvd", "ei3")},
+    "product": lambda: SteadyFilter(ProductDesign(0.05, modes=1), arm(), joints=1),
+}
+
+LONGEST = {"zv": 0.5 / SLOWEST, "zvd": 1.0 / SLOWEST, "ei3": 2.0 / SLOWEST, "product": 0.26}
+"""Longest delay that may be read, whatever the mode [s]."""
+
+
+def lowest(q):
+    return arm().estimate(np.array(q, dtype=float))[0][0]
+
+
+def run(tvist, reference):
+    """Outputs, and for each the f_d it was made with."""
+    rows = [(tvist.filter([q])[0], tvist.f_d[0]) for q in reference]
+    return np.array(rows).T
+
+
+def way(start, end, seconds):
+    """A smooth way from rest to rest [rad]."""
+    s = np.linspace(0.0, 1.0, max(round(seconds / H), 2))
+    return start + (end - start) * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+
+
+def motion(random):
+    """A few ways with pauses between them, of a tick or of long, and a long rest."""
+    places = [0.0, *random.uniform(0.0, 2.5, 4)]
+    parts = [np.zeros(300)]
+    for start, end in pairwise(places):
+        parts.append(way(start, end, random.uniform(0.6, 1.5)))
+        parts.append(np.full(random.choice([0, 1, 2, 15, 40, 100, 400]), end))
+    parts.append(np.full(600, places[-1]))
+    return np.concatenate(parts)
+
+
+@settings(max_examples=25)
+@given(st.sampled_from(sorted(FILTERS)), st.integers(0, 2**32 - 1))
+def test_a_mode_jumps_only_where_the_output_stays_what_it_is_whatever_the_weights(name, seed):
+    """Wherever the frequency jumps, the reference has been one sample for as long as any delay may be."""
+    reference = motion(np.random.default_rng(seed))
+    tvist = FILTERS[name]()
+    shaped, f_d = run(tvist, reference)
+    # Followed, a mode changes by less than 4 % between estimates; exchanged, by more but near the crossing itself.
+    for tick in np.flatnonzero(np.abs(np.diff(f_d)) > 0.05 * f_d[1:]) + 1:
+        held = reference[max(tick - round(LONGEST[name] / H), 0) : tick + 1]
+        assert (held == held[0]).all()
+        assert (shaped[tick - 1 : tick + 1] == held[0]).all()
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_after_a_rest_the_lowest_mode_is_in_force_and_the_output_has_not_moved(name):
+    tvist = FILTERS[name]()
+    out = np.concatenate([way(0.0, 2.0, 0.8), np.full(900, 2.0)])
+    shaped, f_d = run(tvist, out)
+    ended = np.flatnonzero(shaped != 2.0)[-1] + 1
+    assert f_d[ended] > 1.05 * lowest([2.0])  # until then the one it started with is followed
+    assert f_d[-1] == lowest([2.0])
+    assert (shaped[ended:] == 2.0).all()
+
+
+@pytest.mark.parametrize("name", FILTERS)
+@pytest.mark.parametrize("pause", [1, 3, 20, 50])
+def test_a_pause_shorter_than_the_delays_exchanges_no_mode(name, pause):
+    """The shaped reference may repeat itself to the bit in a pause; the line holds the motion still."""
+    reference = np.concatenate([way(0.0, 2.0, 0.8), np.full(pause, 2.0), way(2.0, 1.9, 0.3)])
+    _, f_d = run(FILTERS[name](), reference)
+    assert np.abs(np.diff(f_d) / f_d[1:]).max() < 0.01
+
+
+def test_a_pause_in_which_the_shaped_reference_rests_and_an_older_sample_does_not_exchanges_no_mode():
+    """The case the others may miss: two equal outputs while a longer delay would still read the motion."""
+    tvist = FILTERS["zv"]()
+    rests = 50  # ticks: longer than zv lasts with this mode, shorter than it may get
+    assert tvist.delay < 0.95 * rests * H < 0.5 / SLOWEST
+    shaped, f_d = run(tvist, np.concatenate([way(0.0, 2.0, 0.8), np.full(rests, 2.0)]))
+    assert shaped[-1] == shaped[-2] == shaped[-3] == 2.0
+    assert f_d[-1] > 1.05 * lowest([2.0])
+    tvist.filter([2.0])
+    for _ in range(10):
+        tvist.filter([2.0])
+    assert tvist.f_d[0] == lowest([2.0])
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_a_filter_begins_with_the_lowest_mode_wherever_its_estimator_was_before(name):
+    """At a reset, and where it takes over a motion: then nothing of its output is in force yet."""
+    for begin in ("reset", "take over"):
+        tvist = FILTERS[name]()
+        run(tvist, way(0.0, 2.0, 0.8))
+        before = tvist.f_d[0]
+        if begin == "reset":
+            tvist.reset([tvist._q_star[0] + 0.001])
+        else:
+            tvist.take_over(tvist.fork())
+        assert tvist.f_d[0] == lowest(tvist._q_star) < 0.95 * before
+
+
+@pytest.mark.parametrize("capacity", [4, 9, 30])
+def test_a_line_counts_the_samples_that_are_the_same(capacity):
+    random = np.random.default_rng(capacity)
+    line, pushed, q = DelayLine(2, capacity), [], np.ones(2)
+    assert line.still >= capacity
+    for _ in range(300):
+        if random.random() < 0.1:
+            q = random.choice([0.0, 1.0, np.nextafter(1.0, 2.0)], 2)
+        line.push(q)
+        pushed.append(q)
+        same = (np.array(pushed) == q).all(axis=1)
+        whole = same.all()
+        expected = len(pushed) if whole else np.argmin(same[::-1])
+        assert line.still == expected or (whole and line.still >= capacity and (q == 0.0).all())
+        for other in (DelayLine(2, 6), DelayLine(2, 50)):
+            other.take_over(line)
+            held = other.newest(other.capacity)
+            equal = (held == q).all(axis=1)
+            assert min(other.still, other.capacity) == (
+                other.capacity if equal.all() else np.argmin(equal[::-1])
+            )
+    line.fill([3.0, 4.0])
+    assert line.still >= capacity
+    line.push([3.0, 4.0])
+    assert line.still > capacity
+
+
+def test_an_estimator_that_follows_nothing_settles_as_it_estimates():
+    fixed = Fixed([7.0], [0.1])
+    np.testing.assert_array_equal(fixed.settle(np.zeros(1)), fixed.estimate(np.zeros(1)))
