@@ -5,7 +5,7 @@ BIN := .venv/bin
 export OPENBLAS_NUM_THREADS ?= 1
 READY := .venv/.ready
 
-.PHONY: setup demo test test-all lint bench format lock schemas clean
+.PHONY: setup demo test test-all lint bench soak format lock schemas clean
 
 setup: $(READY)
 
@@ -34,6 +34,10 @@ lint: setup
 
 bench: setup
 	$(BIN)/tvist bench
+
+# Searches for hours on what `make test` tries for a minute.
+soak: setup
+	$(BIN)/tvist search --stops 2000 --streams 500 --changes 500 --sequences 3000 --flexible
 
 format: setup
 	$(BIN)/ruff check --fix

@@ -171,12 +171,6 @@ class DelayLine:
         other._part()  # noqa: SLF001  one of its own kind
         return other
 
-    def fork(self) -> Self:
-        """An independent copy that holds the same samples."""
-        other = copy.copy(self)
-        other._part()  # noqa: SLF001  one of its own kind
-        return other
-
     def gather(self, A: Floats, delays: Floats, out: Floats) -> None:
         """Convolve the reference with impulses, eq. (10) of the paper.
 

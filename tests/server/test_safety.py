@@ -49,7 +49,7 @@ def test_the_torque_stays_within_its_share_unless_the_motion_already_takes_more(
 
 @pytest.mark.parametrize("seed", range(25))
 def test_of_all_decelerations_that_keep_the_torque_the_hardest_is_taken(seed):
-    """Each harder one that is tried is asked for itself: what a hard stop does not keep a gentler one may not either."""
+    """Each is asked for itself: what a hard stop does not keep a gentler one may not, either."""
     state = Target(*map(np.array, moving(seed)))
     stop = plan(*state.__reduce__()[1])
     torque = StopTorque(InverseDynamics(UR5E, DISC), state, np.array(LIMITS.torque))

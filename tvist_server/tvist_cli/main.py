@@ -18,6 +18,7 @@ COMMANDS = {
     "identify": "Calibrate a robot from its own accelerometer.",
     "evaluate": "Shape any moves and say what it does to their vibration.",
     "shaperbench": "Judge shapers, yours too, on eight arms.",
+    "search": "Look for ways to make a robot break what it promises.",
     "bench": "Measure how fast it is on this machine.",
     "keys": "Make certificates for a robot that others may reach.",
 }

@@ -52,4 +52,5 @@ def info_of(controller: Controller) -> Info:
         shapers=shapers(),
         control=None if lease is None else lease.client,
         tick=controller.tick_number,
+        stopping=controller.stopping,
     )

@@ -9,7 +9,7 @@ from tvist_server.control.differentiator import Target
 from tvist_server.trajectory import Known
 
 HOLD = 1.25
-"""Brakes are at least so much stronger than gravity and what moves along ask for: they hold what they have stopped [-]."""
+"""Brakes are at least so much stronger than what gravity and the other joints ask for: they hold what they stop [-]."""
 LONGEST = 5.0
 """Time after which the brakes count as having stopped the arm in any case [s]."""
 

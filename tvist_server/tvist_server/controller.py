@@ -5,12 +5,14 @@ It owns a `Session` (who may) and a `ControlCycle` (what moves), which do not kn
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from tvist_plant.plant import PERIOD, PlantError
 from tvist_protocol import commands as c
+from tvist_protocol.info import Stopping
 from tvist_protocol.io import Io, SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Accepted, Code, Done, Refused, Reply
@@ -25,8 +27,10 @@ from tvist_server.payload_monitor import PayloadMonitor
 from tvist_server.peripherals import Peripherals
 from tvist_server.refusal import RefusalError, check_body, check_joints, check_motion
 from tvist_server.reporting import Reporter
+from tvist_server.safety_control import SafetyControl
 from tvist_server.session import NoControlError, Session
 from tvist_server.setup import Setup, body
+from tvist_server.stopping import stopping
 from tvist_server.trajectory import Limits
 
 
@@ -73,7 +77,8 @@ class Controller:
         self._seed = setup.seed
         collisions = CollisionModel(setup.description, body(setup.payload))
         self.motion = MotionControl(self.cycle, collisions, self._emit, setup.mode)
-        self._faults = Faults(self.motion)
+        self.safety = SafetyControl(self.motion, self._emit)
+        self._faults = Faults(self.motion, self.safety)
         self._payload_monitor = PayloadMonitor(setup.description, body(setup.payload))
         self.peripherals = Peripherals()
         self._io_changed = True
@@ -83,6 +88,11 @@ class Controller:
     def now(self) -> float:
         """Time of the present tick [s]; it passes by ticks alone."""
         return self.tick_number * PERIOD
+
+    @cached_property
+    def stopping(self) -> list[Stopping]:
+        """How long stops last and how far they go."""
+        return stopping(self.setup.description)
 
     # ------------------------------------------------------------------ what comes in
 
@@ -274,6 +284,7 @@ class Controller:
         """Bring the motion to a standstill on its way."""
         self._authorize(command.token)
         self.motion.pause()
+        self.safety.stay_paused()
         return Done()
 
     def resume(self, command: c.Resume) -> Reply:
@@ -339,7 +350,7 @@ class Controller:
     def restart_safety(self, command: c.RestartSafety) -> Reply:
         """Restart the safety system."""
         self._authorize(command.token)
-        self.motion.restart_safety()
+        self.motion.safety.restart()
         return Done()
 
     def set_shaper(self, command: c.SetShaper) -> Reply:

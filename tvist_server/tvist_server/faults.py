@@ -11,6 +11,8 @@ from tvist_protocol.commands import SimulationInject
 from tvist_protocol.faults import FAULTS
 from tvist_server.motion import MotionControl
 from tvist_server.refusal import RefusalError
+from tvist_server.safety_control import SafetyControl
+from tvist_server.safety_system import Emergency
 
 
 class Faults:
@@ -18,10 +20,19 @@ class Faults:
 
     Args:
         motion: What they happen to.
+        safety: Its safety system.
     """
 
-    def __init__(self, motion: MotionControl) -> None:
-        self._motion = motion
+    def __init__(self, motion: MotionControl, safety: SafetyControl) -> None:
+        self._motion, self._safety = motion, safety
+        self._momentary: dict[str, Callable[[], None]] = {
+            "protective_stop": lambda: motion.protect("a protective stop was injected"),
+            "normal": safety.release,
+            "power_loss": lambda: safety.cut_power("a loss of power was injected"),
+            "violation": lambda: safety.cut_power("the safety system found a violation", "violation"),
+            "fault": lambda: safety.cut_power("the safety system failed", "fault"),
+            "nan": lambda: motion.cycle.arm.spoil(),  # noqa: PLW0108  the line may get another arm
+        }
         self._push = np.zeros(motion.cycle.description.joints)
         self._ends: list[tuple[int, int, Callable[[], None]]] = []
         self._number = count()
@@ -37,34 +48,25 @@ class Faults:
             RefusalError: There is none of that name, a field it needs is missing, or one it has not is there.
         """
         _check(command, self._motion.cycle.description.joints)
-        motion, ticks = self._motion, None if command.seconds is None else round(command.seconds / PERIOD)
+        ticks = None if command.seconds is None else round(command.seconds / PERIOD)
+        safety = self._safety
         match command.fault:
-            case "protective_stop":
-                motion.protect("a protective stop was injected")
             case "reduced":
-                motion.reduce(reduced=True)
-                self._release(tick, ticks, lambda: motion.reduce(reduced=False))
+                safety.reduce(reduced=True)
+                self._release(tick, ticks, lambda: safety.reduce(reduced=False))
             case "safeguard_stop":
-                motion.safeguard(stopped=True)
-                self._release(tick, ticks, lambda: motion.safeguard(stopped=False))
-            case "emergency_stop":
-                motion.emergency("robot")
-                self._release(tick, ticks, lambda: motion.end_emergency("robot"))
-            case "system_emergency_stop":
-                motion.emergency("system")
-                self._release(tick, ticks, lambda: motion.end_emergency("system"))
-            case "normal":
-                motion.release()
-            case "power_loss":
-                motion.cut_power("a loss of power was injected")
-            case "violation" | "fault" as found:
-                motion.cut_power(f"a {found} of the safety system was injected", found)
-            case "nan":
-                motion.cycle.arm.spoil()
+                safety.safeguard(stopped=True)
+                self._release(tick, ticks, lambda: safety.safeguard(stopped=False))
+            case "emergency_stop" | "system_emergency_stop":
+                whose: Emergency = "robot" if command.fault == "emergency_stop" else "system"
+                safety.emergency(whose)
+                self._release(tick, ticks, lambda: safety.end_emergency(whose))
             case "torque":
                 joint, value = command.joint or 0, command.value or 0.0
                 self._add(joint, value)
                 self._at(tick + (ticks or 0), lambda: self._add(joint, -value))
+            case name:
+                self._momentary[name]()
 
     def end(self, tick: int) -> None:
         """End those that are over before a tick."""

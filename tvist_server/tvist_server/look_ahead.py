@@ -28,6 +28,7 @@ class LookAhead:
         gentle: From position [rad] and velocity [rad/s] to an acceleration that the torque allows there in every
             direction [rad/s^2].
         quickest: The quickest stop from a state that is clear, by what it is given to tell; None where there is none.
+        highest: Acceleration that no stop exceeds [rad/s^2].
         jerk: Of stops [rad/s^3].
         period: Tick [s].
     """
@@ -38,12 +39,13 @@ class LookAhead:
         gentle: Callable[[Floats, Floats], float],
         quickest: Callable[[Target, Callable[[Stop], bool]], Stop | None],
         *,
+        highest: float,
         jerk: float,
         period: float,
     ) -> None:
         self._collisions = collisions
         self._gentle, self._quickest = gentle, quickest
-        self._jerk, self._period = jerk, period
+        self._highest, self._jerk, self._period = highest, jerk, period
         self._centre: Floats | None = None
         self._room = 0.0
         self._carried = collisions.carried
@@ -103,7 +105,7 @@ class LookAhead:
         """The limit of a stop that is clear, or the stop; None where there is none."""
         if self.is_spacious(state.q, self.turned(state.qd, state.qdd, GENTLEST_STOP)):
             return GENTLEST_STOP
-        acceleration = max(MARGIN * self._gentle(state.q, state.qd), GENTLEST_STOP)
+        acceleration = min(max(MARGIN * self._gentle(state.q, state.qd), GENTLEST_STOP), self._highest)
         if self.is_spacious(state.q, self.turned(state.qd, state.qdd, acceleration)):
             return acceleration
         stop = self._stop(state, acceleration)

@@ -4,7 +4,7 @@
 """
 
 from dataclasses import replace
-from typing import Protocol
+from typing import Protocol, TypedDict
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from tvist_server.outlook import Outlook
 from tvist_server.overload import Overload
 from tvist_server.refusal import RefusalError, out_of_turn
 from tvist_server.safety import REDUCED_SHARE, acceleration_on_way, largest_torque, torque_to_come
-from tvist_server.safety_system import Emergency, Latched, SafetySystem
+from tvist_server.safety_system import SafetySystem
 from tvist_server.stops import StopPlan
 from tvist_server.trajectory import DoubleS, Limits, SetpointStream
 from tvist_server.way_ahead import WayAhead
@@ -34,7 +34,7 @@ STREAM_TIMEOUT = 0.25
 PAUSE_SHARE = 0.95
 """Share of the acceleration that torque leaves on the way that a pause uses: the filter may add a little [-]."""
 LEAST_PAUSE = 0.2
-"""Share of a motion's acceleration that a pause must have; where torque leaves less the motion goes on to its end [-]."""
+"""Where torque leaves less than this share of a motion's acceleration to a pause, the motion goes on to its end [-]."""
 
 
 _PUT: dict[ResetMode, Activity] = {
@@ -72,6 +72,18 @@ class Emit(Protocol):
         """Of the tick that is being made, or of the next one between two."""
 
 
+class Told(TypedDict):
+    """What the event of a stop says of it."""
+
+    category: int | None
+    duration: float | None
+    way: float | None
+
+
+NO_STOP = Told(category=None, duration=None, way=None)
+"""Of an end that is no stop."""
+
+
 class MotionControl:
     """Starts, watches and ends motion on the control line. Every motion's number ends in one of done and stopped.
 
@@ -92,8 +104,9 @@ class MotionControl:
         self.safety = SafetySystem()
         """What the safety system allows."""
         self._emit = emit
-        self._outlook = Outlook(cycle)
-        self._ahead = WayAhead(cycle, self._outlook, collisions)
+        self.outlook = Outlook(cycle)
+        """What the control line is going to do."""
+        self._ahead = WayAhead(cycle, self.outlook, collisions)
         limits = cycle.description.limits
         self._overload = Overload(limits.torque)
         self._reduced_velocity = REDUCED_SHARE * min(limits.velocity)
@@ -105,8 +118,6 @@ class MotionControl:
         self._speed = 1.0
         self._held = False
         """Whether the running motion is held by a pause."""
-        self._goes_on = False
-        """Whether it goes on by itself when the safeguard stop is released."""
         self._stream: SetpointStream | None = None
         self._heard = 0.0
         self._late, self._lost, self._limited = 0, 0, 0
@@ -149,7 +160,7 @@ class MotionControl:
         self.cycle.start(trajectory)
         self._started += 1
         self._motion, self._trajectory, self._velocity = self._started, trajectory, limits.velocity
-        self._held = self._goes_on = False
+        self._held = False
         self._go("move_j")
         self._emit("motion_started", id=self._motion)
         self._warn_of_torque(start, target, spared)
@@ -163,7 +174,7 @@ class MotionControl:
         )
         if (most <= allowed).all():
             return
-        ahead = self._outlook.foresee()
+        ahead = self.outlook.foresee()
         if ahead is None:
             return
         most = torque_to_come(cycle.inverse_dynamics, ahead, PERIOD)[0]
@@ -188,7 +199,6 @@ class MotionControl:
             RefusalError: None is running.
         """
         self._go("pause")
-        self._goes_on = False
         self._hold()
 
     def _hold(self) -> None:
@@ -247,90 +257,11 @@ class MotionControl:
             self._trajectory.speed = self._rate(self._velocity)
 
     def reduce(self, *, reduced: bool) -> None:
-        """Reduce the speed, or allow all of it again.
-
-        Motions are slowed on their way; a stream, whose time is its client's, is stopped if it may be faster.
-        """
-        if reduced == self.safety.reduced:
-            return
+        """Slow motions down on their way, or let them go on; a stream, whose time is its client's, is stopped."""
         self.safety.reduced = reduced
-        share = f"{100 * REDUCED_SHARE:g} % of the joints' limits" if reduced else "no longer reduced"
-        self._emit("warning", why=f"safety_mode is {self.safety_mode.name}: speed is {share}")
         self._set_rate()
         if reduced and self._stream is not None and self._stream.limits.velocity > self._reduced_velocity:
             self.stop(None, "speed was reduced", "limit_velocity")
-
-    def safeguard(self, *, stopped: bool) -> None:
-        """Stop by category 2, or allow motion again: a motion pauses and then goes on, a stream ends.
-
-        Args:
-            stopped: Whether the safeguard asks for the stop.
-        """
-        if stopped == self.safety.safeguard:
-            return
-        self.safety.safeguard = stopped
-        if not stopped:
-            if self._goes_on and self.activity is Activity.PAUSED:
-                self.resume()
-            self._goes_on = False
-            return
-        why, category = "a safeguard stop was injected", 2
-        if after(self.activity, "pause") is None:
-            self._end("interruption", why, kind="safety_stop", category=category)
-            return
-        goes_on = self.activity is Activity.MOVING or self._goes_on
-        self.pause()
-        self._goes_on = goes_on
-        duration, way = self._ahead.until_rest()
-        self._emit("safety_stop", why=why, category=category, duration=duration, way=way)
-
-    def emergency(self, whose: Emergency) -> None:
-        """Stop by category 1: on the way, then without power until it is released."""
-        if self.safety.emergency is not None:
-            return
-        self.safety.emergency = whose
-        self._end("power_off", f"the {whose}'s emergency stop was pressed", kind="safety_stop", category=1)
-
-    def end_emergency(self, whose: Emergency) -> None:
-        """Release an emergency stop; the power stays off until it is switched on."""
-        if self.safety.emergency == whose:
-            self.safety.emergency = None
-
-    def release(self) -> None:
-        """Release all inputs of the safety system: speed, safeguard and emergency stops."""
-        self.reduce(reduced=False)
-        self.safeguard(stopped=False)
-        self.safety.release()
-
-    def cut_power(self, why: str, latched: Latched | None = None) -> None:
-        """Stop by category 0: the brakes close at once.
-
-        Args:
-            why: The reason, for a person.
-            latched: What the safety system has found, until it is restarted; None: nothing.
-        """
-        if latched is not None:
-            self.safety.latched = latched
-        target = after(self.activity, "brakes")
-        if target is None:
-            self._emit("safety_stop", why=why, category=0, duration=0.0, way=0.0)
-            return
-        self.activity = target
-        cycle, plan = self.cycle, StopPlan(None, None, limited=False, duration=0.0, way=0.0)
-        if not cycle.at_rest:
-            stop = brake(cycle.description, cycle.arm.payload, cycle.newest, PERIOD)
-            way = float(np.abs(stop.end - cycle.position).max())
-            plan = replace(plan, duration=stop.duration, way=way)
-            self._outlook.brake(stop)
-        self._tell_end(plan, why, None, "safety_stop", 0)
-
-    def restart_safety(self) -> None:
-        """Restart the safety system after a violation or a fault.
-
-        Raises:
-            RefusalError: There was none.
-        """
-        self.safety.restart()
 
     def power_on(self, *, release_brakes: bool = True) -> None:
         """Power the arm and release its brakes.
@@ -343,14 +274,37 @@ class MotionControl:
         """
         self._go("power_on" if release_brakes else "power")
 
+    def brake(self, why: str) -> None:
+        """Stop by category 0: the power is gone, and the brakes close at once.
+
+        Args:
+            why: The reason, for a person.
+        """
+        target = after(self.activity, "brakes")
+        if target is None:
+            self._emit("safety_stop", why=why, category=0, duration=0.0, way=0.0)
+            return
+        self.activity = target
+        cycle, plan = self.cycle, StopPlan(None, None, limited=False, duration=0.0, way=0.0)
+        if not cycle.at_rest:
+            stop = brake(cycle.description, cycle.arm.payload, cycle.newest, PERIOD)
+            way = float(np.abs(stop.end - cycle.position).max())
+            plan = replace(plan, duration=stop.duration, way=way)
+            self.outlook.brake(stop)
+        self._tell_end(plan, why, None, "safety_stop", 0)
+
+    def until_rest(self) -> tuple[float | None, float | None]:
+        """How long it takes until the shaped reference rests [s], and how far it goes [rad]; see `WayAhead`."""
+        return self._ahead.until_rest()
+
     def power_off(self) -> None:
         """Stop what moves, then take the power; the brakes hold the arm where it is."""
-        self._end("power_off", "power_off was commanded", category=1)
+        self.end("power_off", "power_off was commanded", category=1)
 
     def protect(self, why: str, code: Code | None = None) -> None:
         """Make a protective stop; nothing happens where the brakes hold the arm or power is on its way out."""
         if after(self.activity, "protective_stop") is not None:
-            self._end("protective_stop", why, code, kind="protective_stop")
+            self.end("protective_stop", why, code, kind="protective_stop")
 
     def unlock(self) -> None:
         """Leave a protective stop.
@@ -441,13 +395,13 @@ class MotionControl:
             why: The reason, for a person.
             code: The reason, for a program.
         """
-        self._end("stop", why, code, deceleration)
+        self.end("stop", why, code, deceleration)
 
     def interrupt(self, why: str, code: Code | None = None) -> None:
         """End motion that may not go on, as `stop` does."""
-        self._end("interruption", why, code)
+        self.end("interruption", why, code)
 
-    def _end(
+    def end(
         self,
         trigger: str,
         why: str,
@@ -485,13 +439,13 @@ class MotionControl:
     ) -> None:
         """Tell of a stop, and of what it has ended."""
         duration, way = (0.0, 0.0) if self.cycle.at_rest else self._ahead.until_rest(plan)
-        told = {"category": category, "duration": duration, "way": way}
+        told = Told(category=category, duration=duration, way=way)
         if kind is not None:
             self._emit(kind, code=code, why=why, **told)
         if self._stream is not None:
-            self._forget_stream(why, code, **told)
+            self._forget_stream(why, code, told)
         if self._motion is not None:
-            self._end_motion(why, code, **told)
+            self._end_motion(why, code, told)
 
     def abandon(self, why: str, code: Code | None = None) -> None:
         """Say that what was moving ended: the arm is put elsewhere."""
@@ -503,8 +457,7 @@ class MotionControl:
         """Be in a robot mode; None: in the present one, at rest. The arm was put somewhere at rest before."""
         if mode is not None:
             self.activity = _PUT[mode]
-            self.safety.release()
-            self.safety.latched = None
+            self.safety.clear()
         elif self.activity.protective:
             self.activity = Activity.PROTECTIVE_STOP
         elif self.activity is Activity.BRAKING or (self.safety.emergency and self.activity.moving):
@@ -526,7 +479,7 @@ class MotionControl:
         """
         sample = self.cycle.step()
         if self.cycle.stopping and self.activity in {Activity.STREAMING, Activity.ENDING}:
-            self._end("interruption", str(self._ahead.met), "collision")
+            self.end("interruption", str(self._ahead.met), "collision")
         if self.cycle.at_rest and self.activity.moving:
             self._arrive()
         if self.activity.robot_mode is RobotMode.RUNNING:
@@ -582,14 +535,14 @@ class MotionControl:
             if met is not None:
                 raise RefusalError("collision", "name", f"{met} on the rest of the way", CLEARANCE)
 
-    def _end_motion(self, why: str, code: Code | None = None, **told: float | None) -> None:
+    def _end_motion(self, why: str, code: Code | None, told: Told = NO_STOP) -> None:
         self._emit("motion_stopped", id=self._motion, code=code, why=why, **told)
         self._forget_motion()
 
     def _forget_motion(self) -> None:
-        self._motion, self._trajectory, self._held, self._goes_on = None, None, False, False
+        self._motion, self._trajectory, self._held = None, None, False
 
-    def _forget_stream(self, why: str, code: Code | None = None, **told: float | None) -> None:
+    def _forget_stream(self, why: str, code: Code | None = None, told: Told = NO_STOP) -> None:
         if self._stream is not None:
             self._late, self._lost, self._limited = self.counters()
             self._stream = None

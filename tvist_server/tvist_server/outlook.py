@@ -127,13 +127,13 @@ class Outlook:
         cycle, line = self._cycle, self._shaped(line)
         stop = self.stops.on_line(cycle.published, line, deceleration)
         if stop is None:
-            if cycle.stopping:
-                return None
             ahead = self.foresee()
             if ahead is None:
-                return StopPlan(None, None, deceleration is not None, None, None)
+                return None if cycle.stopping else StopPlan(None, None, deceleration is not None, None, None)
             last = resting_after(ahead)
             stop = self.stops.under(ahead, last, cycle.published, line, deceleration)
+            if stop is None and cycle.stopping:
+                return None
             if stop is None:
                 return self._plan(None, deceleration, (last - 1) * PERIOD, ahead[-1])
         return self._plan(stop, deceleration, stop.duration - PERIOD, stop.end)
@@ -152,7 +152,7 @@ class Outlook:
             return line
         peak = cycle.line_filter.peak
         known = peak == 1.0 and not cycle.line_filter.fading
-        return Line(line.direction, peak * line.braking, line.steady if known else 0.0)
+        return Line(line.direction, peak * line.braking, peak * line.jerk, line.steady if known else 0.0)
 
 
 def resting_after(ahead: Floats) -> int:

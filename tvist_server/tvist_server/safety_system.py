@@ -66,9 +66,9 @@ class SafetySystem:
             why = f"safety_mode is {mode.name}: release the safeguard stop first"
             raise RefusalError("wrong_mode", "", why)
 
-    def release(self) -> None:
-        """Release safeguard and emergency stops."""
-        self.safeguard, self.emergency = False, None
+    def clear(self) -> None:
+        """Release safeguard and emergency stops, and forget what was found."""
+        self.safeguard, self.emergency, self.latched = False, None, None
 
     def restart(self) -> None:
         """Forget what it has found.

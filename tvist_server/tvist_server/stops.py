@@ -18,6 +18,8 @@ STEP = 0.8
 HARDER = 1.05
 """A stop that is harder than the motion's own braking by this is ahead of it nowhere, although a filter that varies
 may brake a little harder than its reference [-]."""
+SOON = 0.02
+"""A motion that brakes no sooner than this is behind a stop by then [s]."""
 COUNTED = 0.9
 """Share of the present velocity that a motion is counted on to keep until it brakes [-]."""
 ROUNDING = 1e-12
@@ -58,8 +60,8 @@ class StopPlanner:
     def on_line(self, state: Target, line: Line, wanted: float | None) -> LineStop | None:
         """The quickest stop along the line of a motion that is certain to be permitted.
 
-        Never ahead of the motion, and never later at rest, is a stop that brakes harder than the motion ever will;
-        and a gentler one that is over before the motion, braking as hard as it may, could be.
+        Never ahead of the motion, and never later at rest, is a stop that brakes harder than the motion ever will,
+        with more jerk; and a gentler one that is over before the motion, braking as hard as it may, could be.
 
         Args:
             state: A tick before the newest shaped reference.
@@ -72,6 +74,8 @@ class StopPlanner:
         leading = int(np.argmax(np.abs(line.direction)))
         sign = float(np.sign(line.direction[leading]))
         speed, rise = sign * float(state.qd[leading]), sign * float(state.qdd[leading])
+        if HARDER * line.jerk > self._jerk and line.steady < SOON:
+            return None  # it may brake with as much jerk as a stop
         if rise < 0.0 and speed <= 1.1 * rise * rise / (2.0 * self._jerk):
             return None  # it is about to rest: nothing within the limits is any sooner
         in_time = line.steady + COUNTED * max(speed, 0.0) / line.braking

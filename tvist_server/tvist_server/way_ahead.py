@@ -33,6 +33,7 @@ class WayAhead:
             collisions,
             room.acceleration,
             lambda state, clear: outlook.stops.by_joints(state, None, clear),
+            highest=min(cycle.description.limits.acceleration),
             jerk=min(cycle.description.limits.jerk),
             period=PERIOD,
         )

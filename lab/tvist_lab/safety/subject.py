@@ -85,10 +85,14 @@ class Subject:
         if not self.flexible:
             self.controller.cycle.arm = RigidArm(self.controller.cycle)  # type: ignore[assignment]
         self.controller.client_seen(CLIENT)
-        reply = self.controller.receive(c.TakeControl(client=CLIENT, lease_s=self.lease_s))
-        assert isinstance(reply, Accepted)
-        self.token = str(reply.token)
+        self.token = self.take_control()
         self.references.append(np.array(self.q))
+
+    def take_control(self) -> str:
+        """Take the lease; its token."""
+        reply = self.controller.receive(c.TakeControl(client=CLIENT, lease_s=self.lease_s))
+        assert isinstance(reply, Accepted), reply
+        return str(reply.token)
 
     def send(self, kind: type[Any], **fields: Any) -> Reply:
         """Send a command with the token, unless it is given."""

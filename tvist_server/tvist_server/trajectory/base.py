@@ -31,6 +31,8 @@ class Line:
     """Of the line in joint space; its largest entry is 1 or -1, shape (n,)."""
     braking: float
     """Largest deceleration to come, of the joint that turns most [rad/s^2]."""
+    jerk: float
+    """Largest jerk to come, of that joint [rad/s^3]."""
     steady: float
     """Time for which it does not slow down yet [s]; 0 where that is not known."""
 

@@ -124,6 +124,7 @@ class DoubleS(Trajectory):
         return Line(
             self._direction,
             self.limits.acceleration,
+            self.limits.jerk,
             max(self._brakes_at - time, 0.0) / rate if known else 0.0,
         )
 

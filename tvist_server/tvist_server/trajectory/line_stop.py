@@ -41,6 +41,8 @@ class LineStop(Trajectory):
         self._origin, self._direction = q, direction
         self.acceleration = acceleration
         """Limit that it keeps [rad/s^2]."""
+        self.jerk = jerk
+        """Limit that it keeps [rad/s^3]."""
         leading = int(np.argmax(np.abs(direction)))
         sign = float(direction[leading])
         request = ruckig.InputParameter(1)
@@ -82,7 +84,7 @@ class LineStop(Trajectory):
     @property
     def line(self) -> Line:
         """Its way: it brakes from the beginning."""
-        return Line(self._direction, self.acceleration, 0.0)
+        return Line(self._direction, self.acceleration, self.jerk, 0.0)
 
     @property
     def end(self) -> Floats:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from tvist_protocol.commands import Command, PowerOff, PowerOn, UnlockProtectiveStop
+from tvist_protocol.commands import Command, PowerOff, PowerOn, RestartSafety, UnlockProtectiveStop
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.replies import Refused, Reply
 from tvist_server.gateways.ur.base import Control
@@ -42,6 +42,15 @@ def power_off(robot: UrRobot, control: Control, outcome: Outcome) -> None:
         outcome(refused)
 
     _change(control, lambda token: PowerOff(token=token), off, lambda: False)
+
+
+def restart_safety(robot: UrRobot, control: Control, outcome: Outcome) -> None:
+    """Restart the safety system after a violation or a fault; otherwise take the arm's power, as a restart does."""
+    latest = robot.latest
+    if latest is not None and latest.safety_mode in (SafetyMode.VIOLATION, SafetyMode.FAULT):
+        _change(control, lambda token: RestartSafety(token=token), outcome, lambda: False)
+    else:
+        power_off(robot, control, outcome)
 
 
 def unlock(robot: UrRobot, control: Control, outcome: Outcome) -> None:

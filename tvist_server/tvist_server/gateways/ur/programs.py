@@ -186,7 +186,9 @@ class Programs:
 
     def event(self, event: Event) -> None:
         """Something happened at the robot."""
-        if event.kind in {"protective_stop", "lease_lost"}:
+        # A stop of category 2 pauses the motion, and the program waits with it.
+        powerless = event.kind == "safety_stop" and event.category != 2
+        if powerless or event.kind in {"protective_stop", "lease_lost"}:
             self.interrupt()
         if event.kind not in {"motion_done", "motion_stopped"} or event.id is None:
             return

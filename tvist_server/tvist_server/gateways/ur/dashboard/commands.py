@@ -81,7 +81,7 @@ def _power_off(request: Request) -> None:
 
 
 def _restart_safety(request: Request) -> None:
-    power.power_off(request.robot, request.control, request.unless_refused("Restarting safety"))
+    power.restart_safety(request.robot, request.control, request.unless_refused("Restarting safety"))
 
 
 def _shutdown(request: Request) -> None:

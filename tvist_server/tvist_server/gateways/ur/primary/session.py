@@ -73,10 +73,10 @@ class PrimarySession(Session):
         return b""
 
     def event(self, event: Event) -> None:
-        """Tell of a protective stop as the error it is, and of warnings as a line of the log."""
+        """Tell of a protective stop as the error it is, of other safety stops and warnings as a line of the log."""
         stamp = messages.stamp(self._robot.latest)
         why = event.why or ""
         if event.kind == "protective_stop":
             self._send(messages.error_code(stamp, messages.PROTECTIVE_STOP, 0, Level.WARNING, why))
-        elif event.kind == "warning":
+        elif event.kind in {"warning", "safety_stop"}:
             self._send(messages.text(stamp, why))

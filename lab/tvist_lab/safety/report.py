@@ -1,0 +1,144 @@
+"""All searches on all cores, and what they found."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeVar
+
+import numpy as np
+
+from tvist_lab.evaluation.workers import spread
+from tvist_lab.safety import changes, sequences, stops, streams
+from tvist_plant.description import RobotDescription, load
+
+T = TypeVar("T")
+
+APART = 1_000_000
+"""Numbers of cases of two seeds are so far apart."""
+
+
+@dataclass(frozen=True)
+class Counts:
+    """How many of each to try."""
+
+    stops: int = 0
+    streams: int = 0
+    changes: int = 0
+    sequences: int = 0
+
+    @property
+    def all(self) -> int:
+        """In all."""
+        return self.stops + self.streams + self.changes + self.sequences
+
+
+def search(
+    counts: Counts,
+    seed: int,
+    *,
+    robot: str = "ur5e",
+    flexible: bool = False,
+    progress: Callable[[str], None] = lambda _: None,
+) -> dict[str, Any]:
+    """Try it all.
+
+    Args:
+        counts: How many of each.
+        seed: Of the cases; with others there are others.
+        robot: Robot file, or the name of one that comes with the package.
+        flexible: Whether the flexible arm is simulated in stops and streams, too, to see how far it goes into what the
+            reference stays clear of.
+        progress: Told what has been tried, after each case.
+
+    Returns:
+        For each search that was asked for: count, `broken` with a sentence for each promise that was, and figures.
+    """
+    description = load(robot)
+    result: dict[str, Any] = {"seed": seed, "robot": robot, "flexible": flexible}
+
+    def run(what: str, count: int, work: Callable[[int], T]) -> list[T]:
+        found = []
+        for one in spread(work, range(seed * APART, seed * APART + count)):
+            found.append(one)
+            progress(what)
+        return found
+
+    if counts.stops:
+        stopped = run("stops", counts.stops, partial(_stop, description, flexible))
+        result["stops"] = _stops(stopped)
+    if counts.streams:
+        streamed = run("streams", counts.streams, partial(_stream, description, flexible))
+        result["streams"] = _streams(streamed)
+    if counts.changes:
+        changed = run("changes", counts.changes, partial(changes.judge, description))
+        result["changes"] = {
+            "count": len(changed),
+            "broken": [repr(one) for one in changed if not one.kept],
+            "refused": sum(one.refused for one in changed),
+        }
+    if counts.sequences:
+        told = run("sequences", counts.sequences, partial(_sequence, description))
+        result["sequences"] = {"count": len(told), "broken": [one for one in told if one is not None]}
+    return result
+
+
+def broken(result: dict[str, Any]) -> list[str]:
+    """Every promise that a search has found broken, in a sentence each."""
+    return [one for part in result.values() if isinstance(part, dict) for one in part["broken"]]
+
+
+def _stop(description: RobotDescription, flexible: bool, number: int) -> stops.Outcome:
+    return stops.judge(description, stops.draw(description, number), flexible=flexible)
+
+
+def _stream(description: RobotDescription, flexible: bool, number: int) -> streams.StreamOutcome:
+    return streams.judge(description, streams.draw(description, number), flexible=flexible)
+
+
+def _sequence(description: RobotDescription, number: int) -> str | None:
+    try:
+        sequences.Sequence(description, number).run()
+    except sequences.BrokenError as error:
+        return str(error)
+    return None
+
+
+def _stops(outcomes: Sequence[stops.Outcome]) -> dict[str, Any]:
+    kinds = {}
+    for kind in stops.KINDS:
+        of_kind = [one for one in outcomes if one.case.kind == kind]
+        if of_kind:
+            lasted = np.array([one.duration for one in of_kind])
+            share = [one.duration / max(one.left, 1e-3) for one in of_kind]
+            kinds[kind] = {
+                "count": len(of_kind),
+                "duration_s": {"median": float(np.median(lasted)), "max": float(lasted.max())},
+                "share_of_time_left": {"median": float(np.median(share)), "max": float(max(share))},
+                "ran_out": sum(one.late == 0 for one in of_kind),
+            }
+    return {
+        "count": len(outcomes),
+        "broken": [repr(one) for one in outcomes if not one.kept],
+        "worst_ahead_rad": max(one.ahead for one in outcomes),
+        "worst_off_rad": max(one.off for one in outcomes),
+        "worst_late_ticks": max(one.late for one in outcomes),
+        "worst_torque_share": max(one.torque for one in outcomes),
+        "worst_below_clearance_m": max(one.near for one in outcomes),
+        "worst_penetration_of_the_flexible_arm_m": _worst(one.penetration for one in outcomes),
+        "kinds": kinds,
+    }
+
+
+def _streams(outcomes: Sequence[streams.StreamOutcome]) -> dict[str, Any]:
+    return {
+        "count": len(outcomes),
+        "broken": [repr(one) for one in outcomes if not one.kept],
+        "stopped_by_the_robot": sum(one.stopped for one in outcomes),
+        "worst_below_clearance_m": max(one.near for one in outcomes),
+        "worst_penetration_of_the_flexible_arm_m": _worst(one.penetration for one in outcomes),
+    }
+
+
+def _worst(values: Iterator[float]) -> float | None:
+    known = [value for value in values if not np.isnan(value)]
+    return max(known) if known else None

@@ -1,0 +1,341 @@
+"""Whole random sequences of commands, whatever they are, and what must hold throughout."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tvist_lab.recordings import Floats
+from tvist_lab.safety.changes import far_payload
+from tvist_lab.safety.stops import SHAPERS
+from tvist_lab.safety.subject import CLIENT, Subject, disc
+from tvist_lab.workspace import WORKSPACE
+from tvist_plant.description import RobotDescription
+from tvist_plant.plant import PERIOD
+from tvist_protocol import commands as c
+from tvist_protocol.replies import Accepted, Refused
+from tvist_protocol.transitions import Activity
+from tvist_server.collision import CLEARANCE, CollisionModel
+from tvist_server.cycle import STILL
+from tvist_server.setup import body
+
+COMMANDS = 40
+"""In a sequence."""
+PAUSES = (0, 1, 2, 5, 20, 60, 150, 400)
+"""Ticks between two of them."""
+ROUNDING = 1e-9
+"""Difference of two positions that counts as none [rad]."""
+VELOCITY, ACCELERATION = 1.003, 1.01
+"""Shares of the joints' limits up to which a shaped reference may go [-]."""
+FAULTS = (
+    "protective_stop", "safeguard_stop", "emergency_stop", "system_emergency_stop", "power_loss", "violation",
+    "fault", "reduced", *("normal",) * 5, "nan",
+)  # fmt: skip
+STOPS_ON_WAY = frozenset({"protective_stop", "safeguard_stop", "emergency_stop", "system_emergency_stop"})
+"""Faults that stop a motion on its way."""
+HALTS = frozenset({"stop", "pause", "power_off", "inject", "lose", "release"})
+"""After these the reference may not get ahead of what it would have been."""
+
+
+class BrokenError(AssertionError):
+    """A promise was broken; the text says by which command of which sequence."""
+
+
+@dataclass
+class Ahead:
+    """What the reference would do if nothing were commanded."""
+
+    references: Floats
+    """One a tick from the moment on, shape (k, n) [rad]."""
+    since: int
+    """Tick of that moment."""
+
+
+class Sequence:
+    """One sequence, and the watch over it.
+
+    Args:
+        description: The robot.
+        seed: Its number.
+        flexible: Whether the flexible arm is simulated.
+    """
+
+    def __init__(self, description: RobotDescription, seed: int, *, flexible: bool = False) -> None:
+        self.seed, self.description = seed, description
+        self._random = np.random.default_rng([seed, 15])
+        self._free = CollisionModel(description, body(disc(description, 0.0)))
+        mass = float(self._random.choice([0.0, 5.0, self._random.uniform(0, 5)]))
+        self._free.carry(body(disc(description, mass)))
+        self.robot = Subject(
+            description, self._posture(), disc(description, mass),
+            shaper=str(self._random.choice(SHAPERS)), flexible=flexible,
+        )  # fmt: skip
+        self.done: list[str] = []
+        """What was sent, and how it was answered."""
+        self._ahead: Ahead | None = None
+        self._excused = False
+        self._sequence = 0
+        self._at = self._towards = self.robot.references[-1]
+        self._braked = False
+
+    def run(self, count: int = COMMANDS) -> None:
+        """Send the commands, and see that the arm can be moved again afterwards.
+
+        Raises:
+            BrokenError: A promise was broken.
+        """
+        names = list(_SENT)
+        weights = np.array([weight for weight, _ in _SENT.values()], dtype=float)
+        for _ in range(count):
+            name = str(self._random.choice(names, p=weights / weights.sum()))
+            before = self._foresee() if name in HALTS else None
+            reply = _SENT[name][1](self)
+            said = reply.code if isinstance(reply, Refused) else type(reply).__name__
+            self.done.append(f"tick {self.robot.controller.tick_number} {name}: {said}")
+            if name != "wait":
+                slowed = name == "inject" and self.done[-2].split()[-1] not in STOPS_ON_WAY
+                self._ahead = None if slowed else before
+            self._tick(int(self._random.choice(PAUSES)))
+        self._come_back()
+
+    def _posture(self) -> Floats:
+        while True:
+            q: Floats = WORKSPACE.random(1, self.description.joints, int(self._random.integers(2**31)))[0]
+            if self._free.meeting(q) is None:
+                return q
+
+    def _foresee(self) -> Ahead | None:
+        """What comes if nothing is commanded, where it goes along a line."""
+        motion, cycle = self.robot.controller.motion, self.robot.controller.cycle
+        if cycle.at_rest or cycle.trajectory.line is None:
+            return None
+        ahead = motion.outlook.foresee()
+        return None if ahead is None else Ahead(ahead[1:], self.robot.controller.tick_number)
+
+    def _tick(self, count: int) -> None:
+        robot = self.robot
+        for _ in range(count):
+            if robot.controller.motion.streaming:
+                self._stream()
+            number = robot.controller.tick_number
+            robot.tick()
+            if robot.controller.tick_number != number + 1:
+                raise self._broken("ticks are not consecutive")
+            self._watch()
+
+    def _stream(self) -> None:
+        """A set-point on the way to somewhere."""
+        way = self._towards - self._at
+        step = 0.004 * np.clip(way, -1.0, 1.0)
+        if self._random.random() < 0.005:
+            self._towards = self._random.uniform(-3, 3, self.description.joints)
+        self._at = self._at + step
+        self.robot.setpoint(self._sequence, self._at)
+        self._sequence += 1
+
+    def _watch(self) -> None:
+        robot, limits = self.robot, self.description.limits
+        q = np.array(robot.references[-3:])
+        activity = robot.controller.motion.activity
+        self._braked = activity is Activity.BRAKING or (self._braked and not robot.controller.cycle.at_rest)
+        if self._braked:
+            self._ahead, self._excused = None, True  # brakes know no path
+        if not np.isfinite(q).all():
+            raise self._broken("a reference is not finite")
+        if len(q) == 3 and not self._braked:
+            if (np.abs(q[-1]) > np.array(limits.position) + ROUNDING).any():
+                raise self._broken(f"a reference is at {q[-1].tolist()}, beyond a joint's range")
+            if (fast := np.abs(q[-1] - q[-2]).max() / PERIOD) > VELOCITY * min(limits.velocity):
+                raise self._broken(f"a reference moves at {fast:.4f} rad/s")
+            if (hard := np.abs(np.diff(q, 2, axis=0)).max() / PERIOD**2) > ACCELERATION * min(
+                limits.acceleration
+            ):
+                raise self._broken(f"a reference accelerates by {hard:.3f} rad/s²")
+            self._watch_clearance(q)
+        if self._ahead is not None:
+            self._watch_way(self._ahead, q[-1])
+
+    def _watch_clearance(self, q: Floats) -> None:
+        collisions = self.robot.controller.motion.collisions
+        meeting = collisions.meeting(q[-1])
+        if meeting is None:
+            self._excused = False
+        elif not self._excused:
+            raise self._broken(f"by the reference {meeting}, nearer than {CLEARANCE} m")
+
+    def _watch_way(self, ahead: Ahead, q: Floats) -> None:
+        """On the line, not ahead, and at rest no later."""
+        references = ahead.references
+        tick = self.robot.controller.tick_number - ahead.since
+        way = references[-1] - references[0]
+        length = float(np.linalg.norm(way))
+        if length < ROUNDING:
+            return
+        along = way / length
+        reached, there = (q - references[0]) @ along, references[min(tick, len(references) - 1)]
+        # At rest counts from 1e-7 rad a tick: what is left of the filter still creeps.
+        creeps = STILL if tick >= len(references) else 0.0
+        if reached > (there - references[0]) @ along + ROUNDING + creeps:
+            raise self._broken("a stop is ahead of what the motion would have done")
+        if np.abs(q - references[0] - reached * along).max() > ROUNDING:
+            raise self._broken("a stop leaves the line")
+        if tick > len(references) + 1 and not self.robot.resting:
+            raise self._broken("a stop lasts longer than the motion would have")
+
+    def _come_back(self) -> None:
+        """From everywhere there is a way back to motion."""
+        robot = self.robot
+        self._ahead = None
+        robot.send(c.SimulationInject, fault="normal")
+        robot.controller.client_gone("nobody")
+        robot.token = robot.take_control()
+        robot.send(c.Stop)
+        self._tick_until_rest()
+        robot.send(c.RestartSafety)
+        robot.send(c.UnlockProtectiveStop)
+        robot.send(c.PowerOn)
+        if robot.controller.motion.activity is not Activity.REST:
+            raise self._broken(f"no way back: {robot.controller.motion.activity}")
+        robot.send(c.SetSpeed, fraction=1.0)
+        if robot.controller.motion.collisions.meeting(robot.references[-1]) is None:
+            target = 0.98 * robot.references[-1]
+            reply = robot.send(c.MoveJ, q=tuple(target.tolist()))
+            if not isinstance(reply, Accepted) and not (
+                isinstance(reply, Refused) and reply.code == "collision"
+            ):
+                raise self._broken(f"a move is not accepted: {reply}")
+            self._tick_until_rest()
+        started = [e.id for e in robot.events if e.kind == "motion_started"]
+        ended = [e.id for e in robot.events if e.kind in {"motion_done", "motion_stopped"}]
+        if sorted(started) != sorted(ended):  # type: ignore[type-var]
+            raise self._broken(f"motions {started} ended as {ended}")
+
+    def _tick_until_rest(self) -> None:
+        for _ in range(200):
+            if not self.robot.controller.motion.activity.moving:
+                return
+            self._tick(100)
+        raise self._broken("it does not come to rest")
+
+    def _broken(self, what: str) -> BrokenError:
+        story = "\n  ".join(self.done[-12:])
+        tick = self.robot.controller.tick_number
+        return BrokenError(f"sequence {self.seed}, tick {tick}: {what}, after\n  {story}")
+
+    # ------------------------------------------------------------------ commands
+
+    def _limits(self) -> dict[str, float]:
+        random = self._random
+        return {
+            # Below the joints' own: a filter that varies exceeds its reference's by itself, by up to a tenth.
+            "velocity": float(random.uniform(0.2, 2.8)),
+            "acceleration": float(random.choice([random.uniform(0.5, 8.0), random.uniform(8.0, 35.0)])),
+            "jerk": float(random.choice([50.0, 100.0, 500.0, 2000.0])),
+        }
+
+    def move(self) -> object:
+        """A move to somewhere."""
+        target = self._posture()
+        if self._random.random() < 0.3:
+            here = self.robot.references[-1]
+            target = here + 0.1 * (target - here)
+        return self.robot.send(c.MoveJ, q=tuple(target.tolist()), **self._limits())
+
+    def stream(self) -> object:
+        """The start of a stream."""
+        self._sequence, self._at = 0, self.robot.controller.cycle.reference
+        self._towards = self._random.uniform(-3, 3, self.description.joints)
+        return self.robot.send(c.ServoStart, **self._limits())
+
+    def halt(self) -> object:
+        """A stop by anybody."""
+        token = self.robot.token if self._random.random() < 0.5 else None
+        wanted = None if self._random.random() < 0.4 else float(10 ** self._random.uniform(-2, 1.6))
+        return self.robot.send(c.Stop, token=token, deceleration=wanted)
+
+    def payload(self) -> object:
+        """Another payload."""
+        payload = far_payload(self._random, self.description.limits.payload)
+        resting = self.robot.controller.cycle.at_rest
+        reply = self.robot.send(c.SetPayload, mass=payload.mass, com=payload.com, inertia=payload.inertia)
+        if resting:  # at rest any payload may be declared, also one that meets something there
+            collisions = self.robot.controller.motion.collisions
+            self._excused = collisions.meeting(self.robot.references[-1]) is not None
+        return reply
+
+    def estimator(self) -> object:
+        """Other modes."""
+        f_d, zeta = self._random.uniform(4, 20), self._random.uniform(0.0, 0.3)
+        return self.robot.send(c.SetEstimator, name="fixed", f_d=(float(f_d),), zeta=(float(zeta),))
+
+    def reset(self) -> object:
+        """The arm put elsewhere, where nothing meets."""
+        collisions = self.robot.controller.motion.collisions
+        for _ in range(100):
+            q = self._posture()
+            if collisions.meeting(q) is None:
+                break
+        mode = self._random.choice(["RUNNING", "RUNNING", "IDLE", "POWER_OFF", "none"])
+        fields = {} if mode == "none" else {"mode": str(mode)}
+        reply = self.robot.send(c.SimulationReset, q=tuple(q.tolist()), **fields)
+        if not isinstance(reply, Refused):
+            self.robot.references[-2:] = [q, q]
+            self._excused = collisions.meeting(q) is not None
+        return reply
+
+    def inject(self) -> object:
+        """A fault."""
+        fault = str(self._random.choice(FAULTS))
+        self.done.append(f"  fault {fault}")
+        return self.robot.send(c.SimulationInject, fault=fault)
+
+    def lose(self) -> object:
+        """The client's liveliness token goes, and it takes control anew."""
+        self.robot.controller.client_gone(CLIENT)
+        self.robot.controller.client_seen(CLIENT)
+        self.robot.token = self.robot.take_control()
+        return "gone"
+
+    def release(self) -> object:
+        """Control is released, and taken anew."""
+        reply = self.robot.send(c.ReleaseControl)
+        self.robot.token = self.robot.take_control()
+        return reply
+
+
+_SENT: dict[str, tuple[float, Callable[[Sequence], object]]] = {
+    "move": (14.0, Sequence.move),
+    "stream": (5.0, Sequence.stream),
+    "servo_stop": (2.0, lambda it: it.robot.send(c.ServoStop)),
+    "stop": (5.0, Sequence.halt),
+    "pause": (2.0, lambda it: it.robot.send(c.Pause)),
+    "resume": (3.0, lambda it: it.robot.send(c.Resume)),
+    "speed": (2.0, lambda it: it.robot.send(c.SetSpeed, fraction=float(it._random.uniform(0.05, 1.0)))),  # noqa: SLF001
+    "payload": (3.0, Sequence.payload),
+    "shaper": (3.0, lambda it: it.robot.send(c.SetShaper, name=str(it._random.choice(SHAPERS)))),  # noqa: SLF001
+    "estimator": (1.0, Sequence.estimator),
+    "power_on": (9.0, lambda it: it.robot.send(c.PowerOn)),
+    "power_off": (1.0, lambda it: it.robot.send(c.PowerOff)),
+    "unlock": (4.0, lambda it: it.robot.send(c.UnlockProtectiveStop)),
+    "restart_safety": (3.0, lambda it: it.robot.send(c.RestartSafety)),
+    "inject": (3.0, Sequence.inject),
+    "lose": (1.0, Sequence.lose),
+    "release": (1.0, Sequence.release),
+    "reset": (1.0, Sequence.reset),
+    "wait": (3.0, lambda it: it.robot.send(c.KeepAlive)),
+}
+"""What may be sent, and how often."""
+
+
+def search(
+    description: RobotDescription, count: int, seed: int, *, flexible: bool = False
+) -> Iterator[Sequence | BrokenError]:
+    """Many of them; one that breaks a promise gives what it broke."""
+    for number in range(count):
+        sequence = Sequence(description, seed * 1_000_000 + number, flexible=flexible)
+        try:
+            sequence.run()
+        except BrokenError as error:
+            yield error
+        else:
+            yield sequence

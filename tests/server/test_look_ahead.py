@@ -1,0 +1,148 @@
+"""What is looked at before it is done: streams, changes in motion, and what a line is going to do."""
+
+import numpy as np
+import pytest
+
+from tvist_lab.safety import changes, streams
+from tvist_plant.description import Payload
+from tvist_protocol import commands as c
+from tvist_protocol.replies import Done, Refused
+from tvist_server.collision import CLEARANCE, CollisionModel
+from tvist_server.cycle import STILL
+from tvist_server.outlook import MOST_AHEAD, Outlook, resting_after
+
+from .robots import FITTING, PAPER, Q1, Q2, Q3, UR5E, H, Robot, cycle, without_arm
+
+
+@pytest.mark.parametrize("name", [*FITTING[:4], "none"])
+def test_what_is_foreseen_is_what_happens_to_the_bit(name):
+    random = np.random.default_rng(FITTING.index(name) if name in FITTING else 99)
+    line = without_arm(cycle(name))
+    motion = line.start(line.plan(Q3, PAPER))
+    for moment in sorted(random.integers(2, 1100, 3)):
+        while line.trajectory._ticks < moment and not line.at_rest and motion.rate == 1.0:
+            line.step()
+        ahead = Outlook(line).foresee()
+        assert ahead is not None
+        if moment > 800:
+            break
+    for expected in ahead[2:]:
+        line.step()
+        assert (line.position == expected).all()
+    assert line.at_rest
+    assert np.abs(np.diff(ahead[resting_after(ahead) :], axis=0)).max(initial=0.0) <= STILL
+
+
+def test_a_pause_and_a_change_of_the_filter_are_foreseen_too():
+    robot = Robot()
+    robot.send(c.MoveJ, q=tuple(Q3))
+    robot.tick(300)
+    robot.send(c.SetShaper, name="ei")
+    robot.tick(20)
+    robot.send(c.Pause)
+    cycle_ = robot.controller.cycle
+    ahead = robot.controller.motion.outlook.foresee()
+    for expected in ahead[2:]:
+        robot.tick()
+        assert cycle_.position == pytest.approx(expected, abs=1e-12)
+    assert not cycle_.at_rest
+    assert np.abs(cycle_.position - ahead[-1]).max() < 1e-6
+
+
+def test_what_lasts_too_long_is_not_foreseen():
+    line = without_arm(cycle())
+    line.start(line.plan(Q3, type(PAPER)(0.01, 0.1, 1.0)))
+    line.step()
+    assert MOST_AHEAD * H < 100.0
+    assert Outlook(line).foresee() is None
+
+
+@pytest.mark.parametrize("number", range(10))
+def test_no_stream_brings_the_reference_into_the_clearance_however_it_ends(number):
+    outcome = streams.judge(UR5E, streams.draw(UR5E, number))
+    assert outcome.kept, outcome
+
+
+@pytest.mark.parametrize("number", range(16))
+def test_no_change_in_motion_leads_the_reference_into_the_clearance(number):
+    outcome = changes.judge(UR5E, number)
+    assert outcome.kept, outcome
+
+
+def test_a_payload_that_would_meet_the_floor_on_the_rest_of_the_way_is_refused_and_changes_nothing():
+    robot, plain = Robot(), Robot()
+    start, target = (0.0, -1.57, 0.0, -1.57, 0.0, 0.0), (0.0, -0.3, 0.0, -1.57, 0.0, 0.0)
+    for one in (robot, plain):
+        one.send(c.SimulationReset, q=start)
+        one.send(c.MoveJ, q=target)
+        one.tick(200)
+    moment = (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)
+    reply = robot.send(c.SetPayload, mass=3.0, com=(0.3, 0.0, 0.3), inertia=moment)
+    assert isinstance(reply, Refused)
+    assert (reply.code, reply.limit) == ("collision", CLEARANCE)
+    assert "payload and floor" in reply.why
+    for one in (robot, plain):
+        one.until_rest()
+    assert robot.states == plain.states
+    assert robot.send(c.SetPayload, mass=3.0, com=(0.0, 0.0, 0.05), inertia=moment) == Done()
+
+
+def test_at_rest_any_payload_may_be_declared():
+    robot = Robot()
+    robot.send(c.SimulationReset, q=(0.0, -0.3, 0.0, -1.57, 0.0, 0.0))
+    moment = (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)
+    assert robot.send(c.SetPayload, mass=3.0, com=(0.3, 0.0, 0.3), inertia=moment) == Done()
+
+
+@pytest.mark.parametrize("shaper", ["none", "zv", "ei3"])
+def test_a_stream_whose_end_through_the_filter_would_meet_is_stopped_instead(shaper):
+    """With its own low acceleration the stream would come to rest in the floor; a hard stop does not."""
+    robot, start = Robot(), np.array([0.0, -1.6, 0.0, -1.57, 0.0, 0.0])
+    robot.send(c.SetShaper, name=shaper)
+    robot.send(c.SimulationReset, q=tuple(start))
+    robot.send(c.ServoStart, velocity=1.5, acceleration=1.0, jerk=100.0)
+    q, speed, sequence = start.copy(), 0.0, 0
+    while q[1] < -0.75:
+        speed = min(speed + 0.9 * H, 1.0)
+        q[1] += speed * H
+        robot.setpoint(sequence, q)
+        robot.tick()
+        sequence += 1
+    assert robot.controller.motion.streaming
+    assert robot.send(c.ServoStop) == Done()
+    robot.until_rest()
+    ended = [event for event in robot.events if event.kind == "stream_stopped"]
+    assert [event.code for event in ended] == ["collision"]
+    assert "through the filter" in ended[0].why
+    model = robot.controller.motion.collisions
+    assert model.nearest(robot.column("target_q")) >= CLEARANCE
+
+
+def test_no_point_travels_farther_than_the_reach_of_the_joints_that_turn():
+    random = np.random.default_rng(0)
+    for com in ((0.0, 0.0, 0.04), (0.25, -0.1, 0.1)):
+        model = CollisionModel(UR5E, Payload(mass=2.0, com=com))
+        for _ in range(60):
+            q, turned = random.uniform(-3, 3, (2, 6)) * np.array([[1.0], [0.05]])
+            here, there = model._nearest(q), model._nearest(q + turned)
+            assert abs(there.distance - here.distance) <= model.travel(turned) + 1e-9
+
+
+def test_info_says_how_long_stops_last():
+    info = Robot().controller.stopping
+    assert [(row.payload, row.speed) for row in info] == [
+        (mass, speed) for mass in (0.0, UR5E.limits.payload) for speed in (0.33, 0.66, 1.0)
+    ]
+    for slow, fast in zip(info[:2], info[1:3], strict=True):
+        assert slow.duration < fast.duration
+        assert slow.way < fast.way
+    assert all(empty.way < loaded.way for empty, loaded in zip(info[:3], info[3:], strict=True))
+
+
+def test_the_paper_s_motions_still_go(q=Q2):
+    robot = Robot()
+    robot.send(c.MoveJ, q=tuple(q))
+    robot.until_rest()
+    assert robot.kinds() == ["motion_started", "motion_done"]
+    assert robot.states[-1].target_q == pytest.approx(list(q), abs=1e-6)
+    assert robot.states[0].target_q == pytest.approx(list(Q1), abs=1e-6)

@@ -1,0 +1,102 @@
+"""`tvist search`: look for ways to make a robot break what it promises."""
+
+from typing import Any
+
+from tvist_cli.failure import Failure
+from tvist_cli.output import number, out, print_json, progress, say, table
+
+
+def search(
+    *,
+    stops: int = 100,
+    streams: int = 50,
+    changes: int = 50,
+    sequences: int = 50,
+    seed: int = 0,
+    robot: str = "ur5e",
+    flexible: bool = False,
+    json: bool = False,
+) -> None:
+    """Try random stops, streams, changes in motion and whole sequences of commands, and check what must hold.
+
+    A stop stays on the way of the motion, never gets ahead of it, rests no later and keeps the torque; the reference
+    stays clear of floor and arm; every motion ends once; from everywhere there is a way back to motion. Whatever is
+    found is printed with the number of its case, and the exit code is 1.
+
+    Args:
+        stops: How many stops of every kind to try, at random moments of accepted moves.
+        streams: How many streams of set-points towards the floor, the arm itself and limits.
+        changes: How many changes of payload, shaper, estimator and speed in mid-motion.
+        sequences: How many sequences of 40 random commands.
+        seed: Of the cases: another seed tries others.
+        robot: Robot file, or the name of one that comes with the package.
+        flexible: Simulate the flexible arm in stops and streams, too, and say how far it goes beyond the reference.
+        json: Print one JSON object.
+    """
+    for name, count in (
+        ("stops", stops),
+        ("streams", streams),
+        ("changes", changes),
+        ("sequences", sequences),
+    ):
+        if not 0 <= count <= 1_000_000:
+            raise Failure(f"{name} is {count}: must be 0 to 1000000", code=2)
+    if not 0 <= seed < 2**31:
+        raise Failure(f"seed is {seed}: must be 0 to {2**31 - 1}", code=2)
+    from tvist_lab.safety.report import Counts, broken
+    from tvist_lab.safety.report import search as run
+
+    counts = Counts(stops, streams, changes, sequences)
+    if not counts.all:
+        raise Failure(
+            "there is nothing to search: give one of --stops --streams --changes --sequences", code=2
+        )
+    with progress(counts.all, "searching") as advance:
+        result = run(counts, seed, robot=robot, flexible=flexible, progress=lambda what: advance(1, what))
+    found = broken(result)
+    if json:
+        print_json(result)
+    else:
+        _print(result)
+    for one in found:
+        say(one)
+    if found:
+        raise Failure(f"{len(found)} of {counts.all} cases broke a promise", code=1)
+
+
+def _print(result: dict[str, Any]) -> None:
+    searched = {name: part for name, part in result.items() if isinstance(part, dict)}
+    columns = ("search", "cases", "broken", "refused or stopped", "below clearance [mm]", "flexible arm [mm]")
+    rows = []
+    for name, part in searched.items():
+        ended = part.get("refused", part.get("stopped_by_the_robot"))
+        near, deep = part.get("worst_below_clearance_m"), part.get("worst_penetration_of_the_flexible_arm_m")
+        rows.append(
+            (
+                name,
+                str(part["count"]),
+                str(len(part["broken"])),
+                number(ended, 0),
+                number(None if near is None else 1e3 * near, 2),
+                number(None if deep is None else 1e3 * deep, 2),
+            )
+        )
+    table("what was searched", columns, rows)
+    if "stops" in result:
+        kinds = result["stops"]["kinds"]
+        table(
+            "stops",
+            ("kind", "cases", "duration, median [s]", "largest [s]", "of the time left, median", "ran out"),
+            [
+                (
+                    kind,
+                    str(part["count"]),
+                    number(part["duration_s"]["median"], 3),
+                    number(part["duration_s"]["max"], 3),
+                    number(part["share_of_time_left"]["median"], 2),
+                    str(part["ran_out"]),
+                )
+                for kind, part in kinds.items()
+            ],
+        )
+    out.print("Below clearance: negative is clear; the flexible arm swings beyond its reference.")
