@@ -193,6 +193,7 @@ async def test_what_is_said_reaches_the_robot_as_it_was_said(fake, free):
         await arm.power_on()
         await arm.inject("torque", joint=1, seconds=1, value=-30)
         await arm.unlock_protective_stop()
+        await arm.restart_safety()
         await arm.hand_over("you")
     token = "me#1"
     assert fake.commands == [
@@ -208,6 +209,7 @@ async def test_what_is_said_reaches_the_robot_as_it_was_said(fake, free):
         c.PowerOn(token=token),
         c.SimulationInject(token=token, fault="torque", joint=1, seconds=1.0, value=-30.0),
         c.UnlockProtectiveStop(token=token),
+        c.RestartSafety(token=token),
         c.HandOver(token=token, client="you"),
         c.ReleaseControl(token=token),
     ]

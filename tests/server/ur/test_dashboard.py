@@ -159,6 +159,13 @@ def test_power_and_brakes_are_two_steps(client, control):
     ]
 
 
+@pytest.mark.parametrize("mode", [8, 9])
+def test_after_a_violation_or_a_fault_safety_is_restarted_and_nothing_else(client, control, desk, mode):
+    moved_to(desk, safety_mode=mode, safety_status=mode)
+    assert client.ask("restart safety") == "Restarting safety"
+    assert control.commands == [c.RestartSafety(token="the-token")]
+
+
 CHANGING = ["power on", "power off", "brake release", "restart safety", "unlock protective stop", "shutdown"]
 
 

@@ -1,5 +1,6 @@
 """`tvist search`: look for ways to make a robot break what it promises."""
 
+from pathlib import Path
 from typing import Any
 
 from tvist_cli.failure import Failure
@@ -15,6 +16,7 @@ def search(
     seed: int = 0,
     robot: str = "ur5e",
     flexible: bool = False,
+    markdown: Path | None = None,
     json: bool = False,
 ) -> None:
     """Try random stops, streams, changes in motion and whole sequences of commands, and check what must hold.
@@ -31,6 +33,7 @@ def search(
         seed: Of the cases: another seed tries others.
         robot: Robot file, or the name of one that comes with the package.
         flexible: Simulate the flexible arm in stops and streams, too, and say how far it goes beyond the reference.
+        markdown: File for a page with the figures.
         json: Print one JSON object.
     """
     for name, count in (
@@ -54,6 +57,14 @@ def search(
     with progress(counts.all, "searching") as advance:
         result = run(counts, seed, robot=robot, flexible=flexible, progress=lambda what: advance(1, what))
     found = broken(result)
+    if markdown is not None:
+        from tvist_lab.safety.markdown import page
+
+        asked = (
+            f"--stops {stops} --streams {streams} --changes {changes} --sequences {sequences} --seed {seed}"
+        )
+        command = f"tvist search {asked}{' --flexible' if flexible else ''}"
+        markdown.write_text(page(result, command), encoding="utf-8")
     if json:
         print_json(result)
     else:
