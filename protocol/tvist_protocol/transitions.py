@@ -38,23 +38,12 @@ class Activity(StrEnum):
     PROTECTIVE_STOP = "PROTECTIVE_STOP"
     """A protective stop, at rest, until it is unlocked."""
 
-    @property
-    def robot_mode(self) -> RobotMode:
-        """As RTDE numbers it."""
-        # Compared, since looking up an enumeration's member costs ten times as much: this is asked every tick.
-        if self is Activity.POWER_OFF or self is Activity.BRAKING:
-            return RobotMode.POWER_OFF
-        return RobotMode.IDLE if self is Activity.IDLE else RobotMode.RUNNING
-
-    @property
-    def moving(self) -> bool:
-        """Whether something moves, or is about to go on."""
-        return self in _MOVING
-
-    @property
-    def protective(self) -> bool:
-        """Whether it is a protective stop."""
-        return self is Activity.PROTECTIVE_STOPPING or self is Activity.PROTECTIVE_STOP
+    robot_mode: RobotMode
+    """As RTDE numbers it."""
+    moving: bool
+    """Whether something moves, or is about to go on."""
+    protective: bool
+    """Whether it is a protective stop."""
 
     def safety_mode(self, *, reduced: bool) -> SafetyMode:
         """As RTDE numbers it, as long as the safety system has nothing graver.
@@ -109,6 +98,18 @@ _MOVING = frozenset(
         _A.PROTECTIVE_STOPPING,
     }
 )
+_POWERLESS = frozenset({_A.POWER_OFF, _A.BRAKING})
+for _activity in Activity:
+    # Attributes of the members, since looking up another member costs ten times as much: these are asked every tick.
+    _activity.robot_mode = (
+        RobotMode.POWER_OFF
+        if _activity in _POWERLESS
+        else RobotMode.IDLE
+        if _activity is _A.IDLE
+        else RobotMode.RUNNING
+    )
+    _activity.moving = _activity in _MOVING
+    _activity.protective = _activity in {_A.PROTECTIVE_STOPPING, _A.PROTECTIVE_STOP}
 _FREE_TO_END = (_A.MOVING, _A.PAUSED, _A.STREAMING, _A.ENDING, _A.STOPPING)
 """Motion that is not yet ending for good."""
 _STANDING = (_A.POWER_OFF, _A.IDLE, _A.REST, _A.PROTECTIVE_STOP)

@@ -31,6 +31,10 @@ from tvist_shaping.base import Filter
 
 STREAM_TIMEOUT = 0.25
 """A stream without set-points for this long is stopped [s]."""
+LOOKS = 64
+"""Moments of a motion at which its torque is looked at before it is run ahead."""
+BLUNTED = 1.05
+"""By how much the shaped motion's torque may be beyond that of the unshaped one, which it lags behind [-]."""
 PAUSE_SHARE = 0.95
 """Share of the acceleration that torque leaves on the way that a pause uses: the filter may add a little [-]."""
 LEAST_PAUSE = 0.2
@@ -172,7 +176,7 @@ class MotionControl:
         most = largest_torque(
             cycle.inverse_dynamics, start, target - start, limits.velocity, limits.acceleration
         )
-        if (most <= allowed).all():
+        if (most <= allowed).all() or (self._torque_before_shaping() * BLUNTED <= allowed).all():
             return
         ahead = self.outlook.foresee()
         if ahead is None:
@@ -186,6 +190,13 @@ class MotionControl:
                 f"{most[joint] - limit:.1f} beyond its limit of {limit:g}: ask for less acceleration"
             )
             self._emit("warning", id=self._motion, code="limit_torque", why=why)
+
+    def _torque_before_shaping(self) -> Floats:
+        """Largest torques of the motion that has just begun as it would be without a filter, shape (n,) [N m]."""
+        assert self._trajectory is not None, "a motion has begun"
+        dynamics, states = self.cycle.inverse_dynamics, self._trajectory.states(LOOKS)
+        most: Floats = np.max([dynamics.effort(*state) for state in states], axis=0)
+        return most
 
     def set_speed(self, fraction: float) -> None:
         """Scale the time of motions, the one that runs and those to come; streams keep their client's time."""

@@ -45,16 +45,20 @@ class Differentiator:
 
     def update(self, q: Floats) -> Target:
         """Take the reference of this tick; target of the tick before."""
-        self._before, self._middle, self._last = self._middle, self._last, q
-        return self.published
+        before, middle = self._middle, self._last
+        self._before, self._middle, self._last = before, middle, q
+        return self._central(before, middle, q)
 
     @property
     def published(self) -> Target:
         """State of motion a tick before the newest reference, where central differences are exact to h²."""
+        return self._central(self._before, self._middle, self._last)
+
+    def _central(self, before: Floats, middle: Floats, last: Floats) -> Target:
         h = self._period
         # Differences of neighbours first: their rounding does not grow with the position.
-        rise, fall = self._last - self._middle, self._middle - self._before
-        return Target(q=self._middle, qd=(rise + fall) / (2.0 * h), qdd=(rise - fall) / (h * h))
+        rise, fall = last - middle, middle - before
+        return Target(q=middle, qd=(rise + fall) / (2.0 * h), qdd=(rise - fall) / (h * h))
 
     @property
     def newest(self) -> Target:

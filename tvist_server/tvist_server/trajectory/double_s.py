@@ -1,6 +1,7 @@
 """Point to point with a double-S velocity profile."""
 
 import copy
+from collections.abc import Iterator
 from typing import Self
 
 import numpy as np
@@ -15,8 +16,8 @@ LOOK_AHEAD = 2.0
 SOONER = 25
 """Ticks by which a pause must be over sooner than the motion, to be worth it."""
 
-SURELY = 0.3
-"""A pause that has this much time more than it needs until the motion brakes is sooner for certain [s]."""
+SURELY = 0.12
+"""So long before the motion brakes, and as much more as it lasts longer, a pause is sooner for certain [s]."""
 
 
 class DoubleS(Trajectory):
@@ -87,6 +88,12 @@ class DoubleS(Trajectory):
             early, late = (middle, late) if done < share else (early, middle)
         return late
 
+    def states(self, count: int) -> Iterator[tuple[Floats, Floats, Floats]]:
+        """Position, velocity and acceleration at some moments of the whole motion at full speed, each of shape (n,)."""
+        for time in np.linspace(0.0, self.duration, count).tolist():
+            q, qd, qdd = (np.array(values) for values in self._trajectory.at_time(time)[:3])
+            yield q, qd, qdd
+
     def next(self) -> Floats:
         """Position one tick further; the target exactly from the first tick at or after the end."""
         if self._pace.steady(self.speed):
@@ -146,8 +153,11 @@ class DoubleS(Trajectory):
         """
         paused = self.fork()
         paused.speed, paused._pace.acceleration = 0.0, acceleration  # noqa: SLF001  one of its own kind
-        lasts = self.velocity / acceleration + self.limits.acceleration / self.limits.jerk
-        if self.line.steady < lasts + SURELY and not _stands_sooner(paused, self.fork()):
+        most, line = self.limits.acceleration, self.line
+        longer = self.velocity * (1.0 / acceleration - 1.0 / most) + 2.0 * most / self.limits.jerk
+        if line.steady == 0.0 and self.rate == 1.0 and self._pace.steady(1.0):
+            return False  # it brakes as hard as it may
+        if line.steady < longer + SURELY and not _stands_sooner(paused, self.fork()):
             return False
         self.speed, self._pace.acceleration = 0.0, acceleration
         return True
