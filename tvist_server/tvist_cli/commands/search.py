@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from tvist_cli.failure import Failure
+from tvist_cli.failure import Failure, told
 from tvist_cli.output import number, out, print_json, progress, say, table
 
 
@@ -48,12 +48,16 @@ def search(
         raise Failure(f"seed is {seed}: must be 0 to {2**31 - 1}", code=2)
     from tvist_lab.safety.report import Counts, broken
     from tvist_lab.safety.report import search as run
+    from tvist_plant.description import DescriptionError, load
 
     counts = Counts(stops, streams, changes, sequences)
     if not counts.all:
         raise Failure(
             "there is nothing to search: give one of --stops --streams --changes --sequences", code=2
         )
+    with told(DescriptionError, code=2):
+        if load(robot).joints != 6:
+            raise Failure(f"robot {robot} has other than six joints: the postures to try are for six", code=2)
     with progress(counts.all, "searching") as advance:
         result = run(counts, seed, robot=robot, flexible=flexible, progress=lambda what: advance(1, what))
     found = broken(result)
@@ -64,7 +68,8 @@ def search(
             f"--stops {stops} --streams {streams} --changes {changes} --sequences {sequences} --seed {seed}"
         )
         command = f"tvist search {asked}{' --flexible' if flexible else ''}"
-        markdown.write_text(page(result, command), encoding="utf-8")
+        with told(OSError):
+            markdown.write_text(page(result, command), encoding="utf-8")
     if json:
         print_json(result)
     else:
