@@ -69,7 +69,8 @@ class _Signal:
         here = self.left(poles)
         columns = []
         for drivetrain in drivetrains:
-            moved, scratch = poles.copy(), np.zeros((len(self.mass), len(self.mass) + 1), dtype=complex)
+            L = len(self.mass)
+            moved, scratch = poles.copy(), np.zeros((L + len(poles), L + 1), dtype=complex)
             if not follow(self.mass, drivetrain.rows, moved, shapes.copy(), scratch):
                 moved = drivetrain.poles(self.mass)[0][:MODES]
             columns.append((self.left(moved) - here) / STEP)
