@@ -73,7 +73,7 @@ class StatusValues(Reading):
 
     @property
     def safety_mode(self) -> int:
-        """State: RTDE's number; 1 is NORMAL, 2 REDUCED, 3 PROTECTIVE_STOP."""
+        """State: RTDE's number; 1 is NORMAL, 2 REDUCED, 3 PROTECTIVE_STOP, 5 to 9 stops of the safety system."""
         return self.state.safety_mode
 
     @property
