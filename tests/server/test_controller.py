@@ -12,8 +12,8 @@ from tvist_protocol.values import Payload
 from tvist_server.about import info_of
 from tvist_server.controller import Controller
 from tvist_server.cycle import STILL
-from tvist_server.motion import STREAM_TIMEOUT
 from tvist_server.setup import body, paper_payload
+from tvist_server.streaming import TIMEOUT
 
 from .robots import PAPER, Q1, Q2, Q3, ROUNDING, UR5E, H, Robot, calibration, cut, setup
 
@@ -549,7 +549,7 @@ def test_a_stream_without_set_points_is_stopped_after_a_quarter_of_a_second(begu
     robot.tick(200)
     (event,) = robot.events
     assert event.kind == "stream_stopped"
-    assert event.tick == begun + 1 + round(STREAM_TIMEOUT / H)
+    assert event.tick == begun + 1 + round(TIMEOUT / H)
 
 
 def test_a_stream_that_falls_silent_in_mid_motion_stops_within_its_limits():

@@ -22,7 +22,7 @@ from tvist_protocol.modes import SafetyMode
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.transitions import Activity, after
 from tvist_server.controller import Controller
-from tvist_server.motion import STREAM_TIMEOUT
+from tvist_server.streaming import TIMEOUT
 
 from .robots import Q1, setup
 
@@ -305,7 +305,7 @@ class Sessions(RuleBasedStateMachine):
         now = self.robot.now
         if self.lease is not None and now >= self.lease.ends:
             self.lose_lease()
-        if self.activity is Activity.STREAMING and now - self.heard >= STREAM_TIMEOUT:
+        if self.activity is Activity.STREAMING and now - self.heard >= TIMEOUT:
             self.happen("interruption")
         state, events = self.robot.tick()
         kinds = [event.kind for event in events]

@@ -357,7 +357,7 @@ class Controller:
         """Choose the shaper."""
         self._authorize(command.token)
         chosen = self.filters.choose(command.name, self.declared, command.modes, "name")
-        self.motion.check_filter(chosen[1])
+        self.motion.ahead.check_filter(chosen[1])
         self.filters.use(chosen)
         return Done()
 
@@ -365,7 +365,7 @@ class Controller:
         """Choose the estimator."""
         self._authorize(command.token)
         chosen = self.filters.estimate(command, self.declared)
-        self.motion.check_filter(chosen[1])
+        self.motion.ahead.check_filter(chosen[1])
         self.filters.use(chosen)
         self.filters.warn_of_payload(self.declared)
         return Done()
@@ -376,7 +376,7 @@ class Controller:
         payload = Payload(mass=command.mass, com=command.com, inertia=command.inertia)
         check_body(payload, rated=self.setup.description.limits.payload)
         tvist = self.filters.with_payload(payload)
-        self.motion.check_payload(body(payload), tvist)
+        self.motion.ahead.check_payload(body(payload), tvist)
         self.declared = payload
         self.cycle.declare(body(payload))
         self.filters.declare(payload, tvist)

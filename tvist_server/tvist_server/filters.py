@@ -7,8 +7,8 @@ from tvist_protocol.values import Payload
 from tvist_server.calibrations import fits
 from tvist_server.choices import choose_filter, choose_source, make_estimator, wanted_modes
 from tvist_server.cycle import ControlCycle
+from tvist_server.events import Emit
 from tvist_server.mode_source import ModeSource, modal_source
-from tvist_server.motion import Emit
 from tvist_server.refusal import RefusalError
 from tvist_server.setup import Setup
 from tvist_shaping.base import Filter

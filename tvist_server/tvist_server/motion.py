@@ -4,11 +4,9 @@
 """
 
 from dataclasses import replace
-from typing import Protocol, TypedDict
 
 import numpy as np
 
-from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD, PlantError
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import Code
@@ -18,28 +16,18 @@ from tvist_protocol.values import ResetMode
 from tvist_server.brakes import brake
 from tvist_server.collision import CLEARANCE, CollisionModel
 from tvist_server.control.differentiator import Floats
-from tvist_server.cycle import STILL, ControlCycle, Sample
+from tvist_server.cycle import ControlCycle, Sample
+from tvist_server.events import NO_STOP, Emit, Told
+from tvist_server.moving import Move
 from tvist_server.outlook import Outlook
 from tvist_server.overload import Overload
 from tvist_server.refusal import RefusalError, out_of_turn
-from tvist_server.safety import REDUCED_SHARE, acceleration_on_way, largest_torque, torque_to_come
+from tvist_server.safety import REDUCED_SHARE
 from tvist_server.safety_system import SafetySystem
 from tvist_server.stops import StopPlan
-from tvist_server.trajectory import DoubleS, Limits, SetpointStream
+from tvist_server.streaming import TIMEOUT, Streaming
+from tvist_server.trajectory import Limits
 from tvist_server.way_ahead import WayAhead
-from tvist_shaping.base import Filter
-
-STREAM_TIMEOUT = 0.25
-"""A stream without set-points for this long is stopped [s]."""
-LOOKS = 64
-"""Moments of a motion at which its torque is looked at before it is run ahead."""
-BLUNTED = 1.05
-"""By how much the shaped motion's torque may be beyond that of the unshaped one, which it lags behind [-]."""
-PAUSE_SHARE = 0.95
-"""Share of the acceleration that torque leaves on the way that a pause uses: the filter may add a little [-]."""
-LEAST_PAUSE = 0.2
-"""Where torque leaves less than this share of a motion's acceleration to a pause, the motion goes on to its end [-]."""
-
 
 _PUT: dict[ResetMode, Activity] = {
     "RUNNING": Activity.REST,
@@ -57,35 +45,6 @@ _RUNTIME = {
     Activity.PROTECTIVE_STOPPING: RuntimeState.STOPPING,
 }
 """All else is STOPPED."""
-
-
-class Emit(Protocol):
-    """Puts down an event."""
-
-    def __call__(
-        self,
-        kind: EventKind,
-        *,
-        id: int | None = None,  # noqa: A002  the wire's name
-        code: Code | None = None,
-        why: str | None = None,
-        category: int | None = None,
-        duration: float | None = None,
-        way: float | None = None,
-    ) -> None:
-        """Of the tick that is being made, or of the next one between two."""
-
-
-class Told(TypedDict):
-    """What the event of a stop says of it."""
-
-    category: int | None
-    duration: float | None
-    way: float | None
-
-
-NO_STOP = Told(category=None, duration=None, way=None)
-"""Of an end that is no stop."""
 
 
 class MotionControl:
@@ -110,37 +69,30 @@ class MotionControl:
         self._emit = emit
         self.outlook = Outlook(cycle)
         """What the control line is going to do."""
-        self._ahead = WayAhead(cycle, self.outlook, collisions)
+        self.ahead = WayAhead(cycle, self.outlook, collisions)
+        """What would meet on its way."""
         limits = cycle.description.limits
         self._overload = Overload(limits.torque)
         self._reduced_velocity = REDUCED_SHARE * min(limits.velocity)
         self._started = 0
-        self._motion: int | None = None
-        self._trajectory: DoubleS | None = None
-        self._velocity = 0.0
-        """Limit of the running motion [rad/s]."""
+        self._move: Move | None = None
         self._speed = 1.0
-        self._held = False
-        """Whether the running motion is held by a pause."""
-        self._stream: SetpointStream | None = None
-        self._heard = 0.0
-        self._late, self._lost, self._limited = 0, 0, 0
+        self._streaming = Streaming()
 
     @property
     def streaming(self) -> bool:
         """Whether a stream of set-points is followed."""
-        return self._stream is not None
+        return self._streaming.stream is not None
 
     @property
     def sequence(self) -> int | None:
         """Newest set-point taken in; None without a stream, or before its first."""
-        return None if self._stream is None else self._stream.sequence
+        stream = self._streaming.stream
+        return None if stream is None else stream.sequence
 
     def counters(self) -> tuple[int, int, int]:
         """Late, lost and limited set-points since the start, the running stream's included."""
-        stream = self._stream
-        late, lost, limited = (stream.late, stream.lost, stream.limited) if stream else (0, 0, 0)
-        return self._late + late, self._lost + lost, self._limited + limited
+        return self._streaming.counters()
 
     def move(self, target: Floats, limits: Limits) -> int:
         """Start a point-to-point motion; its number.
@@ -163,40 +115,13 @@ class MotionControl:
         self.cycle.tvist.aim(target)
         self.cycle.start(trajectory)
         self._started += 1
-        self._motion, self._trajectory, self._velocity = self._started, trajectory, limits.velocity
-        self._held = False
+        move = self._move = Move(self._started, trajectory, limits.velocity, self.cycle)
         self._go("move_j")
-        self._emit("motion_started", id=self._motion)
-        self._warn_of_torque(start, target, spared)
-        return self._motion
-
-    def _warn_of_torque(self, start: Floats, target: Floats, limits: Limits) -> None:
-        """Say by how much a motion that has just begun will pass a limit of torque, where it will."""
-        cycle, allowed = self.cycle, self._overload.limits
-        most = largest_torque(
-            cycle.inverse_dynamics, start, target - start, limits.velocity, limits.acceleration
-        )
-        if (most <= allowed).all() or (self._torque_before_shaping() * BLUNTED <= allowed).all():
-            return
-        ahead = self.outlook.foresee()
-        if ahead is None:
-            return
-        most = torque_to_come(cycle.inverse_dynamics, ahead, PERIOD)[0]
-        joint = int(np.argmax(most / allowed))
-        if most[joint] > allowed[joint]:
-            name, limit = cycle.description.robot.joints[joint], allowed[joint]
-            why = (
-                f"torque of joint {name} will reach {most[joint]:.0f} N m, "
-                f"{most[joint] - limit:.1f} beyond its limit of {limit:g}: ask for less acceleration"
-            )
-            self._emit("warning", id=self._motion, code="limit_torque", why=why)
-
-    def _torque_before_shaping(self) -> Floats:
-        """Largest torques of the motion that has just begun as it would be without a filter, shape (n,) [N m]."""
-        assert self._trajectory is not None, "a motion has begun"
-        dynamics, states = self.cycle.inverse_dynamics, self._trajectory.states(LOOKS)
-        most: Floats = np.max([dynamics.effort(*state) for state in states], axis=0)
-        return most
+        self._emit("motion_started", id=move.number)
+        excess = move.excess_of_torque(self.outlook)
+        if excess is not None:
+            self._emit("warning", id=move.number, code="limit_torque", why=excess)
+        return move.number
 
     def set_speed(self, fraction: float) -> None:
         """Scale the time of motions, the one that runs and those to come; streams keep their client's time."""
@@ -210,21 +135,8 @@ class MotionControl:
             RefusalError: None is running.
         """
         self._go("pause")
-        self._hold()
-
-    def _hold(self) -> None:
-        """Slow the motion down to a standstill within the torque, where that ends it sooner."""
-        trajectory, cycle = self._trajectory, self.cycle
-        if trajectory is None or self._held:
-            return
-        most = trajectory.limits.acceleration
-        speed = max(trajectory.velocity, float(np.abs(cycle.newest.qd).max()))
-        left = trajectory.target - cycle.position
-        farthest = float(np.abs(left).max())
-        way = left * min(speed * speed / (most * max(farthest, STILL)), 1.0)
-        room = acceleration_on_way(cycle.inverse_dynamics, cycle.position, way, speed, self._overload.limits)
-        room *= PAUSE_SHARE
-        self._held = room > LEAST_PAUSE * most and trajectory.hold(min(room, most))
+        if self._move is not None:
+            self._move.hold()
 
     def resume(self) -> None:
         """Go on with a motion that was paused.
@@ -233,14 +145,13 @@ class MotionControl:
             RefusalError: None is.
         """
         self._go("resume")
-        if self._trajectory is not None and self._held:
-            self._trajectory.release(self._rate(self._velocity))
-        self._held = False
+        if self._move is not None:
+            self._move.release(self._rate(self._move.velocity))
 
     @property
     def speed(self) -> float:
         """Rate of the running motion's time; without one, that of the next [-]."""
-        return self._speed if self._trajectory is None else self._trajectory.rate
+        return self._speed if self._move is None else self._move.rate
 
     @property
     def wanted_speed(self) -> float:
@@ -264,14 +175,15 @@ class MotionControl:
         return min(self._speed, self._reduced_velocity / velocity) if self.safety.reduced else self._speed
 
     def _set_rate(self) -> None:
-        if self._trajectory is not None and not self._held:
-            self._trajectory.speed = self._rate(self._velocity)
+        if self._move is not None:
+            self._move.go(self._rate(self._move.velocity))
 
     def reduce(self, *, reduced: bool) -> None:
         """Slow motions down on their way, or let them go on; a stream, whose time is its client's, is stopped."""
         self.safety.reduced = reduced
         self._set_rate()
-        if reduced and self._stream is not None and self._stream.limits.velocity > self._reduced_velocity:
+        stream = self._streaming.stream
+        if reduced and stream is not None and stream.limits.velocity > self._reduced_velocity:
             self.stop(None, "speed was reduced", "limit_velocity")
 
     def power_on(self, *, release_brakes: bool = True) -> None:
@@ -306,7 +218,7 @@ class MotionControl:
 
     def until_rest(self) -> tuple[float | None, float | None]:
         """How long it takes until the shaped reference rests [s], and how far it goes [rad]; see `WayAhead`."""
-        return self._ahead.until_rest()
+        return self.ahead.until_rest()
 
     def power_off(self) -> None:
         """Stop what moves, then take the power; the brakes hold the arm where it is."""
@@ -371,15 +283,12 @@ class MotionControl:
             why = f"velocity is {limits.velocity:g} rad/s; safety_mode is REDUCED, which leaves {most:.3g}"
             raise RefusalError("limit_velocity", "velocity", why, most)
         self.activity = target
-        self._stream = self.cycle.stream(period, limits)
-        self._ahead.begin()
-        self._heard = now
+        self._streaming.begin(self.cycle.stream(period, limits), now)
+        self.ahead.begin()
 
     def offer(self, sequence: int, q: Floats, now: float) -> None:
         """Take a set-point of the running stream."""
-        if self._stream is not None:
-            self._heard = now
-            self._stream.offer(sequence, q)
+        self._streaming.offer(sequence, q, now)
 
     def end_stream(self) -> None:
         """Bring the stream to rest through the filter.
@@ -387,16 +296,17 @@ class MotionControl:
         Raises:
             RefusalError: None is running.
         """
-        if self._stream is None:
+        stream = self._streaming.stream
+        if stream is None:
             raise out_of_turn("servo_stop", self.activity)
-        end = self.cycle.end_of(self._stream)
-        met = self._ahead.after_stream(end)
+        end = self.cycle.end_of(stream)
+        met = self.ahead.after_stream(end)
         if met is not None:
             self.interrupt(f"{met} before the stream came to rest through the filter", "collision")
             return
         self._go("servo_stop")
         self.cycle.start(end)
-        self._forget_stream("servo_stop")
+        self._end_stream("servo_stop")
 
     def stop(self, deceleration: float | None, why: str, code: Code | None = None) -> None:
         """Stop past the filter, and say how what was moving ended.
@@ -436,11 +346,11 @@ class MotionControl:
         if target is None:
             return
         self.activity = target
-        plan = None if self.cycle.at_rest else self._ahead.stop(deceleration)
+        plan = None if self.cycle.at_rest else self.ahead.stop(deceleration)
         if plan is not None and plan.limited:
             kept = "the motion's own" if plan.acceleration is None else f"{plan.acceleration:.3g} rad/s²"
             why = f"{why}; deceleration is {kept}, limited from {deceleration:.3g}"
-        bare = self._motion is None  # what has no number ends without a word on limits
+        bare = self._move is None  # what has no number ends without a word on limits
         self._tell_end(plan, why, code, kind, category)
         if bare and plan is not None and plan.limited:
             self._emit("warning", code="limit_acceleration", why=why)
@@ -449,20 +359,19 @@ class MotionControl:
         self, plan: StopPlan | None, why: str, code: Code | None, kind: EventKind | None, category: int
     ) -> None:
         """Tell of a stop, and of what it has ended."""
-        duration, way = (0.0, 0.0) if self.cycle.at_rest else self._ahead.until_rest(plan)
+        if kind is None and self._move is None and not self.streaming:
+            return
+        duration, way = (0.0, 0.0) if self.cycle.at_rest else self.ahead.until_rest(plan)
         told = Told(category=category, duration=duration, way=way)
         if kind is not None:
             self._emit(kind, code=code, why=why, **told)
-        if self._stream is not None:
-            self._forget_stream(why, code, told)
-        if self._motion is not None:
-            self._end_motion(why, code, told)
+        self._end_stream(why, code, told)
+        self._end_motion(why, code, told)
 
     def abandon(self, why: str, code: Code | None = None) -> None:
         """Say that what was moving ended: the arm is put elsewhere."""
-        self._forget_stream(why, code)
-        if self._motion is not None:
-            self._end_motion(why, code)
+        self._end_stream(why, code)
+        self._end_motion(why, code)
 
     def put(self, mode: ResetMode | None) -> None:
         """Be in a robot mode; None: in the present one, at rest. The arm was put somewhere at rest before."""
@@ -479,8 +388,8 @@ class MotionControl:
 
     def watch(self, now: float) -> None:
         """End a stream that nobody keeps up."""
-        if self._stream is not None and now - self._heard >= STREAM_TIMEOUT:
-            self.interrupt(f"no set-point for {STREAM_TIMEOUT:g} s")
+        if self._streaming.is_silent(now):
+            self.interrupt(f"no set-point for {TIMEOUT:g} s")
 
     def step(self) -> Sample:
         """One tick of the line.
@@ -490,7 +399,7 @@ class MotionControl:
         """
         sample = self.cycle.step()
         if self.cycle.stopping and self.activity in {Activity.STREAMING, Activity.ENDING}:
-            self.end("interruption", str(self._ahead.met), "collision")
+            self.end("interruption", str(self.ahead.met), "collision")
         if self.cycle.at_rest and self.activity.moving:
             self._arrive()
         if self.activity.robot_mode is RobotMode.RUNNING:
@@ -502,9 +411,9 @@ class MotionControl:
         target = after(self.activity, "at_rest")
         if target is not None:
             self.activity = target
-            if self._motion is not None:
-                self._emit("motion_done", id=self._motion)
-                self._forget_motion()
+            if self._move is not None:
+                self._emit("motion_done", id=self._move.number)
+                self._move = None
 
     def _watch_torque(self, sample: Sample) -> None:
         """Protect drives that give more than they should for longer than they may."""
@@ -515,46 +424,11 @@ class MotionControl:
             why = f"torque of joint {name} is {moment:.0f} N m; beyond its {limit:g} for more than 10 ms"
             self.protect(why, "limit_torque")
 
-    def check_payload(self, payload: Payload, tvist: Filter | None) -> None:
-        """Check the rest of what moves with another payload, and put it into the collision model.
-
-        Args:
-            payload: What the controller is to believe that the arm carries.
-            tvist: Filter that comes with it; None for the present one.
-
-        Raises:
-            RefusalError: Something would meet; nothing has changed.
-        """
-        before, q = self.collisions.carried, self.cycle.position
-        escaping = self.cycle.at_rest or self.collisions.meeting(q) is not None
-        self.collisions.carry(payload)
-        met = None if escaping else self.collisions.meeting(q)
-        met = met or self._ahead.rest_of_way(tvist)
-        if met is not None:
-            self.collisions.carry(before)
-            why = f"{met} on the rest of the way with this payload"
-            raise RefusalError("collision", "com", why, CLEARANCE)
-
-    def check_filter(self, tvist: Filter) -> None:
-        """Check the rest of a stream that has ended with another filter.
-
-        Raises:
-            RefusalError: Something would meet.
-        """
-        if self.activity is Activity.ENDING:
-            met = self._ahead.rest_of_way(tvist)
-            if met is not None:
-                raise RefusalError("collision", "name", f"{met} on the rest of the way", CLEARANCE)
-
     def _end_motion(self, why: str, code: Code | None, told: Told = NO_STOP) -> None:
-        self._emit("motion_stopped", id=self._motion, code=code, why=why, **told)
-        self._forget_motion()
+        if self._move is not None:
+            self._emit("motion_stopped", id=self._move.number, code=code, why=why, **told)
+            self._move = None
 
-    def _forget_motion(self) -> None:
-        self._motion, self._trajectory, self._held = None, None, False
-
-    def _forget_stream(self, why: str, code: Code | None = None, told: Told = NO_STOP) -> None:
-        if self._stream is not None:
-            self._late, self._lost, self._limited = self.counters()
-            self._stream = None
+    def _end_stream(self, why: str, code: Code | None = None, told: Told = NO_STOP) -> None:
+        if self._streaming.end():
             self._emit("stream_stopped", code=code, why=why, **told)

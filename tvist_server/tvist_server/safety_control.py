@@ -2,7 +2,8 @@
 
 from tvist_protocol.modes import SafetyMode
 from tvist_protocol.transitions import Activity, after
-from tvist_server.motion import Emit, MotionControl
+from tvist_server.events import Emit
+from tvist_server.motion import MotionControl
 from tvist_server.safety import REDUCED_SHARE
 from tvist_server.safety_system import Emergency, Latched
 

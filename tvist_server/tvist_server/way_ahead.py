@@ -4,12 +4,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD
-from tvist_server.collision import CollisionModel, Meeting
+from tvist_server.collision import CLEARANCE, CollisionModel, Meeting
 from tvist_server.control.differentiator import Floats
 from tvist_server.cycle import ControlCycle
 from tvist_server.look_ahead import LookAhead
 from tvist_server.outlook import Outlook, resting_after
+from tvist_server.refusal import RefusalError
 from tvist_server.safety import TorqueRoom
 from tvist_server.stops import StopPlan
 from tvist_server.trajectory import DoubleS, LineStop, SetpointStream, Stop
@@ -105,6 +107,40 @@ class WayAhead:
             found = collisions.on_line(cycle.position, trajectory.end)
             return None if found is None else found[1]
         return self._on(self._outlook.foresee(tvist))
+
+    def check_payload(self, payload: Payload, tvist: Filter | None) -> None:
+        """Check the rest of what moves with another payload, and put it into the collision model.
+
+        Args:
+            payload: What the controller is to believe that the arm carries.
+            tvist: Filter that comes with it; None for the present one.
+
+        Raises:
+            RefusalError: Something would meet; nothing has changed.
+        """
+        collisions, q = self._collisions, self._cycle.position
+        before = collisions.carried
+        escaping = self._cycle.at_rest or collisions.meeting(q) is not None
+        collisions.carry(payload)
+        met = None if escaping else collisions.meeting(q)
+        met = met or self.rest_of_way(tvist)
+        if met is not None:
+            collisions.carry(before)
+            why = f"{met} on the rest of the way with this payload"
+            raise RefusalError("collision", "com", why, CLEARANCE)
+
+    def check_filter(self, tvist: Filter) -> None:
+        """Check the rest of what comes to rest through the filter off any line, with another filter.
+
+        Raises:
+            RefusalError: Something would meet.
+        """
+        cycle = self._cycle
+        if cycle.guard is None or cycle.stopping or isinstance(cycle.trajectory, SetpointStream):
+            return
+        met = self.rest_of_way(tvist)
+        if met is not None:
+            raise RefusalError("collision", "name", f"{met} on the rest of the way", CLEARANCE)
 
     def _tail_is_spacious(self, end: Stop) -> bool:
         """Whether there is room for whatever a filter makes of the references that it may still read."""

@@ -1,0 +1,45 @@
+"""A stream of set-points that is followed, and what was counted of all streams."""
+
+from tvist_server.control.differentiator import Floats
+from tvist_server.trajectory import SetpointStream
+
+TIMEOUT = 0.25
+"""A stream without set-points for this long is stopped [s]."""
+
+
+class Streaming:
+    """Follows one stream at a time."""
+
+    def __init__(self) -> None:
+        self.stream: SetpointStream | None = None
+        """The one that is followed."""
+        self._heard = 0.0
+        self._late, self._lost, self._limited = 0, 0, 0
+
+    def begin(self, stream: SetpointStream, now: float) -> None:
+        """Follow a stream from a time on [s]."""
+        self.stream, self._heard = stream, now
+
+    def offer(self, sequence: int, q: Floats, now: float) -> None:
+        """Take a set-point."""
+        if self.stream is not None:
+            self._heard = now
+            self.stream.offer(sequence, q)
+
+    def is_silent(self, now: float) -> bool:
+        """Whether set-points have failed to come."""
+        return self.stream is not None and now - self._heard >= TIMEOUT
+
+    def end(self) -> bool:
+        """Follow it no longer, and keep its counts; whether there was one."""
+        if self.stream is None:
+            return False
+        self._late, self._lost, self._limited = self.counters()
+        self.stream = None
+        return True
+
+    def counters(self) -> tuple[int, int, int]:
+        """Late, lost and limited set-points since the start, the present stream's included."""
+        stream = self.stream
+        late, lost, limited = (stream.late, stream.lost, stream.limited) if stream else (0, 0, 0)
+        return self._late + late, self._lost + lost, self._limited + limited
