@@ -14,6 +14,10 @@ MARGIN = 0.8
 on the way [-]."""
 
 
+FRESH = 8
+"""Ticks for which the acceleration that the torque leaves is taken for what it was: the margin covers what changes."""
+
+
 class LookAhead:
     """Looks at the stop from the state of motion that a reference would lead to.
 
@@ -50,12 +54,14 @@ class LookAhead:
         self._room = 0.0
         self._carried = collisions.carried
         self._before: tuple[Target, float | Stop] | None = None
+        self._acceleration, self._age = GENTLEST_STOP, FRESH
         self.met: Meeting | None = None
         """What the reference that was refused last would have led to."""
 
     def begin(self, state: Target) -> None:
         """Start from rest."""
         self._before, self.met = (state, GENTLEST_STOP), None
+        self._acceleration, self._age = GENTLEST_STOP, FRESH
 
     def __call__(self, state: Target) -> Stop | None:
         """Whether a reference may be played.
@@ -103,15 +109,20 @@ class LookAhead:
 
     def _permitted(self, state: Target) -> float | Stop | None:
         """The limit of a stop that is clear, or the stop; None where there is none."""
-        if self.is_spacious(state.q, self.turned(state.qd, state.qdd, GENTLEST_STOP)):
-            return GENTLEST_STOP
-        acceleration = min(max(MARGIN * self._gentle(state.q, state.qd), GENTLEST_STOP), self._highest)
-        if self.is_spacious(state.q, self.turned(state.qd, state.qdd, acceleration)):
-            return acceleration
-        stop = self._stop(state, acceleration)
+        self._age += 1
+        if self._age <= FRESH and self._is_spacious_for(state):
+            return self._acceleration
+        allowed = MARGIN * self._gentle(state.q, state.qd)
+        self._acceleration, self._age = min(max(allowed, GENTLEST_STOP), self._highest), 0
+        if self._is_spacious_for(state):
+            return self._acceleration
+        stop = self._stop(state, self._acceleration)
         if self.clear(stop):
             return stop
         return self._quickest(state, self.clear)
+
+    def _is_spacious_for(self, state: Target) -> bool:
+        return self.is_spacious(state.q, self.turned(state.qd, state.qdd, self._acceleration))
 
     def is_spacious(self, q: Floats, turned: Floats) -> bool:
         """Whether there is certainly room around q to turn the joints by so much."""
