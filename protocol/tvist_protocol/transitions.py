@@ -113,7 +113,8 @@ for _activity in Activity:
 _FREE_TO_END = (_A.MOVING, _A.PAUSED, _A.STREAMING, _A.ENDING, _A.STOPPING)
 """Motion that is not yet ending for good."""
 _STANDING = (_A.POWER_OFF, _A.IDLE, _A.REST, _A.PROTECTIVE_STOP)
-_DRIVEN = tuple(activity for activity in _A if activity not in {_A.POWER_OFF, _A.IDLE, _A.BRAKING})
+_LOSING_POWER = (_A.POWERING_OFF, _A.BRAKING)
+_DRIVEN = tuple(a for a in _A if a not in {_A.POWER_OFF, _A.IDLE, *_LOSING_POWER})
 
 TRANSITIONS: tuple[Transition, ...] = (
     Transition("take_control", (Control.FREE, Control.HELD), Control.HELD),
@@ -143,7 +144,7 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition("at_rest", (_A.PROTECTIVE_STOPPING,), _A.PROTECTIVE_STOP),
     Transition("unlock_protective_stop", (_A.PROTECTIVE_STOP,), _A.REST),
     Transition("plant_failure", _DRIVEN, _A.PROTECTIVE_STOP),
-    Transition("plant_failure", (_A.BRAKING,), _A.POWER_OFF),
+    Transition("plant_failure", _LOSING_POWER, _A.POWER_OFF),
 )
 """The table. `simulation.reset` is not in it: it puts the robot at REST, IDLE or POWER_OFF from everywhere."""
 

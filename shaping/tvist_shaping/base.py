@@ -151,6 +151,11 @@ class Filter(ABC):
         self.estimator, self._line = self.estimator.fork(), self._line.fork()
         self._q_star = self._q_star.copy()
 
+    @property
+    def settled(self) -> bool:
+        """Whether all that it may still read is one sample, so that its output rests."""
+        return self._line.still > self._reach
+
     def window(self) -> Floats:
         """Samples of the reference that it may still read, the oldest first, shape (k, joints) [rad]."""
         return self._line.newest(self._line.capacity)
@@ -161,7 +166,7 @@ class Filter(ABC):
         Where the line holds one sample as far as weights may reach, and did a tick ago, so that the shaped reference
         rests on it.
         """
-        if self._line.still > self._reach:
+        if self.settled:
             return self.estimator.settle(self._q_star)
         return self.estimator.estimate(self._q_star)
 

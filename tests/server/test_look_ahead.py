@@ -8,7 +8,7 @@ import pytest
 from tvist_lab.safety import changes, streams
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c
-from tvist_protocol.replies import Done, Refused
+from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_server.collision import CLEARANCE, CollisionModel
 from tvist_server.cycle import STILL
 from tvist_server.outlook import MOST_AHEAD, Outlook, resting_after
@@ -139,3 +139,26 @@ def test_info_says_how_long_stops_last():
         assert slow.duration < fast.duration
         assert slow.way < fast.way
     assert all(empty.way < loaded.way for empty, loaded in zip(info[:3], info[3:], strict=True))
+
+
+def test_a_stream_that_is_refused_from_standstill_ends_and_says_so():
+    """At the very edge of the clearance even the first set-point leads too far."""
+    robot = Robot()
+    model = robot.controller.motion.collisions
+    q, low = np.array([0.0, -0.2, 0.0, -1.57, 0.0, 0.0]), 0.8
+    while low - q[1] > 1e-9:  # halve: the lowest shoulder that is clear
+        middle = np.array([0.0, 0.5 * (q[1] + low), 0.0, -1.57, 0.0, 0.0])
+        if model.meeting(middle) is None:
+            q = middle
+        else:
+            low = float(middle[1])
+    robot.send(c.SimulationReset, q=tuple(q))
+    assert robot.send(c.ServoStart) == Done()
+    for sequence in range(100):
+        robot.setpoint(sequence, q + np.array([0.0, 1e-5 * sequence**2, 0.0, 0.0, 0.0, 0.0]))
+        robot.tick()
+    ended = [event for event in robot.events if event.kind == "stream_stopped"]
+    assert [event.code for event in ended] == ["collision"]
+    assert not robot.controller.motion.streaming
+    assert model.nearest(robot.column("target_q")) >= CLEARANCE - 1e-9
+    assert isinstance(robot.send(c.MoveJ, q=(0.0, -1.0, 0.0, -1.57, 0.0, 0.0)), Accepted)

@@ -268,7 +268,8 @@ def test_an_arm_that_is_no_longer_finite_is_put_at_rest_and_the_robot_goes_on(ac
     assert robot.send(c.SimulationInject, fault="nan") == Done()
     state = robot.tick()
     assert [(e.kind, e.code) for e in robot.events if e.code == "plant_failure"][-1][0] == "protective_stop"
-    driven = activity not in {Activity.POWER_OFF, Activity.IDLE, Activity.BRAKING}
+    powerless = {Activity.POWER_OFF, Activity.IDLE, Activity.BRAKING, Activity.POWERING_OFF}
+    driven = activity not in powerless
     assert state.safety_mode == (SafetyMode.PROTECTIVE_STOP if driven else SafetyMode.NORMAL)
     assert np.isfinite(state.actual_q).all()
     ended = [event for event in robot.events if event.kind in {"motion_done", "motion_stopped"}]

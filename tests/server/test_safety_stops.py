@@ -204,3 +204,46 @@ def test_brakes_bring_the_arm_to_rest_and_take_energy_all_the_way(seed):
     assert way.duration < 2.0
     assert (way.next() == q[-1]).all()
     assert way.end == pytest.approx(q[-1])
+
+
+def test_a_plant_that_fails_while_the_power_is_on_its_way_out_is_without_power():
+    robot = moving()
+    inject(robot, "emergency_stop")
+    robot.tick()
+    inject(robot, "nan")
+    state = robot.tick(3)
+    assert (state.robot_mode, state.safety_mode) == (RobotMode.POWER_OFF, SafetyMode.ROBOT_EMERGENCY_STOP)
+    assert robot.send(c.UnlockProtectiveStop).code == "wrong_mode"
+    assert robot.send(c.MoveJ, **MOVE).code == "wrong_mode"
+
+
+def test_each_emergency_stop_is_released_by_itself():
+    robot = Robot()
+    inject(robot, "emergency_stop", seconds=0.02)
+    inject(robot, "system_emergency_stop")
+    assert robot.tick().safety_mode == SafetyMode.ROBOT_EMERGENCY_STOP
+    assert robot.tick(20).safety_mode == SafetyMode.SYSTEM_EMERGENCY_STOP
+    assert robot.send(c.PowerOn).code == "wrong_mode"
+
+
+@pytest.mark.parametrize("fault", ["safeguard_stop", "emergency_stop", "reduced"])
+def test_an_input_that_is_set_anew_does_not_end_by_what_it_was_set_to_before(fault):
+    robot = Robot()
+    inject(robot, fault, seconds=0.1)
+    inject(robot, "normal")
+    assert robot.tick().safety_mode == SafetyMode.NORMAL
+    inject(robot, fault)
+    mode = robot.tick().safety_mode
+    assert mode != SafetyMode.NORMAL
+    assert robot.tick(200).safety_mode == mode
+
+
+def test_a_second_loss_of_power_while_the_brakes_work_says_how_long_they_still_do():
+    robot = moving(500)
+    inject(robot, "power_loss")
+    robot.tick(5)
+    inject(robot, "violation")
+    robot.tick()
+    first, second = told(robot, "safety_stop")
+    assert second.duration == pytest.approx(first.duration - 5 * H, abs=3 * H)
+    assert 0.0 < second.way < first.way

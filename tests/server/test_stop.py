@@ -177,9 +177,9 @@ def test_a_stop_on_a_line_is_at_no_moment_ahead_of_any_motion_within_its_limits(
     direction = (Q3 - Q1) / np.abs(Q3 - Q1).max()
     for moment in random.integers(3, len(q) - 4, 10):
         before, at, after = q[moment - 1 : moment + 2]
-        qd, qdd = (after - before) / (2 * H), (after - 2 * at + before) / H**2
+        qdd = (after - 2 * at + before) / H**2
         acceleration = random.uniform(1.0, 5.0) * limits.acceleration
-        stop = LineStop(at, qd, qdd, direction, acceleration=acceleration, jerk=2000.0, period=H)
+        stop = LineStop(after, after - at, qdd, direction, acceleration=acceleration, jerk=2000.0, period=H)
         ahead = q[moment + 2 :]
         stopped = np.array([stop.next() for _ in ahead])
         leading = int(np.argmax(np.abs(direction)))
@@ -190,3 +190,33 @@ def test_a_stop_on_a_line_is_at_no_moment_ahead_of_any_motion_within_its_limits(
             np.abs(np.diff(stopped, 2, axis=0)).max() / H**2
             <= max(acceleration, np.abs(qdd).max()) + ROUNDING
         )
+
+
+@pytest.mark.parametrize("name", ["um_zv", "um_zvd"])
+@pytest.mark.parametrize("way", [0.003, 0.05, 0.6])
+def test_with_negative_impulses_a_motion_is_done_only_where_nothing_more_comes_of_the_filter(name, way):
+    """Their echoes cancel for a moment: a shaped reference that stands may go on."""
+    robot = Robot()
+    robot.send(c.SetEstimator, name="fixed", f_d=(5.0,), zeta=(0.05,))
+    robot.send(c.SetShaper, name=name)
+    robot.send(c.MoveJ, q=tuple(Q3 + way * (Q1 - Q3)) if way > 0.5 else tuple(Q1 + way))
+    robot.until_rest()
+    rested = robot.controller.cycle.position
+    robot.tick(300)
+    assert np.abs(robot.column("target_q")[-250:] - rested).max() < 1e-7
+
+
+def test_a_pause_while_the_slider_slows_is_not_ahead_of_what_the_slider_would_have_done():
+    def moving(command):
+        robot = Robot()
+        robot.send(c.SetShaper, name="mzv")
+        robot.send(c.MoveJ, q=tuple(Q3), velocity=3.0, acceleration=33.0, jerk=2000.0)
+        robot.tick(200)
+        robot.send(c.SetSpeed, fraction=0.25)
+        robot.tick(6)
+        if command is not None:
+            robot.send(command)
+        robot.tick(600)
+        return (robot.column("target_q") - Q1) @ (Q3 - Q1)
+
+    assert (moving(c.Pause) - moving(None)).max() <= 1e-9

@@ -135,7 +135,7 @@ class ControlCycle:
         trajectory = self.trajectory
         if self.at_rest or not (trajectory.finished or (self.running_out and trajectory.standing)):
             return
-        self.at_rest = not self.line_filter.fading and rests(reference, target)
+        self.at_rest = (self.stopping or self.line_filter.settled) and rests(reference, target)
         if self.at_rest and self.stopping:  # the delay line starts anew from where the stop ended
             self.line_filter.begin(self.tvist, reference)
         if self.at_rest and not trajectory.finished:  # what ran out was paused: it goes no further

@@ -14,6 +14,8 @@ from tvist_server.refusal import RefusalError
 from tvist_server.safety_control import SafetyControl
 from tvist_server.safety_system import Emergency
 
+_EMERGENCIES: dict[str, Emergency] = {"emergency_stop": "robot", "system_emergency_stop": "system"}
+
 
 class Faults:
     """Begins faults, and ends those that last.
@@ -34,7 +36,7 @@ class Faults:
             "nan": lambda: motion.cycle.arm.spoil(),  # noqa: PLW0108  the line may get another arm
         }
         self._push = np.zeros(motion.cycle.description.joints)
-        self._ends: list[tuple[int, int, Callable[[], None]]] = []
+        self._ends: list[tuple[int, int, str, Callable[[], None]]] = []
         self._number = count()
 
     def inject(self, command: SimulationInject, tick: int) -> None:
@@ -50,21 +52,22 @@ class Faults:
         _check(command, self._motion.cycle.description.joints)
         ticks = None if command.seconds is None else round(command.seconds / PERIOD)
         safety = self._safety
+        self._forget(command.fault)
         match command.fault:
             case "reduced":
                 safety.reduce(reduced=True)
-                self._release(tick, ticks, lambda: safety.reduce(reduced=False))
+                self._release(tick, ticks, command.fault, lambda: safety.reduce(reduced=False))
             case "safeguard_stop":
                 safety.safeguard(stopped=True)
-                self._release(tick, ticks, lambda: safety.safeguard(stopped=False))
-            case "emergency_stop" | "system_emergency_stop":
-                whose: Emergency = "robot" if command.fault == "emergency_stop" else "system"
+                self._release(tick, ticks, command.fault, lambda: safety.safeguard(stopped=False))
+            case "emergency_stop" | "system_emergency_stop" as name:
+                whose = _EMERGENCIES[name]
                 safety.emergency(whose)
-                self._release(tick, ticks, lambda: safety.end_emergency(whose))
+                self._release(tick, ticks, command.fault, lambda: safety.end_emergency(whose))
             case "torque":
                 joint, value = command.joint or 0, command.value or 0.0
                 self._add(joint, value)
-                self._at(tick + (ticks or 0), lambda: self._add(joint, -value))
+                self._at(tick + (ticks or 0), "torque", lambda: self._add(joint, -value))
             case name:
                 self._momentary[name]()
 
@@ -80,12 +83,19 @@ class Faults:
         self._push[:] = 0.0
         self._motion.cycle.arm.push(self._push)
 
-    def _release(self, tick: int, ticks: int | None, end: Callable[[], None]) -> None:
-        if ticks is not None:
-            self._at(tick + ticks, end)
+    def _forget(self, fault: str) -> None:
+        """An input that is set anew, or released, does not end by what it was set to before."""
+        if fault != "torque":  # pushes add up, and each ends by itself
+            ended = {fault} if fault != "normal" else {"reduced", "safeguard_stop", *_EMERGENCIES}
+            self._ends = [one for one in self._ends if one[2] not in ended]
+            heapq.heapify(self._ends)
 
-    def _at(self, tick: int, end: Callable[[], None]) -> None:
-        heapq.heappush(self._ends, (tick, next(self._number), end))
+    def _release(self, tick: int, ticks: int | None, fault: str, end: Callable[[], None]) -> None:
+        if ticks is not None:
+            self._at(tick + ticks, fault, end)
+
+    def _at(self, tick: int, fault: str, end: Callable[[], None]) -> None:
+        heapq.heappush(self._ends, (tick, next(self._number), fault, end))
 
     def _add(self, joint: int, torque: float) -> None:
         self._push[joint] += torque

@@ -32,6 +32,14 @@ class LineFilter:
         return self._fade is not None
 
     @property
+    def settled(self) -> bool:
+        """Whether nothing that is still to come of it can move, once its output stands where its reference does.
+
+        Where weights are negative their echoes may cancel for a moment.
+        """
+        return self._fade is None and (self.tvist.peak == 1.0 or self.tvist.settled)
+
+    @property
     def peak(self) -> float:
         """By what factor the shaped acceleration may exceed the reference's, see `Filter.peak`."""
         fade = self._fade

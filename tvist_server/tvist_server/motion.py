@@ -110,8 +110,8 @@ class MotionControl:
         found = self.collisions.on_line(start, target)
         if found is not None:
             share, meeting = found
-            after = trajectory.time_at(share)
-            raise RefusalError("collision", "q", f"{meeting} {after:.2f} s after the start", CLEARANCE)
+            time = trajectory.time_at(share)
+            raise RefusalError("collision", "q", f"{meeting} {time:.2f} s after the start", CLEARANCE)
         self.cycle.tvist.aim(target)
         self.cycle.start(trajectory)
         self._started += 1
@@ -205,7 +205,8 @@ class MotionControl:
         """
         target = after(self.activity, "brakes")
         if target is None:
-            self._emit("safety_stop", why=why, category=0, duration=0.0, way=0.0)
+            duration, way = (0.0, 0.0) if self.cycle.at_rest else self.ahead.until_rest()
+            self._emit("safety_stop", why=why, category=0, duration=duration, way=way)
             return
         self.activity = target
         cycle, plan = self.cycle, StopPlan(None, None, limited=False, duration=0.0, way=0.0)
@@ -380,7 +381,7 @@ class MotionControl:
             self.safety.clear()
         elif self.activity.protective:
             self.activity = Activity.PROTECTIVE_STOP
-        elif self.activity is Activity.BRAKING or (self.safety.emergency and self.activity.moving):
+        elif self.activity is Activity.BRAKING or (self.safety.emergencies and self.activity.moving):
             self.activity = Activity.POWER_OFF
         elif self.activity.moving:
             self.activity = Activity.REST
@@ -398,7 +399,9 @@ class MotionControl:
             PlantError: The arm's state is no longer finite: `recover`.
         """
         sample = self.cycle.step()
-        if self.cycle.stopping and self.activity in {Activity.STREAMING, Activity.ENDING}:
+        stream = self._streaming.stream
+        refused = stream is not None and self.cycle.trajectory is not stream
+        if refused or (self.cycle.stopping and self.activity is Activity.ENDING):
             self.end("interruption", str(self.ahead.met), "collision")
         if self.cycle.at_rest and self.activity.moving:
             self._arrive()

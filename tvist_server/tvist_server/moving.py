@@ -56,6 +56,8 @@ class Move:
         way = left * min(speed * speed / (most * max(farthest, STILL)), 1.0)
         limits = np.array(cycle.description.limits.torque)
         room = PAUSE_SHARE * acceleration_on_way(cycle.inverse_dynamics, cycle.position, way, speed, limits)
+        if not trajectory.steady:  # the slider has it brake or hurry already, with all that it may
+            room = most
         self._held = room > LEAST_PAUSE * most and trajectory.hold(min(room, most))
 
     def release(self, rate: float) -> None:

@@ -37,7 +37,7 @@ class Outlook:
         """Run the references ahead: what they will be if nothing is commanded.
 
         Args:
-            tvist: A filter to change to now; None for no change.
+            tvist: A filter to change to now; None for no change. A stop bypasses any.
             trajectory: One to follow from now on; None for the present one.
 
         Returns:
@@ -55,7 +55,8 @@ class Outlook:
             shaped = reference if stopping else line_filter.filter(reference)
             target = differentiator.update(shaped)
             ahead.append(shaped)
-            if trajectory.standing and not line_filter.fading and rests(reference, target):
+            settled = stopping or line_filter.settled
+            if trajectory.standing and settled and rests(reference, target):
                 return np.array(ahead)
         return None
 
@@ -125,18 +126,23 @@ class Outlook:
 
     def _on_line(self, line: Line, deceleration: float | None) -> StopPlan | None:
         cycle, line = self._cycle, self._shaped(line)
-        stop = self.stops.on_line(cycle.published, line, deceleration)
+        stop = self.stops.on_line(cycle.published, cycle.position, line, deceleration)
         if stop is None:
             ahead = self.foresee()
-            if ahead is None:
-                return None if cycle.stopping else StopPlan(None, None, deceleration is not None, None, None)
+            if ahead is None:  # it lasts for so long that any stop is sooner
+                stop = self.stops.on_line(cycle.published, cycle.position, line, deceleration, certain=False)
+                if stop is None:
+                    return (
+                        None if cycle.stopping else StopPlan(None, None, deceleration is not None, None, None)
+                    )
+                return self._plan(stop, deceleration, stop.duration, stop.end)
             last = resting_after(ahead)
             stop = self.stops.under(ahead, last, cycle.published, line, deceleration)
             if stop is None and cycle.stopping:
                 return None
             if stop is None:
                 return self._plan(None, deceleration, (last - 1) * PERIOD, ahead[-1])
-        return self._plan(stop, deceleration, stop.duration - PERIOD, stop.end)
+        return self._plan(stop, deceleration, stop.duration, stop.end)
 
     def _plan(
         self, stop: Stop | LineStop | None, wanted: float | None, duration: float, end: Floats

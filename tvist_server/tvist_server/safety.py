@@ -54,24 +54,23 @@ class TorqueRoom:
 class StopTorque:
     """What a stop may ask of the joints' torques.
 
-    Every torque of the rigid arm along the stop stays within its share of the limit. Where the motion already takes
-    more at this moment, or would take more later if it were not stopped, the stop may, too.
+    Every torque of the rigid arm along the stop stays within its share of the limit. Where the motion itself would take
+    more if it were not stopped, the stop may, too.
 
     Args:
         dynamics: Inverse dynamics with the declared payload.
         state: Where the stop begins.
         limits: Of the joints' torque, shape (n,) [N m].
-        asked: Largest that the motion itself would ask from now on, shape (n,) [N m]; None where that is not known.
+        asked: Largest that the motion itself would ask from now on, shape (n,) [N m]; None: what it asks now.
     """
 
     def __init__(
         self, dynamics: InverseDynamics, state: Target, limits: Floats, asked: Floats | None = None
     ) -> None:
         self._dynamics = dynamics
-        present = dynamics.effort(state.q, state.qd, state.qdd)
-        if asked is not None:
-            present = np.maximum(present, asked)
-        self._share, self._most = np.maximum(TORQUE_SHARE * limits, present), np.maximum(limits, present)
+        if asked is None:
+            asked = dynamics.effort(state.q, state.qd, state.qdd)
+        self._share, self._most = np.maximum(TORQUE_SHARE * limits, asked), np.maximum(limits, asked)
         self._before = dynamics.torque(state.q, state.qd, state.qdd) - dynamics.gravity(state.q)
 
     def holds(self, stop: Stop | LineStop, *, rebound: bool = True) -> bool:

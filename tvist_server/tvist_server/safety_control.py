@@ -1,6 +1,5 @@
 """What the safety system does: reduced speed, and stops of UR's categories 0, 1 and 2."""
 
-from tvist_protocol.modes import SafetyMode
 from tvist_protocol.transitions import Activity, after
 from tvist_server.events import Emit
 from tvist_server.motion import MotionControl
@@ -28,8 +27,7 @@ class SafetyControl:
             return
         motion.reduce(reduced=reduced)
         share = f"{100 * REDUCED_SHARE:g} % of the joints' limits" if reduced else "no longer reduced"
-        mode = SafetyMode.REDUCED if reduced else motion.safety_mode
-        self._emit("warning", why=f"safety_mode is {mode.name}: speed is {share}")
+        self._emit("warning", why=f"safety_mode is {motion.safety_mode.name}: speed is {share}")
 
     def safeguard(self, *, stopped: bool) -> None:
         """Stop by category 2, or allow motion again: a motion pauses and then goes on, a stream ends.
@@ -61,21 +59,21 @@ class SafetyControl:
 
     def emergency(self, whose: Emergency) -> None:
         """Stop by category 1: on the way, then without power until it is released."""
-        if self._motion.safety.emergency is None:
-            self._motion.safety.emergency = whose
+        pressed = self._motion.safety.emergencies
+        if whose not in pressed:
+            pressed.add(whose)
             why = f"the {whose}'s emergency stop was pressed"
             self._motion.end("power_off", why, kind="safety_stop", category=1)
 
     def end_emergency(self, whose: Emergency) -> None:
         """Release an emergency stop; the power stays off until it is switched on."""
-        if self._motion.safety.emergency == whose:
-            self._motion.safety.emergency = None
+        self._motion.safety.emergencies.discard(whose)
 
     def release(self) -> None:
         """Release all inputs: speed, safeguard and emergency stops."""
         self.reduce(reduced=False)
         self.safeguard(stopped=False)
-        self._motion.safety.emergency = None
+        self._motion.safety.emergencies.clear()
 
     def cut_power(self, why: str, latched: Latched | None = None) -> None:
         """Stop by category 0: the brakes close at once.

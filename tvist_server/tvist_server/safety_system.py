@@ -1,6 +1,6 @@
 """What the safety system allows: inputs that ask for less, and what stays until it is restarted."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from tvist_protocol.modes import SafetyMode
@@ -16,7 +16,7 @@ _EMERGENCIES = {
 }
 _LATCHED = {"violation": SafetyMode.VIOLATION, "fault": SafetyMode.FAULT}
 _MOTION = frozenset({"move_j", "servo_start", "resume"})
-_POWER = frozenset({"power_on", "power"})
+_LIVE = frozenset({*_MOTION, "power_on", "power", "unlock_protective_stop"})
 
 
 @dataclass
@@ -27,8 +27,8 @@ class SafetySystem:
     """Whether the speed is reduced."""
     safeguard: bool = False
     """Whether a safeguard asks for a stop."""
-    emergency: Emergency | None = None
-    """Whose emergency stop is pressed."""
+    emergencies: set[Emergency] = field(default_factory=set)
+    """Whose emergency stops are pressed."""
     latched: Latched | None = None
     """What it has found wrong, until it is restarted."""
 
@@ -40,8 +40,8 @@ class SafetySystem:
         """
         if self.latched is not None:
             return _LATCHED[self.latched]
-        if self.emergency is not None:
-            return _EMERGENCIES[self.emergency]
+        if self.emergencies:
+            return _EMERGENCIES["robot" if "robot" in self.emergencies else "system"]
         if self.safeguard and not activity.protective:
             return SafetyMode.SAFEGUARD_STOP
         return activity.safety_mode(reduced=self.reduced)
@@ -57,9 +57,9 @@ class SafetySystem:
             RefusalError: It is that.
         """
         mode = self.mode(activity)
-        if trigger in _POWER and self.latched is not None:
+        if trigger in _LIVE and self.latched is not None:
             raise RefusalError("wrong_mode", "", f"safety_mode is {mode.name}: send restart_safety first")
-        if trigger in _POWER and self.emergency is not None:
+        if trigger in _LIVE and self.emergencies:
             why = f"safety_mode is {mode.name}: release the emergency stop first"
             raise RefusalError("wrong_mode", "", why)
         if trigger in _MOTION and self.safeguard:
@@ -67,8 +67,9 @@ class SafetySystem:
             raise RefusalError("wrong_mode", "", why)
 
     def clear(self) -> None:
-        """Release safeguard and emergency stops, and forget what was found."""
-        self.safeguard, self.emergency, self.latched = False, None, None
+        """Release safeguard and emergency stops, and forget what was found; the speed stays reduced where it is."""
+        self.safeguard, self.latched = False, None
+        self.emergencies.clear()
 
     def restart(self) -> None:
         """Forget what it has found.

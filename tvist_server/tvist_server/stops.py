@@ -18,6 +18,8 @@ STEP = 0.8
 HARDER = 1.05
 """A stop that is harder than the motion's own braking by this is ahead of it nowhere, although a filter that varies
 may brake a little harder than its reference [-]."""
+SLOW = 1e-3
+"""Below this a shaped motion may turn back by what interpolation undershoots [rad/s]."""
 SOON = 0.02
 """A motion that brakes no sooner than this is behind a stop by then [s]."""
 COUNTED = 0.9
@@ -57,7 +59,9 @@ class StopPlanner:
         self._torque, self._position = np.array(limits.torque), np.array(limits.position)
         self._highest, self._jerk = min(limits.acceleration), min(limits.jerk)
 
-    def on_line(self, state: Target, line: Line, wanted: float | None) -> LineStop | None:
+    def on_line(
+        self, state: Target, newest: Floats, line: Line, wanted: float | None, *, certain: bool = True
+    ) -> LineStop | None:
         """The quickest stop along the line of a motion that is certain to be permitted.
 
         Never ahead of the motion, and never later at rest, is a stop that brakes harder than the motion ever will,
@@ -65,8 +69,10 @@ class StopPlanner:
 
         Args:
             state: A tick before the newest shaped reference.
+            newest: That, shape (n,) [rad].
             line: What is known of the motion.
             wanted: Deceleration asked for [rad/s^2]; None for as much as possible.
+            certain: False: take the quickest that keeps the torque, for a motion that will not rest for long.
 
         Returns:
             None where none is certain, or the motion is about to rest by itself.
@@ -74,16 +80,19 @@ class StopPlanner:
         leading = int(np.argmax(np.abs(line.direction)))
         sign = float(np.sign(line.direction[leading]))
         speed, rise = sign * float(state.qd[leading]), sign * float(state.qdd[leading])
-        if HARDER * line.jerk > self._jerk and line.steady < SOON:
-            return None  # it may brake with as much jerk as a stop
-        if rise < 0.0 and speed <= 1.1 * rise * rise / (2.0 * self._jerk):
-            return None  # it is about to rest: nothing within the limits is any sooner
         in_time = line.steady + COUNTED * max(speed, 0.0) / line.braking
+        # What hardly moves may turn back a little, what brakes with as much jerk as a stop may be as quick, and what is
+        # about to rest is quicker than anything within the limits.
+        creeps = speed < SLOW
+        jerks = HARDER * line.jerk > self._jerk and line.steady < SOON
+        rests = rise < 0.0 and speed <= 1.1 * rise * rise / (2.0 * self._jerk)
+        if certain and (creeps or jerks or rests or line.turns):
+            return None
 
         def permitted(stop: LineStop) -> bool:
-            return stop.acceleration >= HARDER * line.braking or stop.duration <= in_time
+            return not certain or stop.acceleration >= HARDER * line.braking or stop.duration <= in_time
 
-        return self._quickest_on_line(state, line, wanted, None, permitted)
+        return self._quickest_on_line(state, newest, line, wanted, np.zeros_like(state.q), permitted)
 
     def under(
         self, ahead: Floats, rests: int, state: Target, line: Line, wanted: float | None
@@ -103,15 +112,15 @@ class StopPlanner:
         """
         asked = torque_to_come(self._dynamics, ahead, self._period)[0]
         leading = int(np.argmax(np.abs(line.direction)))
-        along = (ahead[2:, leading] - state.q[leading]) * np.sign(line.direction[leading])
+        along = (ahead[2:, leading] - ahead[1, leading]) * np.sign(line.direction[leading])
 
         def permitted(stop: LineStop) -> bool:
-            if math.ceil(stop.duration / self._period) > rests:
+            if math.ceil(stop.duration / self._period) > rests - 1:
                 return False
-            shares = (stop.share((number + 2) * self._period) for number in range(len(along)))
+            shares = (stop.share((number + 1) * self._period) for number in range(len(along)))
             return all(share <= limit + ROUNDING for share, limit in zip(shares, along.tolist(), strict=True))
 
-        return self._quickest_on_line(state, line, wanted, asked, permitted)
+        return self._quickest_on_line(state, ahead[1], line, wanted, asked, permitted)
 
     def by_joints(self, state: Target, wanted: float | None, clear: Callable[[Stop], bool]) -> Stop | None:
         """The quickest stop of every joint by itself that is clear all along and keeps the torque.
@@ -146,15 +155,16 @@ class StopPlanner:
     def _quickest_on_line(
         self,
         state: Target,
+        newest: Floats,
         line: Line,
         wanted: float | None,
-        asked: Floats | None,
+        asked: Floats,
         permitted: Callable[[LineStop], bool],
     ) -> LineStop | None:
         torque = StopTorque(self._dynamics, state, self._torque, asked)
         stops = [
             LineStop(
-                state.q, state.qd, state.qdd, line.direction,
+                newest, newest - state.q, state.qdd, line.direction,
                 acceleration=acceleration, jerk=self._jerk, period=self._period,
             )
             for acceleration in self._ladder(wanted)

@@ -41,12 +41,11 @@ class ChangeOutcome:
 def judge(description: RobotDescription, seed: int) -> ChangeOutcome:
     """Change something at a random moment of a motion, now and then stop it afterwards, and watch."""
     random = np.random.default_rng([seed, 14])
-    robot, replies = _under_way(description, seed, random), []
+    robot = _under_way(description, seed, random)
     before = len(robot.references)
     resting = robot.controller.cycle.at_rest
     kind, fields = _draw(description, random)
     reply = robot.send(kind, **fields)
-    replies.append(reply)
     later = int(random.integers(0, 600))
     for tick in range(3000):
         if tick == later and random.random() < 0.5:

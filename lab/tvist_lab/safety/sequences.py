@@ -13,6 +13,7 @@ from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
+from tvist_protocol.faults import FAULTS as FAULT_FIELDS
 from tvist_protocol.replies import Accepted, Refused
 from tvist_protocol.transitions import Activity
 from tvist_server.collision import CLEARANCE, CollisionModel
@@ -29,7 +30,7 @@ VELOCITY, ACCELERATION = 1.003, 1.01
 """Shares of the joints' limits up to which a shaped reference may go [-]."""
 FAULTS = (
     "protective_stop", "safeguard_stop", "emergency_stop", "system_emergency_stop", "power_loss", "violation",
-    "fault", "reduced", *("normal",) * 5, "nan",
+    "fault", "reduced", *("normal",) * 3, "nan",
 )  # fmt: skip
 STOPS_ON_WAY = frozenset({"protective_stop", "safeguard_stop", "emergency_stop", "system_emergency_stop"})
 """Faults that stop a motion on its way."""
@@ -187,7 +188,6 @@ class Sequence:
         robot = self.robot
         self._ahead = None
         robot.send(c.SimulationInject, fault="normal")
-        robot.controller.client_gone("nobody")
         robot.token = robot.take_control()
         robot.send(c.Stop)
         self._tick_until_rest()
@@ -287,7 +287,13 @@ class Sequence:
         """A fault."""
         fault = str(self._random.choice(FAULTS))
         self.done.append(f"  fault {fault}")
-        return self.robot.send(c.SimulationInject, fault=fault)
+        lasts = self._random.random() < 0.3 and "seconds" in FAULT_FIELDS[fault].may
+        fields = {"seconds": float(self._random.uniform(0.0, 1.0))} if lasts else {}
+        reply = self.robot.send(c.SimulationInject, fault=fault, **fields)
+        system, activity = self.robot.controller.motion.safety, self.robot.controller.motion.activity
+        if (system.emergencies or system.latched) and activity in {Activity.REST, Activity.MOVING}:
+            raise self._broken(f"{activity} under {system}")
+        return reply
 
     def lose(self) -> object:
         """The client's liveliness token goes, and it takes control anew."""

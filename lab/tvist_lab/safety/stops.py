@@ -18,7 +18,7 @@ ROUNDING = 1e-9
 """Difference of two positions that counts as none [rad]."""
 TORQUE_ROUNDING = 1e-3
 """Share by which a torque may be beyond its bound, between the moments that a plan looks at [-]."""
-SHAPERS = ("none", "zv", "zvd", "ei3", "auto")
+SHAPERS = ("none", "zv", "mzv", "zvd", "zvddd", "ei3", "um_zv", "um_zvd", "auto", "auto-target", "short")
 
 Halt = Callable[[Subject, np.random.Generator], object]
 

@@ -35,6 +35,8 @@ class Line:
     """Largest jerk to come, of that joint [rad/s^3]."""
     steady: float
     """Time for which it does not slow down yet [s]; 0 where that is not known."""
+    turns: bool = False
+    """Whether it may turn back on its way."""
 
 
 class Trajectory(ABC):

@@ -13,6 +13,8 @@ from tvist_server.trajectory.pace import Pace
 LOOK_AHEAD = 2.0
 """Ticks by which the path is looked ahead of when its pace changes."""
 
+LONGEST_LOOK = 1500
+"""Ticks for which a motion is compared with its pause: one that lasts longer is not about to end."""
 SOONER = 25
 """Ticks by which a pause must be over sooner than the motion, to be worth it."""
 
@@ -99,14 +101,14 @@ class DoubleS(Trajectory):
         if self._pace.steady(self.speed):
             self._ticks += 1
         else:
-            time = self._time
+            time = self.time
             ends = (time, time + LOOK_AHEAD * self._period)
             curve = [np.array(self._trajectory.at_time(end)[1:3]) for end in ends]
             step = self._pace.advance(self.speed, curve)
             self._since, self._ticks = time + step, 0
         if self.finished:
             return self._target
-        return np.array(self._trajectory.at_time(self._time)[0])
+        return np.array(self._trajectory.at_time(self.time)[0])
 
     @property
     def target(self) -> Floats:
@@ -126,7 +128,7 @@ class DoubleS(Trajectory):
     @property
     def line(self) -> Line:
         """Its way; how soon it brakes is known where its rate does not change."""
-        time, rate = self._time, self._pace.rate
+        time, rate = self.time, self._pace.rate
         known = rate > 0.0 and self._pace.steady(self.speed)
         return Line(
             self._direction,
@@ -136,9 +138,14 @@ class DoubleS(Trajectory):
         )
 
     @property
+    def steady(self) -> bool:
+        """Whether its rate is what it is to be."""
+        return self._pace.steady(self.speed)
+
+    @property
     def velocity(self) -> float:
         """Of the joint that turns most, now [rad/s]."""
-        return float(np.abs(self._trajectory.at_time(self._time)[1]).max()) * self._pace.rate
+        return float(np.abs(self._trajectory.at_time(self.time)[1]).max()) * self._pace.rate
 
     def hold(self, acceleration: float) -> bool:
         """Pause, where that lets it stand noticeably sooner than if it were let go on.
@@ -173,19 +180,25 @@ class DoubleS(Trajectory):
         return other
 
     @property
-    def _time(self) -> float:
+    def time(self) -> float:
+        """How much of it has passed, at full speed [s]."""
         return self._since + self._ticks * self._pace.rate * self._period
 
     @property
     def finished(self) -> bool:
         """Whether the target was reached."""
-        return self._time >= self.duration
+        return self.time >= self.duration
 
 
 def _stands_sooner(paused: DoubleS, free: DoubleS) -> bool:
-    while not (paused.standing or free.standing):
+    """Whether the one stands noticeably sooner than the other, and is at no tick further on its way."""
+    for _ in range(LONGEST_LOOK):
+        if paused.standing or free.standing:
+            break
         paused.next()
         free.next()
+        if paused.time > free.time + 1e-12:
+            return False
     for _ in range(SOONER):
         free.next()
-    return paused.standing and not free.standing
+    return not free.standing

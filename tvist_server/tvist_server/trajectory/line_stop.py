@@ -14,13 +14,13 @@ class LineStop(Trajectory):
     taken back. So a stop that is at least as hard as anything the motion itself would have done never gets ahead of
     the motion.
 
-    It begins one tick before the newest reference, at the state of motion that central differences give there
-    without error, so that its first step already brakes.
+    Its first step brakes already, by as much jerk as it may: the second difference b of the positions last played
+    becomes b - jerk·h, and the state of motion that it goes on from is that of central differences with this step.
 
     Args:
-        q: Position a tick before the newest reference, shape (n,) [rad].
-        qd: Velocity there, along the line, shape (n,) [rad/s].
-        qdd: Acceleration there, along the line, shape (n,) [rad/s^2].
+        q: Newest reference, shape (n,) [rad].
+        step: By which it is ahead of the one before, along the line, shape (n,) [rad].
+        qdd: Second difference of the last three, along the line, shape (n,) [rad/s^2].
         direction: Of the line; its largest entry is 1 or -1, shape (n,).
         acceleration: Limit for the joint that turns most [rad/s^2].
         jerk: Limit for the joint that turns most [rad/s^3].
@@ -30,7 +30,7 @@ class LineStop(Trajectory):
     def __init__(
         self,
         q: Floats,
-        qd: Floats,
+        step: Floats,
         qdd: Floats,
         direction: Floats,
         *,
@@ -45,16 +45,23 @@ class LineStop(Trajectory):
         """Limit that it keeps [rad/s^3]."""
         leading = int(np.argmax(np.abs(direction)))
         sign = float(direction[leading])
+        before = sign * float(qdd[leading])
+        most = jerk * period
+        bend = (
+            max(before - most, -acceleration) if before > -acceleration else min(before + most, -acceleration)
+        )
+        goes_on = -jerk if bend > -acceleration else 0.0
+        speed = sign * float(step[leading]) / period + 0.5 * period * bend - period * period * goes_on / 6.0
         request = ruckig.InputParameter(1)
         request.control_interface = ruckig.ControlInterface.Velocity
-        request.current_position, request.current_velocity = [0.0], [sign * float(qd[leading])]
-        request.current_acceleration = [sign * float(qdd[leading])]
+        request.current_position, request.current_velocity = [0.0], [speed]
+        request.current_acceleration = [bend]
         request.target_velocity, request.target_acceleration = [0.0], [0.0]
         request.max_acceleration, request.max_jerk = [acceleration], [jerk]
         self._trajectory = ruckig.Trajectory(1)
         ruckig.Ruckig(1).calculate(request, self._trajectory)
         self._period = period
-        self._ticks = 1
+        self._ticks = 0
 
     @property
     def duration(self) -> float:
