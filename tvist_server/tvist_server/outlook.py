@@ -12,6 +12,8 @@ from tvist_server.stops import StopPlan, StopPlanner
 from tvist_server.trajectory import Line, LineStop, Stop, Trajectory
 from tvist_shaping.base import Filter
 
+EVEN = 1e-12
+"""Differences of steps below this are rounding [rad]."""
 MOST_AHEAD = 4000
 """Ticks that a motion is run ahead at most to see how it will end."""
 
@@ -157,7 +159,10 @@ class Outlook:
         if cycle.stopping:
             return line
         peak = cycle.line_filter.peak
-        known = peak == 1.0 and not cycle.line_filter.fading
+        known = peak == 1.0 and not cycle.line_filter.fading and line.steady > 0.0
+        if known:  # the filter gives back late what it was given, also how it was slowed down before
+            steps = np.diff(cycle.line_filter.window() @ line.direction)
+            known = bool((np.diff(steps) >= -EVEN * float(line.direction @ line.direction)).all())
         return Line(line.direction, peak * line.braking, peak * line.jerk, line.steady if known else 0.0)
 
 

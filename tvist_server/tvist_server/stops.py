@@ -18,7 +18,7 @@ STEP = 0.8
 HARDER = 1.05
 """A stop that is harder than the motion's own braking by this is ahead of it nowhere, although a filter that varies
 may brake a little harder than its reference [-]."""
-SLOW = 1e-3
+SLOW = 3e-3
 """Below this a shaped motion may turn back by what interpolation undershoots [rad/s]."""
 SOON = 0.02
 """A motion that brakes no sooner than this is behind a stop by then [s]."""

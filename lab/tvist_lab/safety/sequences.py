@@ -78,6 +78,7 @@ class Sequence:
         self._sequence = 0
         self._at = self._towards = self.robot.references[-1]
         self._braked = False
+        self._injected = ""
 
     def run(self, count: int = COMMANDS) -> None:
         """Send the commands, and see that the arm can be moved again afterwards.
@@ -94,8 +95,8 @@ class Sequence:
             said = reply.code if isinstance(reply, Refused) else type(reply).__name__
             self.done.append(f"tick {self.robot.controller.tick_number} {name}: {said}")
             if name != "wait":
-                slowed = name == "inject" and self.done[-2].split()[-1] not in STOPS_ON_WAY
-                self._ahead = None if slowed else before
+                goes_on = name == "inject" and self._injected not in STOPS_ON_WAY
+                self._ahead = None if goes_on else before
             self._tick(int(self._random.choice(PAUSES)))
         self._come_back()
 
@@ -287,8 +288,11 @@ class Sequence:
         """A fault."""
         fault = str(self._random.choice(FAULTS))
         self.done.append(f"  fault {fault}")
+        self._injected = fault
         lasts = self._random.random() < 0.3 and "seconds" in FAULT_FIELDS[fault].may
-        fields = {"seconds": float(self._random.uniform(0.0, 1.0))} if lasts else {}
+        fields = {}
+        if lasts:  # then what it stopped goes on by itself
+            fields, self._injected = {"seconds": float(self._random.uniform(0.0, 1.0))}, "for a while"
         reply = self.robot.send(c.SimulationInject, fault=fault, **fields)
         system, activity = self.robot.controller.motion.safety, self.robot.controller.motion.activity
         if (system.emergencies or system.latched) and activity in {Activity.REST, Activity.MOVING}:

@@ -1,5 +1,7 @@
 """To rest on a straight line, all joints in phase."""
 
+import math
+
 import numpy as np
 import ruckig
 
@@ -46,12 +48,15 @@ class LineStop(Trajectory):
         leading = int(np.argmax(np.abs(direction)))
         sign = float(direction[leading])
         before = sign * float(qdd[leading])
-        most = jerk * period
-        bend = (
-            max(before - most, -acceleration) if before > -acceleration else min(before + most, -acceleration)
-        )
+        most, present = jerk * period, max(sign * float(step[leading]) / period, 0.0)
+        # The hardest from which the velocity still comes to nothing without turning back.
+        turning = jerk * (0.5 * period - math.sqrt(0.25 * period**2 + 2.0 * present / jerk))
+        if before > -acceleration:
+            bend = max(before - most, -acceleration, turning)
+        else:
+            bend = min(before + most, -acceleration)
         goes_on = -jerk if bend > -acceleration else 0.0
-        speed = sign * float(step[leading]) / period + 0.5 * period * bend - period * period * goes_on / 6.0
+        speed = present + 0.5 * period * bend - period * period * goes_on / 6.0
         request = ruckig.InputParameter(1)
         request.control_interface = ruckig.ControlInterface.Velocity
         request.current_position, request.current_velocity = [0.0], [speed]
