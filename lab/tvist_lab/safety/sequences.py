@@ -176,7 +176,7 @@ class Sequence:
         along = way / length
         reached, there = (q - references[0]) @ along, references[min(tick, len(references) - 1)]
         # At rest counts from 1e-7 rad a tick: what is left of the filter still creeps.
-        creeps = STILL if tick >= len(references) else 0.0
+        creeps = 10.0 * STILL if tick >= len(references) else 0.0
         if reached > (there - references[0]) @ along + ROUNDING + creeps:
             raise self._broken("a stop is ahead of what the motion would have done")
         if np.abs(q - references[0] - reached * along).max() > ROUNDING:
