@@ -1,6 +1,5 @@
 """Changes while the arm moves: payload, shaper, estimator, speed, reduced speed, in moves and streams."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,12 +65,6 @@ def judge(description: RobotDescription, seed: int) -> ChangeOutcome:
         near=-1.0 if resting else CLEARANCE - collisions.nearest(np.array(robot.references[before:])),
         refused=isinstance(reply, Refused) and reply.code == "collision",
     )
-
-
-def search(description: RobotDescription, count: int, seed: int) -> Iterator[ChangeOutcome]:
-    """Many of them."""
-    for number in range(count):
-        yield judge(description, seed * 1_000_000 + number)
 
 
 def far_payload(random: np.random.Generator, rated: float) -> Payload:

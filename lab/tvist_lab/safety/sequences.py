@@ -1,6 +1,6 @@
 """Whole random sequences of commands, whatever they are, and what must hold throughout."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -335,17 +335,3 @@ _SENT: dict[str, tuple[float, Callable[[Sequence], object]]] = {
     "wait": (3.0, lambda it: it.robot.send(c.KeepAlive)),
 }
 """What may be sent, and how often."""
-
-
-def search(
-    description: RobotDescription, count: int, seed: int, *, flexible: bool = False
-) -> Iterator[Sequence | BrokenError]:
-    """Many of them; one that breaks a promise gives what it broke."""
-    for number in range(count):
-        sequence = Sequence(description, seed * 1_000_000 + number, flexible=flexible)
-        try:
-            sequence.run()
-        except BrokenError as error:
-            yield error
-        else:
-            yield sequence

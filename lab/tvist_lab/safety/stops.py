@@ -1,6 +1,6 @@
 """Stops of every kind at random moments of accepted moves, against the same moves left alone."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -165,14 +165,6 @@ def judge(description: RobotDescription, case: Case, *, flexible: bool = False) 
         told=(None, None) if told is None else (told.duration, told.way),
         way=float(np.abs(stopped[-1] - stopped[case.moment]).max()),
     )
-
-
-def search(
-    description: RobotDescription, count: int, seed: int, *, flexible: bool = False
-) -> Iterator[Outcome]:
-    """Many of them."""
-    for number in range(count):
-        yield judge(description, draw(description, seed * 1_000_000 + number), flexible=flexible)
 
 
 def moving(description: RobotDescription, case: Case, *, flexible: bool = False) -> Subject:

@@ -1,6 +1,6 @@
 """Streams of set-points at the floor, at the arm itself and at limits, cut or ended at random."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -147,11 +147,3 @@ def judge(description: RobotDescription, case: StreamCase, *, flexible: bool = F
         stopped=any(event.code == "collision" for event in robot.events),
         beyond=float((np.abs(references) - reach).max()),
     )
-
-
-def search(
-    description: RobotDescription, count: int, seed: int, *, flexible: bool = False
-) -> Iterator[StreamOutcome]:
-    """Many of them."""
-    for number in range(count):
-        yield judge(description, draw(description, seed * 1_000_000 + number), flexible=flexible)
