@@ -6,7 +6,7 @@ from tvist_plant.plant import PERIOD
 from tvist_server.control.differentiator import Floats
 from tvist_server.cycle import STILL, ControlCycle
 from tvist_server.outlook import Outlook
-from tvist_server.safety import acceleration_on_way, largest_torque, torque_to_come
+from tvist_server.safety import acceleration_on_way, largest_torque, torque_along
 from tvist_server.trajectory import DoubleS
 
 LOOKS = 64
@@ -83,7 +83,7 @@ class Move:
         ahead = outlook.foresee()
         if ahead is None:
             return None
-        most = torque_to_come(dynamics, ahead, PERIOD)[0]
+        most = torque_along(dynamics, ahead, PERIOD)
         joint = int(np.argmax(most / allowed))
         name, limit = cycle.description.robot.joints[joint], allowed[joint]
         if most[joint] <= limit:

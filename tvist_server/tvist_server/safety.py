@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tvist_plant.description import RobotDescription
-from tvist_server.control.differentiator import Floats, Target
+from tvist_server.control.differentiator import Floats, Target, central_differences
 from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.trajectory import LineStop, Stop
 
@@ -155,20 +155,18 @@ def _on_way(
         yield resting, np.abs(dynamics.torque(q, still, along) - gravity)
 
 
-def torque_to_come(dynamics: InverseDynamics, ahead: Floats, period: float) -> Floats:
-    """Largest torques from each tick on of references that are known, shape (k, n) [N m].
+def torque_along(dynamics: InverseDynamics, references: Floats, period: float) -> Floats:
+    """Largest torques of references that are known, by central differences, shape (n,) [N m].
+
+    Every `LOOK_EVERY`th is looked at, and the last.
 
     Args:
         dynamics: Inverse dynamics with the declared payload.
-        ahead: References, one a tick, shape (k + 2, n) [rad]: derivatives are central differences.
+        references: One a tick, shape (k, n) [rad], k >= 3.
         period: Tick [s].
     """
-    qd = (ahead[2:] - ahead[:-2]) / (2.0 * period)
-    qdd = np.diff(ahead, 2, axis=0) / period**2
-    last = len(qd) - 1
-    looked = np.unique(np.append(np.arange(0, last, LOOK_EVERY), last))
-    states = zip(ahead[1:-1][looked], qd[looked], qdd[looked], strict=True)
-    efforts = np.array([dynamics.effort(*state) for state in states])
-    to_come = np.maximum.accumulate(efforts[::-1], axis=0)[::-1]
-    following: Floats = to_come[np.searchsorted(looked, np.arange(last + 1))]
-    return following
+    q, qd, qdd = central_differences(references, period)
+    looked = np.append(np.arange(0, len(q) - 1, LOOK_EVERY), len(q) - 1)
+    states = zip(q[looked], qd[looked], qdd[looked], strict=True)
+    most: Floats = np.max([dynamics.effort(*state) for state in states], axis=0)
+    return most

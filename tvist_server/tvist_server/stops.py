@@ -10,7 +10,7 @@ import numpy as np
 from tvist_plant.description import RobotDescription
 from tvist_server.control.differentiator import Floats, Target
 from tvist_server.control.inverse_dynamics import InverseDynamics
-from tvist_server.safety import GENTLEST_STOP, StopTorque, torque_to_come
+from tvist_server.safety import GENTLEST_STOP, StopTorque, torque_along
 from tvist_server.trajectory import Line, LineStop, Stop
 
 STEP = 0.8
@@ -110,7 +110,7 @@ class StopPlanner:
         Returns:
             None where none is permitted but to let the motion run out.
         """
-        asked = torque_to_come(self._dynamics, ahead, self._period)[0]
+        asked = torque_along(self._dynamics, ahead, self._period)
         leading = int(np.argmax(np.abs(line.direction)))
         along = (ahead[2:, leading] - ahead[1, leading]) * np.sign(line.direction[leading])
 

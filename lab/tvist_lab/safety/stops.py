@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from tvist_lab.recordings import Floats
-from tvist_lab.safety.subject import CLIENT, Subject, disc, last_move, refused, torques
+from tvist_lab.safety.subject import CLIENT, Subject, disc, refused, torques
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import RobotDescription
 from tvist_protocol import commands as c
 from tvist_server.collision import CLEARANCE, CollisionModel
+from tvist_server.outlook import resting_after
 from tvist_server.safety import TORQUE_SHARE
 from tvist_server.setup import body
 
@@ -121,7 +122,7 @@ def draw(description: RobotDescription, seed: int, kinds: tuple[str, ...] = tupl
         speed=float(random.choice([1.0, 1.0, 1.0, random.uniform(0.1, 1.0)])),
         moment=0,
     )
-    moved = last_move(_left_alone(description, case))
+    moved = resting_after(_left_alone(description, case))
     return Case(**{**vars(case), "moment": int(random.integers(1, max(moved, 2)))})
 
 
@@ -149,7 +150,7 @@ def judge(description: RobotDescription, case: Case, *, flexible: bool = False) 
     penetration = float("nan")
     if flexible:
         penetration = CLEARANCE - collisions.nearest(np.array(robot.actual[case.moment - 1 :]))
-    ends = last_move(stopped), last_move(alone)
+    ends = resting_after(stopped), resting_after(alone)
     told = next((e for e in robot.events if e.duration is not None), None)
     return Outcome(
         case=case,

@@ -14,6 +14,7 @@ from tvist_protocol.replies import Accepted, Refused, Reply
 from tvist_protocol.stream import Event
 from tvist_protocol.values import Payload
 from tvist_server.calibrations import load
+from tvist_server.control.differentiator import central_differences
 from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.controller import Controller
 from tvist_server.cycle import STILL, ControlCycle
@@ -141,15 +142,8 @@ def disc(description: RobotDescription, mass: float) -> Payload:
 def torques(description: RobotDescription, payload: Payload, references: Floats) -> Floats:
     """Torques of the rigid arm for references, one a tick, by central differences, shape (k - 2, n) [N m]."""
     dynamics = InverseDynamics(description, body(payload))
-    qd = (references[2:] - references[:-2]) / (2.0 * PERIOD)
-    qdd = np.diff(references, 2, axis=0) / PERIOD**2
-    return np.array([dynamics.torque(*state) for state in zip(references[1:-1], qd, qdd, strict=True)])
-
-
-def last_move(references: Floats) -> int:
-    """Index of the last reference that differs from the one before; 0: none does."""
-    moved = np.flatnonzero(np.abs(np.diff(references, axis=0)).max(axis=1) > STILL)
-    return int(moved[-1]) + 1 if len(moved) else 0
+    states = zip(*central_differences(references, PERIOD), strict=True)
+    return np.array([dynamics.torque(*state) for state in states])
 
 
 def refused(reply: Reply) -> bool:

@@ -21,6 +21,21 @@ class Target(Struct, frozen=True, eq=False, gc=False):
     """q̈*, shape (n,) [rad/s^2]."""
 
 
+def central_differences(references: Floats, period: float) -> tuple[Floats, Floats, Floats]:
+    """Positions, velocities and accelerations of references that are known, as `Differentiator` would make them.
+
+    Args:
+        references: One a tick, shape (k + 2, n) [rad].
+        period: Tick [s].
+
+    Returns:
+        All but the first and the last, and their derivatives, each of shape (k, n).
+    """
+    qd: Floats = (references[2:] - references[:-2]) / (2.0 * period)
+    qdd: Floats = np.diff(references, 2, axis=0) / period**2
+    return references[1:-1], qd, qdd
+
+
 class Differentiator:
     """Central differences: q̇ᵢ = (qᵢ₊₁ - qᵢ₋₁)/2h and q̈ᵢ = (qᵢ₊₁ - 2qᵢ + qᵢ₋₁)/h².
 
