@@ -6,7 +6,7 @@ It owns a `Session` (who may) and a `ControlCycle` (what moves), which do not kn
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -15,11 +15,12 @@ from tvist_protocol import commands as c
 from tvist_protocol.info import Stopping
 from tvist_protocol.io import Io, SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.modes import RobotMode
-from tvist_protocol.replies import Accepted, Code, Done, Refused, Reply
+from tvist_protocol.replies import Accepted, Done, Refused, Reply
 from tvist_protocol.stream import Event, EventKind, State, Truth
 from tvist_protocol.values import PROTOCOL_VERSION, Payload
 from tvist_server.collision import CollisionModel
 from tvist_server.cycle import ControlCycle, Sample
+from tvist_server.events import Fields
 from tvist_server.faults import Faults
 from tvist_server.filters import Filters
 from tvist_server.motion import MotionControl
@@ -182,24 +183,9 @@ class Controller:
         """What no robot can know, after a tick."""
         return self._reporter.truth(self.tick_number, self.cycle.arm)
 
-    def _emit(
-        self,
-        kind: EventKind,
-        *,
-        id: int | None = None,  # noqa: A002  the wire's name
-        code: Code | None = None,
-        why: str | None = None,
-        category: int | None = None,
-        duration: float | None = None,
-        way: float | None = None,
-    ) -> None:
+    def _emit(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
         """Put down an event of the tick that is being made; of the next one between two."""
-        tick = self.tick_number + 1
-        self._events.append(
-            Event(
-                tick=tick, kind=kind, id=id, code=code, why=why, category=category, duration=duration, way=way
-            )
-        )
+        self._events.append(Event(tick=self.tick_number + 1, kind=kind, **fields))
 
     def _watch_time(self) -> None:
         """End what is over, and what nobody keeps up."""

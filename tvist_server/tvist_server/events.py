@@ -1,35 +1,29 @@
 """What happens, on its way to who tells of it."""
 
-from typing import Protocol, TypedDict
+from typing import Protocol, TypedDict, Unpack
 
 from tvist_protocol.replies import Code
 from tvist_protocol.stream import EventKind
 
 
-class Emit(Protocol):
-    """Puts down an event."""
-
-    def __call__(
-        self,
-        kind: EventKind,
-        *,
-        id: int | None = None,  # noqa: A002  the wire's name
-        code: Code | None = None,
-        why: str | None = None,
-        category: int | None = None,
-        duration: float | None = None,
-        way: float | None = None,
-    ) -> None:
-        """Of the tick that is being made, or of the next one between two."""
-
-
-class Told(TypedDict):
-    """What the event of a stop says of it."""
+class Told(TypedDict, total=False):
+    """What the event of a stop says of it; see `tvist_protocol.stream.Event`."""
 
     category: int | None
     duration: float | None
     way: float | None
 
 
-NO_STOP = Told(category=None, duration=None, way=None)
-"""Of an end that is no stop."""
+class Fields(Told, total=False):
+    """What an event may say besides its kind; see `tvist_protocol.stream.Event`."""
+
+    id: int | None
+    code: Code | None
+    why: str | None
+
+
+class Emit(Protocol):
+    """Puts down an event."""
+
+    def __call__(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
+        """Of the tick that is being made, or of the next one between two."""

@@ -4,6 +4,7 @@
 """
 
 from dataclasses import replace
+from typing import Unpack
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from tvist_server.brakes import brake
 from tvist_server.collision import CLEARANCE, CollisionModel
 from tvist_server.control.differentiator import Floats
 from tvist_server.cycle import ControlCycle, Sample
-from tvist_server.events import NO_STOP, Emit, Told
+from tvist_server.events import Emit, Told
 from tvist_server.moving import Move
 from tvist_server.outlook import Outlook
 from tvist_server.overload import Overload
@@ -366,8 +367,8 @@ class MotionControl:
         told = Told(category=category, duration=duration, way=way)
         if kind is not None:
             self._emit(kind, code=code, why=why, **told)
-        self._end_stream(why, code, told)
-        self._end_motion(why, code, told)
+        self._end_stream(why, code, **told)
+        self._end_motion(why, code, **told)
 
     def abandon(self, why: str, code: Code | None = None) -> None:
         """Say that what was moving ended: the arm is put elsewhere."""
@@ -427,11 +428,11 @@ class MotionControl:
             why = f"torque of joint {name} is {moment:.0f} N m; beyond its {limit:g} for more than 10 ms"
             self.protect(why, "limit_torque")
 
-    def _end_motion(self, why: str, code: Code | None, told: Told = NO_STOP) -> None:
+    def _end_motion(self, why: str, code: Code | None, **told: Unpack[Told]) -> None:
         if self._move is not None:
             self._emit("motion_stopped", id=self._move.number, code=code, why=why, **told)
             self._move = None
 
-    def _end_stream(self, why: str, code: Code | None = None, told: Told = NO_STOP) -> None:
+    def _end_stream(self, why: str, code: Code | None = None, **told: Unpack[Told]) -> None:
         if self._streaming.end():
             self._emit("stream_stopped", code=code, why=why, **told)
