@@ -55,7 +55,7 @@ def test_of_all_decelerations_that_keep_the_torque_the_hardest_is_taken(seed):
     torque = StopTorque(InverseDynamics(UR5E, DISC), state, np.array(LIMITS.torque))
     planner = StopPlanner(UR5E, InverseDynamics(UR5E, DISC), H)
     tried = [min(LIMITS.acceleration) * STEP**k for k in range(16)]
-    held = [a for a in tried if torque.holds(planner._stop(state, a))]
+    held = [a for a in tried if torque.holds(planner.stop(state, a))]
     if held:
         assert stop.acceleration == pytest.approx(max(held))
     elif stop is not None:  # none keeps what the flexible arm swings beyond, too

@@ -1,6 +1,5 @@
 """One control period: the paper's Figure 6, left to right."""
 
-from collections.abc import Callable
 from typing import TypeVar
 
 import numpy as np
@@ -12,6 +11,7 @@ from tvist_server.control.differentiator import Differentiator, Floats, Target
 from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.control.joint_controllers import JointControllers
 from tvist_server.line_filter import LineFilter
+from tvist_server.look_ahead import LookAhead
 from tvist_server.safety import TorqueRoom
 from tvist_server.trajectory import DoubleS, Limits, Rest, SetpointStream, Stop, Trajectory
 from tvist_shaping.base import Filter
@@ -76,7 +76,7 @@ class ControlCycle:
         """Whether a stop bypasses the filter."""
         self.running_out = False
         """Whether what was under way comes to rest by itself, since no stop is quicker."""
-        self.guard: Callable[[Target], Stop | None] | None = None
+        self.guard: LookAhead | None = None
         """Asked before each shaped reference is played; where it answers with a stop, that is made instead."""
         self.reset(q, carried=carried, seed=seed)
         # The first steps load compiled code, which lasts many ticks: they are made here, and taken back.
@@ -106,9 +106,7 @@ class ControlCycle:
         self._settle(reference, target)
         return Sample(reference, target, torque, command.torque, measured)
 
-    def _guarded(
-        self, guard: Callable[[Target], Stop | None], reference: Floats, shaped: Floats
-    ) -> tuple[Floats, Floats]:
+    def _guarded(self, guard: LookAhead, reference: Floats, shaped: Floats) -> tuple[Floats, Floats]:
         """What is played in place of a reference from which no stop would be clear."""
         stop = None if self.stopping else guard(self._differentiator.after(shaped))
         if stop is None:
@@ -135,13 +133,13 @@ class ControlCycle:
         trajectory = self.trajectory
         if self.at_rest or not (trajectory.finished or (self.running_out and trajectory.standing)):
             return
-        self.at_rest = (self.stopping or self.line_filter.settled) and rests(reference, target)
-        if self.at_rest and self.stopping:  # the delay line starts anew from where the stop ended
+        if not ((self.stopping or self.line_filter.settled) and rests(reference, target)):
+            return
+        if self.stopping:  # the delay line starts anew from where the stop ended
             self.line_filter.begin(self.tvist, reference)
-        if self.at_rest and not trajectory.finished:  # what ran out was paused: it goes no further
+        if not trajectory.finished:  # what ran out was paused: it goes no further
             self.trajectory = Rest(reference)
-        if self.at_rest:
-            self.stopping, self.running_out, self.guard = False, False, None
+        self.at_rest, self.stopping, self.running_out, self.guard = True, False, False, None
 
     @property
     def position(self) -> Floats:

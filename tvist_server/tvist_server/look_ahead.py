@@ -1,19 +1,16 @@
 """Streams of set-points: nothing is played from which no stop would be clear."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from tvist_server.collision import CollisionModel, Meeting
 from tvist_server.control.differentiator import Floats, Target
-from tvist_server.safety import GENTLEST_STOP
+from tvist_server.safety import GENTLEST_STOP, TorqueRoom
+from tvist_server.stops import StopPlanner
 from tvist_server.trajectory import Stop
 
 MARGIN = 0.8
 """Share of the acceleration that the torque leaves where a stop begins, with which it is made: what it leaves changes
 on the way [-]."""
-
-
 FRESH = 8
 """Ticks for which the acceleration that the torque leaves is taken for what it was: the margin covers what changes."""
 
@@ -29,27 +26,12 @@ class LookAhead:
 
     Args:
         collisions: Where the arm would meet something.
-        gentle: From position [rad] and velocity [rad/s] to an acceleration that the torque allows there in every
-            direction [rad/s^2].
-        quickest: The quickest stop from a state that is clear, by what it is given to tell; None where there is none.
-        highest: Acceleration that no stop exceeds [rad/s^2].
-        jerk: Of stops [rad/s^3].
-        period: Tick [s].
+        stops: Plans stops.
+        room: What torque leaves.
     """
 
-    def __init__(
-        self,
-        collisions: CollisionModel,
-        gentle: Callable[[Floats, Floats], float],
-        quickest: Callable[[Target, Callable[[Stop], bool]], Stop | None],
-        *,
-        highest: float,
-        jerk: float,
-        period: float,
-    ) -> None:
-        self._collisions = collisions
-        self._gentle, self._quickest = gentle, quickest
-        self._highest, self._jerk, self._period = highest, jerk, period
+    def __init__(self, collisions: CollisionModel, stops: StopPlanner, room: TorqueRoom) -> None:
+        self._collisions, self._stops, self._torque = collisions, stops, room
         self._centre: Floats | None = None
         self._room = 0.0
         self._carried = collisions.carried
@@ -86,7 +68,7 @@ class LookAhead:
         """The stop from the state of motion of the reference that was played last, which is known to be clear."""
         assert self._before is not None, "begin comes first"
         state, stop = self._before
-        return stop if isinstance(stop, Stop) else self._stop(state, stop)
+        return stop if isinstance(stop, Stop) else self._stops.stop(state, stop)
 
     def clear(self, stop: Stop) -> bool:
         """Whether nothing meets on the whole way of a stop."""
@@ -99,8 +81,7 @@ class LookAhead:
     def meeting(self, stop: Stop) -> Meeting | None:
         """The first pair that meets on the way of a stop."""
         _, qd, qdd = stop.at(0.0)
-        fastest = np.abs(qd) + qdd * qdd / (2.0 * self._jerk)
-        travel = self._collisions.travel(fastest * stop.duration)
+        travel = self._collisions.travel(_fastest(qd, qdd, stop.jerk) * stop.duration)
         before = None if self._before is None else self._before[0].q
         found = self._collisions.on_way(
             lambda share: stop.at(share * stop.duration)[0], travel, before=before
@@ -112,14 +93,14 @@ class LookAhead:
         self._age += 1
         if self._age <= FRESH and self._is_spacious_for(state):
             return self._acceleration
-        allowed = MARGIN * self._gentle(state.q, state.qd)
-        self._acceleration, self._age = min(max(allowed, GENTLEST_STOP), self._highest), 0
+        allowed = MARGIN * self._torque.acceleration(state.q, state.qd)
+        self._acceleration, self._age = min(max(allowed, GENTLEST_STOP), self._stops.highest), 0
         if self._is_spacious_for(state):
             return self._acceleration
-        stop = self._stop(state, self._acceleration)
+        stop = self._stops.stop(state, self._acceleration)
         if self.clear(stop):
             return stop
-        return self._quickest(state, self.clear)
+        return self._stops.by_joints(state, None, self.clear)
 
     def _is_spacious_for(self, state: Target) -> bool:
         return self.is_spacious(state.q, self.turned(state.qd, state.qdd, self._acceleration))
@@ -145,12 +126,14 @@ class LookAhead:
             acceleration: Its limit [rad/s^2].
             jerk: Its limit [rad/s^3]; None for that of the joints.
         """
-        jerk = self._jerk if jerk is None else jerk
-        fastest = np.abs(qd) + qdd * qdd / (2.0 * jerk)
+        jerk = self._stops.jerk if jerk is None else jerk
+        fastest = _fastest(qd, qdd, jerk)
         ramps = (acceleration + np.abs(qdd)) / jerk
-        return fastest * (fastest / (2.0 * acceleration) + ramps + self._period)
+        turned: Floats = fastest * (fastest / (2.0 * acceleration) + ramps + self._stops.period)
+        return turned
 
-    def _stop(self, state: Target, acceleration: float) -> Stop:
-        return Stop(
-            state.q, state.qd, state.qdd, acceleration=acceleration, jerk=self._jerk, period=self._period
-        )
+
+def _fastest(qd: Floats, qdd: Floats, jerk: float) -> Floats:
+    """Upper bound of what each joint's velocity comes to until its acceleration is taken back [rad/s]."""
+    fastest: Floats = np.abs(qd) + qdd * qdd / (2.0 * jerk)
+    return fastest

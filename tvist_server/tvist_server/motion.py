@@ -348,7 +348,7 @@ class MotionControl:
         if target is None:
             return
         self.activity = target
-        plan = None if self.cycle.at_rest else self.ahead.stop(deceleration)
+        plan = None if self.cycle.at_rest else self.outlook.stop(deceleration)
         if plan is not None and plan.limited:
             kept = "the motion's own" if plan.acceleration is None else f"{plan.acceleration:.3g} rad/s²"
             why = f"{why}; deceleration is {kept}, limited from {deceleration:.3g}"

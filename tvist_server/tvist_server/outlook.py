@@ -1,7 +1,6 @@
 """What the control line is going to do, and the quickest way to end it."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -62,22 +61,15 @@ class Outlook:
                 return np.array(ahead)
         return None
 
-    def stop(
-        self,
-        deceleration: float | None,
-        *,
-        clear: Callable[[Stop], bool] = _anywhere,
-        otherwise: Callable[[], Stop] | None = None,
-    ) -> StopPlan | None:
+    def stop(self, deceleration: float | None) -> StopPlan | None:
         """Come to rest as soon as is permitted.
 
         A motion stays on its way, never further along it than if it had not been stopped, and rests no later.
-        Where no stop does that within the torque, the motion runs out through the filter.
+        Where no stop does that within the torque, the motion runs out through the filter. A stream, whose way is
+        its client's, stops clear of everything.
 
         Args:
             deceleration: Wanted limit [rad/s^2]; None for what the torque allows.
-            clear: Whether nothing meets on the way of a stop that leaves the way of the motion, as that of a stream.
-            otherwise: A stop for where none is clear and keeps the torque; None for the hardest.
 
         Returns:
             What is done; None where a stop under way is as quick already, and goes on.
@@ -85,7 +77,7 @@ class Outlook:
         cycle, wanted = self._cycle, math.inf if deceleration is None else deceleration
         if (cycle.stopping or cycle.running_out) and wanted <= self._wanted:
             return None
-        plan = self.plan_stop(deceleration, clear=clear, otherwise=otherwise)
+        plan = self.plan_stop(deceleration)
         self._wanted = wanted
         if plan is None:
             return None
@@ -100,51 +92,38 @@ class Outlook:
         self._cycle.bypass(trajectory)
         self._wanted = math.inf
 
-    def plan_stop(
-        self,
-        deceleration: float | None,
-        *,
-        clear: Callable[[Stop], bool] = _anywhere,
-        otherwise: Callable[[], Stop] | None = None,
-    ) -> StopPlan | None:
+    def plan_stop(self, deceleration: float | None) -> StopPlan | None:
         """The quickest permitted stop from here; as `stop`, but nothing is done."""
         line = self._cycle.trajectory.line
-        if line is None:
-            return self._by_joints(deceleration, clear, otherwise)
-        return self._on_line(line, deceleration)
+        return self._by_joints(deceleration) if line is None else self._on_line(line, deceleration)
 
-    def _by_joints(
-        self, deceleration: float | None, clear: Callable[[Stop], bool], otherwise: Callable[[], Stop] | None
-    ) -> StopPlan | None:
-        cycle, present = self._cycle, self._cycle.trajectory
-        stop = self.stops.by_joints(cycle.newest, deceleration, clear)
+    def _by_joints(self, deceleration: float | None) -> StopPlan | None:
+        cycle, guard, present = self._cycle, self._cycle.guard, self._cycle.trajectory
+        stop = self.stops.by_joints(cycle.newest, deceleration, _anywhere if guard is None else guard.clear)
         if cycle.stopping and (
             stop is None or (isinstance(present, Stop) and stop.acceleration <= present.acceleration)
         ):
             return None
-        if stop is None:
-            stop = self.stops.hardest(cycle.newest) if otherwise is None else otherwise()
+        if stop is None:  # none is clear and keeps the torque
+            hardest = self.stops.highest
+            stop = self.stops.stop(cycle.newest, hardest) if guard is None else guard.fallback()
         return self._plan(stop, deceleration, stop.duration, stop.end)
 
     def _on_line(self, line: Line, deceleration: float | None) -> StopPlan | None:
         cycle, line = self._cycle, self._shaped(line)
         stop = self.stops.on_line(cycle.published, cycle.position, line, deceleration)
+        lets_run_out = StopPlan(None, None, deceleration is not None, None, None)
         if stop is None:
             ahead = self.foresee()
             if ahead is None:  # it lasts for so long that any stop is sooner
                 stop = self.stops.on_line(cycle.published, cycle.position, line, deceleration, certain=False)
-                if stop is None:
-                    return (
-                        None if cycle.stopping else StopPlan(None, None, deceleration is not None, None, None)
-                    )
-                return self._plan(stop, deceleration, stop.duration, stop.end)
-            last = resting_after(ahead)
-            stop = self.stops.under(ahead, last, cycle.published, line, deceleration)
-            if stop is None and cycle.stopping:
-                return None
-            if stop is None:
-                return self._plan(None, deceleration, (last - 1) * PERIOD, ahead[-1])
-        return self._plan(stop, deceleration, stop.duration, stop.end)
+            else:
+                last = resting_after(ahead)
+                stop = self.stops.under(ahead, last, cycle.published, line, deceleration)
+                lets_run_out = self._plan(None, deceleration, (last - 1) * PERIOD, ahead[-1])
+        if stop is not None:
+            return self._plan(stop, deceleration, stop.duration, stop.end)
+        return None if cycle.stopping else lets_run_out
 
     def _plan(
         self, stop: Stop | LineStop | None, wanted: float | None, duration: float, end: Floats

@@ -55,9 +55,12 @@ class StopPlanner:
 
     def __init__(self, description: RobotDescription, dynamics: InverseDynamics, period: float) -> None:
         limits = description.limits
-        self._dynamics, self._period = dynamics, period
+        self._dynamics = dynamics
         self._torque, self._position = np.array(limits.torque), np.array(limits.position)
-        self._highest, self._jerk = min(limits.acceleration), min(limits.jerk)
+        self.highest, self.jerk = min(limits.acceleration), min(limits.jerk)
+        """Limits that no stop exceeds [rad/s^2, rad/s^3]."""
+        self.period = period
+        """Tick [s]."""
 
     def on_line(
         self, state: Target, newest: Floats, line: Line, wanted: float | None, *, certain: bool = True
@@ -84,8 +87,8 @@ class StopPlanner:
         # What hardly moves may turn back a little, what brakes with as much jerk as a stop may be as quick, and what is
         # about to rest is quicker than anything within the limits.
         creeps = speed < SLOW
-        jerks = HARDER * line.jerk > self._jerk and line.steady < SOON
-        rests = rise < 0.0 and speed <= 1.1 * rise * rise / (2.0 * self._jerk)
+        jerks = HARDER * line.jerk > self.jerk and line.steady < SOON
+        rests = rise < 0.0 and speed <= 1.1 * rise * rise / (2.0 * self.jerk)
         if certain and (creeps or jerks or rests or line.turns):
             return None
 
@@ -110,14 +113,14 @@ class StopPlanner:
         Returns:
             None where none is permitted but to let the motion run out.
         """
-        asked = torque_along(self._dynamics, ahead, self._period)
+        asked = torque_along(self._dynamics, ahead, self.period)
         leading = int(np.argmax(np.abs(line.direction)))
         along = (ahead[2:, leading] - ahead[1, leading]) * np.sign(line.direction[leading])
 
         def permitted(stop: LineStop) -> bool:
-            if math.ceil(stop.duration / self._period) > rests - 1:
+            if math.ceil(stop.duration / self.period) > rests - 1:
                 return False
-            shares = (stop.share((number + 1) * self._period) for number in range(len(along)))
+            shares = (stop.share((number + 1) * self.period) for number in range(len(along)))
             return all(share <= limit + ROUNDING for share, limit in zip(shares, along.tolist(), strict=True))
 
         return self._quickest_on_line(state, ahead[1], line, wanted, asked, permitted)
@@ -134,7 +137,7 @@ class StopPlanner:
             None where there is none.
         """
         torque = StopTorque(self._dynamics, state, self._torque)
-        stops = [self._stop(state, acceleration) for acceleration in self._ladder(wanted)]
+        stops = [self.stop(state, acceleration) for acceleration in self._ladder(wanted)]
         stops = [stop for stop in stops if (np.abs(stop.end) <= self._position).all()]
         fits = cache(clear)
         for rebound in (True, False):
@@ -143,13 +146,10 @@ class StopPlanner:
                     return stop
         return None
 
-    def hardest(self, state: Target) -> Stop:
-        """The hardest stop of every joint by itself, whatever it asks for."""
-        return self._stop(state, self._highest)
-
-    def _stop(self, state: Target, acceleration: float) -> Stop:
+    def stop(self, state: Target, acceleration: float) -> Stop:
+        """A stop of every joint by itself within an acceleration [rad/s^2], whatever it asks for."""
         return Stop(
-            state.q, state.qd, state.qdd, acceleration=acceleration, jerk=self._jerk, period=self._period
+            state.q, state.qd, state.qdd, acceleration=acceleration, jerk=self.jerk, period=self.period
         )
 
     def _quickest_on_line(
@@ -165,7 +165,7 @@ class StopPlanner:
         stops = [
             LineStop(
                 newest, newest - state.q, state.qdd, line.direction,
-                acceleration=acceleration, jerk=self._jerk, period=self._period,
+                acceleration=acceleration, jerk=self.jerk, period=self.period,
             )
             for acceleration in self._ladder(wanted)
         ]  # fmt: skip
@@ -178,15 +178,15 @@ class StopPlanner:
 
     def _ladder(self, wanted: float | None) -> Iterator[float]:
         """Decelerations in the order in which they are tried: down from the wanted one, then up from it."""
-        first = self._highest if wanted is None else min(max(wanted, GENTLEST_STOP), self._highest)
+        first = self.highest if wanted is None else min(max(wanted, GENTLEST_STOP), self.highest)
         down = first
         while down > GENTLEST_STOP:
             yield down
             down *= STEP
         yield GENTLEST_STOP
         up = first / STEP
-        while up < self._highest:
+        while up < self.highest:
             yield up
             up /= STEP
-        if first < self._highest:
-            yield self._highest
+        if first < self.highest:
+            yield self.highest

@@ -31,14 +31,7 @@ class WayAhead:
         self._cycle, self._collisions = cycle, collisions
         self._outlook = outlook
         room = TorqueRoom(cycle.description, cycle.inverse_dynamics)
-        self._guard = LookAhead(
-            collisions,
-            room.acceleration,
-            lambda state, clear: outlook.stops.by_joints(state, None, clear),
-            highest=min(cycle.description.limits.acceleration),
-            jerk=min(cycle.description.limits.jerk),
-            period=PERIOD,
-        )
+        self._guard = LookAhead(collisions, outlook.stops, room)
 
     @property
     def met(self) -> Meeting | None:
@@ -49,13 +42,6 @@ class WayAhead:
         """Watch a stream that begins from rest."""
         self._guard.begin(self._cycle.newest)
         self._cycle.guard = self._guard
-
-    def stop(self, deceleration: float | None) -> StopPlan | None:
-        """Stop as soon as is permitted; as `Outlook.stop`."""
-        cycle = self._cycle
-        if cycle.guard is None:
-            return self._outlook.stop(deceleration)
-        return self._outlook.stop(deceleration, clear=self._guard.clear, otherwise=self._guard.fallback)
 
     def until_rest(self, plan: StopPlan | None = None) -> tuple[float | None, float | None]:
         """How long it takes until the shaped reference rests [s], and how far the joint that turns most turns [rad].
