@@ -98,16 +98,14 @@ _MOVING = frozenset(
         _A.PROTECTIVE_STOPPING,
     }
 )
-_POWERLESS = frozenset({_A.POWER_OFF, _A.BRAKING})
+_ROBOT_MODES = {
+    _A.POWER_OFF: RobotMode.POWER_OFF,
+    _A.BRAKING: RobotMode.POWER_OFF,
+    _A.IDLE: RobotMode.IDLE,
+}
 for _activity in Activity:
     # Attributes of the members, since looking up another member costs ten times as much: these are asked every tick.
-    _activity.robot_mode = (
-        RobotMode.POWER_OFF
-        if _activity in _POWERLESS
-        else RobotMode.IDLE
-        if _activity is _A.IDLE
-        else RobotMode.RUNNING
-    )
+    _activity.robot_mode = _ROBOT_MODES.get(_activity, RobotMode.RUNNING)
     _activity.moving = _activity in _MOVING
     _activity.protective = _activity in {_A.PROTECTIVE_STOPPING, _A.PROTECTIVE_STOP}
 _FREE_TO_END = (_A.MOVING, _A.PAUSED, _A.STREAMING, _A.ENDING, _A.STOPPING)

@@ -144,7 +144,7 @@ class ControlCycle:
     @property
     def position(self) -> Floats:
         """Where the shaped reference is, shape (n,) [rad]."""
-        return self._differentiator.newest.q
+        return self._differentiator.position
 
     def plan(self, target: Floats, limits: Limits, speed: float = 1.0) -> DoubleS:
         """A point-to-point motion from where the reference is; the arm must be at rest.

@@ -12,9 +12,6 @@ from tvist_protocol.faults import FAULTS
 from tvist_server.motion import MotionControl
 from tvist_server.refusal import RefusalError
 from tvist_server.safety_control import SafetyControl
-from tvist_server.safety_system import Emergency
-
-_EMERGENCIES: dict[str, Emergency] = {"emergency_stop": "robot", "system_emergency_stop": "system"}
 
 
 class Faults:
@@ -26,7 +23,20 @@ class Faults:
     """
 
     def __init__(self, motion: MotionControl, safety: SafetyControl) -> None:
-        self._motion, self._safety = motion, safety
+        self._motion = motion
+        self._inputs: dict[str, tuple[Callable[[], None], Callable[[], None]]] = {
+            "reduced": (lambda: safety.reduce(reduced=True), lambda: safety.reduce(reduced=False)),
+            "safeguard_stop": (
+                lambda: safety.safeguard(stopped=True),
+                lambda: safety.safeguard(stopped=False),
+            ),
+            "emergency_stop": (lambda: safety.emergency("robot"), lambda: safety.end_emergency("robot")),
+            "system_emergency_stop": (
+                lambda: safety.emergency("system"),
+                lambda: safety.end_emergency("system"),
+            ),
+        }
+        """What begins and ends an input of the safety system."""
         self._momentary: dict[str, Callable[[], None]] = {
             "protective_stop": lambda: motion.protect("a protective stop was injected"),
             "normal": safety.release,
@@ -35,6 +45,7 @@ class Faults:
             "fault": lambda: safety.cut_power("the safety system failed", "fault"),
             "nan": lambda: motion.cycle.arm.spoil(),  # noqa: PLW0108  the line may get another arm
         }
+        """What is over at once."""
         self._push = np.zeros(motion.cycle.description.joints)
         self._ends: list[tuple[int, int, str, Callable[[], None]]] = []
         self._number = count()
@@ -50,26 +61,22 @@ class Faults:
             RefusalError: There is none of that name, a field it needs is missing, or one it has not is there.
         """
         _check(command, self._motion.cycle.description.joints)
-        ticks = None if command.seconds is None else round(command.seconds / PERIOD)
-        safety = self._safety
-        self._forget(command.fault)
-        match command.fault:
-            case "reduced":
-                safety.reduce(reduced=True)
-                self._release(tick, ticks, command.fault, lambda: safety.reduce(reduced=False))
-            case "safeguard_stop":
-                safety.safeguard(stopped=True)
-                self._release(tick, ticks, command.fault, lambda: safety.safeguard(stopped=False))
-            case "emergency_stop" | "system_emergency_stop" as name:
-                whose = _EMERGENCIES[name]
-                safety.emergency(whose)
-                self._release(tick, ticks, command.fault, lambda: safety.end_emergency(whose))
-            case "torque":
-                joint, value = command.joint or 0, command.value or 0.0
-                self._add(joint, value)
-                self._at(tick + (ticks or 0), "torque", lambda: self._add(joint, -value))
-            case name:
-                self._momentary[name]()
+        fault, seconds = command.fault, command.seconds
+        ends = tick + round((seconds or 0.0) / PERIOD)
+        if fault == "torque":
+            joint, value = command.joint or 0, command.value or 0.0
+            self._add(joint, value)
+            self._at(ends, fault, lambda: self._add(joint, -value))
+            return
+        # An input that is set anew, or released, does not end by what it was set to before.
+        self._forget({*self._inputs} if fault == "normal" else {fault})
+        if fault in self._inputs:
+            begin, end = self._inputs[fault]
+            begin()
+            if seconds is not None:
+                self._at(ends, fault, end)
+        else:
+            self._momentary[fault]()
 
     def end(self, tick: int) -> None:
         """End those that are over before a tick."""
@@ -83,16 +90,10 @@ class Faults:
         self._push[:] = 0.0
         self._motion.cycle.arm.push(self._push)
 
-    def _forget(self, fault: str) -> None:
-        """An input that is set anew, or released, does not end by what it was set to before."""
-        if fault != "torque":  # pushes add up, and each ends by itself
-            ended = {fault} if fault != "normal" else {"reduced", "safeguard_stop", *_EMERGENCIES}
-            self._ends = [one for one in self._ends if one[2] not in ended]
-            heapq.heapify(self._ends)
-
-    def _release(self, tick: int, ticks: int | None, fault: str, end: Callable[[], None]) -> None:
-        if ticks is not None:
-            self._at(tick + ticks, fault, end)
+    def _forget(self, faults: set[str]) -> None:
+        """Let these go on, if they last, until something else ends them."""
+        self._ends = [one for one in self._ends if one[2] not in faults]
+        heapq.heapify(self._ends)
 
     def _at(self, tick: int, fault: str, end: Callable[[], None]) -> None:
         heapq.heappush(self._ends, (tick, next(self._number), fault, end))

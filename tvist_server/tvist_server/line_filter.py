@@ -94,7 +94,7 @@ class LineFilter:
 
     def rehearse(self, q: Floats) -> None:
         """Filter a sample through a fade and take it back: the first time loads compiled code, for many ticks."""
-        self._fade = self._fade_to(self.tvist.with_estimator(self.tvist.estimator), self.tvist)
+        self._fade = self._fade_to(self.tvist.fork(), self.tvist)
         for _ in range(3):
             self.filter(q)
         self.begin(self.tvist, q)

@@ -204,17 +204,13 @@ class MotionControl:
         Args:
             why: The reason, for a person.
         """
-        target = after(self.activity, "brakes")
-        if target is None:
-            duration, way = (0.0, 0.0) if self.cycle.at_rest else self.ahead.until_rest()
-            self._emit("safety_stop", why=why, category=0, duration=duration, way=way)
-            return
-        self.activity = target
-        cycle, plan = self.cycle, StopPlan(None, None, limited=False, duration=0.0, way=0.0)
-        if not cycle.at_rest:
+        target, plan, cycle = after(self.activity, "brakes"), None, self.cycle
+        if target is not None:
+            self.activity = target
+        if target is not None and not cycle.at_rest:
             stop = brake(cycle.description, cycle.arm.payload, cycle.newest, PERIOD)
             way = float(np.abs(stop.end - cycle.position).max())
-            plan = replace(plan, duration=stop.duration, way=way)
+            plan = StopPlan(None, None, limited=False, duration=stop.duration, way=way)
             self.outlook.brake(stop)
         self._tell_end(plan, why, None, "safety_stop", 0)
 

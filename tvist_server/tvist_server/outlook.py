@@ -1,6 +1,7 @@
 """What the control line is going to do, and the quickest way to end it."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -50,7 +51,7 @@ class Outlook:
         trajectory = present if trajectory is None else trajectory.fork()
         if tvist is not None and not stopping:
             line_filter.use(tvist.fork())
-        ahead = [differentiator.published.q, differentiator.newest.q]
+        ahead = [differentiator.published.q, differentiator.position]
         for _ in range(MOST_AHEAD):
             reference = trajectory.next()
             shaped = reference if stopping else line_filter.filter(reference)
@@ -142,7 +143,9 @@ class Outlook:
         if known:  # the filter gives back late what it was given, also how it was slowed down before
             steps = np.diff(cycle.line_filter.window() @ line.direction)
             known = bool((np.diff(steps) >= -EVEN * float(line.direction @ line.direction)).all())
-        return Line(line.direction, peak * line.braking, peak * line.jerk, line.steady if known else 0.0)
+        return replace(
+            line, braking=peak * line.braking, jerk=peak * line.jerk, steady=line.steady if known else 0.0
+        )
 
 
 def resting_after(ahead: Floats) -> int:

@@ -14,7 +14,7 @@ from tvist_server.outlook import Outlook, resting_after
 from tvist_server.refusal import RefusalError
 from tvist_server.safety import TorqueRoom
 from tvist_server.stops import StopPlan
-from tvist_server.trajectory import DoubleS, LineStop, SetpointStream, Stop
+from tvist_server.trajectory import SetpointStream, Stop
 from tvist_shaping.base import Filter
 
 
@@ -86,13 +86,11 @@ class WayAhead:
                 return self._guard.met
             self._guard.take(cycle.newest, stop)
             return None
-        if isinstance(trajectory, DoubleS):
-            found = collisions.on_line(cycle.position, trajectory.target)
-            return None if found is None else found[1]
-        if isinstance(trajectory, LineStop):
-            found = collisions.on_line(cycle.position, trajectory.end)
-            return None if found is None else found[1]
-        return self._on(self._outlook.foresee(tvist))
+        line = trajectory.line
+        if line is None:
+            return self._on(self._outlook.foresee(tvist))
+        found = collisions.on_line(cycle.position, line.end)
+        return None if found is None else found[1]
 
     def check_payload(self, payload: Payload, tvist: Filter | None) -> None:
         """Check the rest of what moves with another payload, and put it into the collision model.

@@ -76,6 +76,11 @@ class Differentiator:
         return Target(q=middle, qd=(rise + fall) / (2.0 * h), qdd=(rise - fall) / (h * h))
 
     @property
+    def position(self) -> Floats:
+        """The newest reference, shape (n,) [rad]."""
+        return self._last
+
+    @property
     def newest(self) -> Target:
         """State of motion at the newest reference, from it and the two before.
 

@@ -29,6 +29,8 @@ class Line:
 
     direction: Floats
     """Of the line in joint space; its largest entry is 1 or -1, shape (n,)."""
+    end: Floats
+    """Where the trajectory ends if it is let go on, shape (n,) [rad]."""
     braking: float
     """Largest deceleration to come, of the joint that turns most [rad/s^2]."""
     jerk: float

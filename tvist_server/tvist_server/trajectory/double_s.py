@@ -58,8 +58,9 @@ class DoubleS(Trajectory):
                 f"no motion goes from {start.tolist()} to {target.tolist()} in less than two hours within "
                 f"velocity {limits.velocity:g}, acceleration {limits.acceleration:g}, jerk {limits.jerk:g}"
             ) from error
-        self._target = np.array(target, dtype=float)
-        way = self._target - start
+        self.target = np.array(target, dtype=float)
+        """Where it ends, shape (n,) [rad]."""
+        way = self.target - start
         farthest = float(np.abs(way).max())
         self._direction = way / farthest if farthest > 0.0 else np.zeros(n)
         # From rest to rest it is the same forwards and backwards: it brakes for as long as it accelerates.
@@ -98,7 +99,7 @@ class DoubleS(Trajectory):
 
     def next(self) -> Floats:
         """Position one tick further; the target exactly from the first tick at or after the end."""
-        if self._pace.steady(self.speed):
+        if self.steady:
             self._ticks += 1
         else:
             time = self.time
@@ -107,13 +108,8 @@ class DoubleS(Trajectory):
             step = self._pace.advance(self.speed, curve)
             self._since, self._ticks = time + step, 0
         if self.finished:
-            return self._target
+            return self.target
         return np.array(self._trajectory.at_time(self.time)[0])
-
-    @property
-    def target(self) -> Floats:
-        """Where it ends, shape (n,) [rad]."""
-        return self._target
 
     @property
     def rate(self) -> float:
@@ -123,15 +119,16 @@ class DoubleS(Trajectory):
     @property
     def standing(self) -> bool:
         """Whether it has reached its target, or is paused and has come to a standstill."""
-        return self.finished or (self.speed == self.rate == 0.0 and self._pace.steady(0.0))
+        return self.finished or (self.rate == 0.0 and self.steady)
 
     @property
     def line(self) -> Line:
         """Its way; how soon it brakes is known where its rate does not change."""
         time, rate = self.time, self._pace.rate
-        known = rate > 0.0 and self._pace.steady(self.speed)
+        known = rate > 0.0 and self.steady
         return Line(
             self._direction,
+            self.target,
             self.limits.acceleration,
             self.limits.jerk,
             max(self._brakes_at - time, 0.0) / rate if known else 0.0,
@@ -162,7 +159,7 @@ class DoubleS(Trajectory):
         paused.speed, paused._pace.acceleration = 0.0, acceleration  # noqa: SLF001  one of its own kind
         most, line = self.limits.acceleration, self.line
         longer = self.velocity * (1.0 / acceleration - 1.0 / most) + 2.0 * most / self.limits.jerk
-        if line.steady == 0.0 and self.rate == 1.0 and self._pace.steady(1.0):
+        if line.steady == 0.0 and self.rate == 1.0 and self.steady:
             return False  # it brakes as hard as it may
         if line.steady < longer + SURELY and not _stands_sooner(paused, self.fork()):
             return False

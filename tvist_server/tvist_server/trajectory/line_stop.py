@@ -96,7 +96,7 @@ class LineStop(Trajectory):
     @property
     def line(self) -> Line:
         """Its way: it brakes from the beginning."""
-        return Line(self._direction, self.acceleration, self.jerk, 0.0)
+        return Line(self._direction, self.end, self.acceleration, self.jerk, 0.0)
 
     @property
     def end(self) -> Floats:
