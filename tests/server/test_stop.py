@@ -220,3 +220,27 @@ def test_a_pause_while_the_slider_slows_is_not_ahead_of_what_the_slider_would_ha
         return (robot.column("target_q") - Q1) @ (Q3 - Q1)
 
     assert (moving(c.Pause) - moving(None)).max() <= 1e-9
+
+
+@pytest.mark.parametrize("name", ["um_zv", "um_zvd"])
+def test_a_stop_is_not_ahead_of_a_motion_that_negative_impulses_let_turn_back(name):
+    """Of a short move, at every other tick of it: its shaped reference goes forwards and back again."""
+    target = (Q1[0] + 0.003, *Q1[1:])
+    robot = Robot()
+    robot.send(c.SetEstimator, name="fixed", f_d=(5.0,), zeta=(0.1,))
+    robot.send(c.SetShaper, name=name)
+    for moment in range(8, 80, 2):
+        robot.send(c.SimulationReset, q=tuple(Q1), mode="RUNNING")
+        robot.tick(3)
+        assert isinstance(robot.send(c.MoveJ, q=target, velocity=0.5, acceleration=2.0, jerk=50.0), Accepted)
+        robot.tick(moment)
+        if robot.controller.cycle.at_rest:
+            break
+        free = robot.controller.motion.outlook.foresee()[2:, 0]
+        robot.send(c.Stop)
+        stopped = []
+        for _ in free:
+            robot.tick()
+            stopped.append(robot.controller.cycle.position[0])
+        assert (np.array(stopped) - free).max() <= 1e-9, moment
+    assert moment > 20

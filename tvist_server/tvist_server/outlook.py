@@ -144,7 +144,11 @@ class Outlook:
             steps = np.diff(cycle.line_filter.window() @ line.direction)
             known = bool((np.diff(steps) >= -EVEN * float(line.direction @ line.direction)).all())
         return replace(
-            line, braking=peak * line.braking, jerk=peak * line.jerk, steady=line.steady if known else 0.0
+            line,
+            braking=peak * line.braking,
+            jerk=peak * line.jerk,
+            steady=line.steady if known else 0.0,
+            turns=peak > 1.0,
         )
 
 
