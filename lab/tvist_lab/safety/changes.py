@@ -6,7 +6,7 @@ import numpy as np
 
 from tvist_lab.recordings import Floats
 from tvist_lab.safety import stops, streams
-from tvist_lab.safety.subject import Subject, disc
+from tvist_lab.safety.subject import Subject
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
@@ -14,7 +14,7 @@ from tvist_protocol.io import SetTcp
 from tvist_protocol.replies import Refused
 from tvist_protocol.values import Payload
 from tvist_server.collision import CLEARANCE, CollisionModel
-from tvist_server.setup import body
+from tvist_server.setup import body, paper_payload
 
 Change = tuple[type, dict[str, object]]
 
@@ -29,11 +29,11 @@ class ChangeOutcome:
     near: float
     """How much nearer than the clearance two bodies came after it, by the reference; to be 0 or less [m]."""
     refused: bool
-    """Whether the change was refused for what it would meet."""
+    """True when the robot refused the change with `collision`."""
 
     @property
     def kept(self) -> bool:
-        """Whether the promise was kept."""
+        """True when nothing came nearer than the clearance."""
         return self.near <= 0.0
 
 
@@ -97,13 +97,14 @@ def _under_way(description: RobotDescription, seed: int, random: np.random.Gener
         robot.tick(case.moment)
     else:
         stream = streams.draw(description, seed)
-        robot = Subject(description, stream.start, disc(description, stream.mass), shaper=stream.shaper)
+        robot = Subject(
+            description, stream.start, paper_payload(description, stream.mass), shaper=stream.shaper
+        )
         robot.send(c.ServoStart, velocity=stream.velocity, acceleration=stream.acceleration, jerk=2000.0)
         way = stream.towards - stream.start
         duration = float(np.abs(way).max()) / stream.velocity + 0.1
         for tick in range(int(random.integers(20, 500))):
-            share = min(tick * PERIOD / duration, 1.0)
-            robot.setpoint(tick, stream.start + share * share * (3.0 - 2.0 * share) * way)
+            robot.setpoint(tick, stream.start + streams.eased(tick * PERIOD / duration) * way)
             robot.tick()
     match int(random.integers(6)):
         case 0:

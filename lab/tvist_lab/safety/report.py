@@ -1,6 +1,6 @@
 """All searches on all cores, and what they found."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
@@ -71,11 +71,7 @@ def search(
         result["streams"] = _streams(streamed)
     if counts.changes:
         changed = run("changes", counts.changes, partial(changes.judge, description))
-        result["changes"] = {
-            "count": len(changed),
-            "broken": [repr(one) for one in changed if not one.kept],
-            "refused": sum(one.refused for one in changed),
-        }
+        result["changes"] = {**_judged(changed), "refused": sum(one.refused for one in changed)}
     if counts.sequences:
         told = run("sequences", counts.sequences, partial(_sequence, description))
         result["sequences"] = {"count": len(told), "broken": [one for one in told if one is not None]}
@@ -117,28 +113,35 @@ def _stops(outcomes: Sequence[stops.Outcome]) -> dict[str, Any]:
                 "ran_out": sum(one.late == 0 for one in of_kind),
             }
     return {
-        "count": len(outcomes),
-        "broken": [repr(one) for one in outcomes if not one.kept],
+        **_judged(outcomes),
         "worst_ahead_rad": max(one.ahead for one in outcomes),
         "worst_off_rad": max(one.off for one in outcomes),
         "worst_late_ticks": max(one.late for one in outcomes),
         "worst_torque_share": max(one.torque for one in outcomes),
-        "worst_below_clearance_m": max(one.near for one in outcomes),
-        "worst_penetration_of_the_flexible_arm_m": _worst(one.penetration for one in outcomes),
+        **_nearest(outcomes),
         "kinds": kinds,
     }
 
 
 def _streams(outcomes: Sequence[streams.StreamOutcome]) -> dict[str, Any]:
     return {
-        "count": len(outcomes),
-        "broken": [repr(one) for one in outcomes if not one.kept],
+        **_judged(outcomes),
         "stopped_by_the_robot": sum(one.stopped for one in outcomes),
-        "worst_below_clearance_m": max(one.near for one in outcomes),
-        "worst_penetration_of_the_flexible_arm_m": _worst(one.penetration for one in outcomes),
+        **_nearest(outcomes),
     }
 
 
-def _worst(values: Iterator[float]) -> float | None:
-    known = [value for value in values if not np.isnan(value)]
-    return max(known) if known else None
+def _judged(
+    outcomes: Sequence[stops.Outcome | streams.StreamOutcome | changes.ChangeOutcome],
+) -> dict[str, Any]:
+    """How many there were, and each that broke a promise."""
+    return {"count": len(outcomes), "broken": [repr(one) for one in outcomes if not one.kept]}
+
+
+def _nearest(outcomes: Sequence[stops.Outcome | streams.StreamOutcome]) -> dict[str, Any]:
+    """How near two bodies came at worst, by the reference and by the flexible arm where it was simulated."""
+    arm = [one.penetration for one in outcomes if not np.isnan(one.penetration)]
+    return {
+        "worst_below_clearance_m": max(one.near for one in outcomes),
+        "worst_penetration_of_the_flexible_arm_m": max(arm) if arm else None,
+    }

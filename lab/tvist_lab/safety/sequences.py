@@ -1,5 +1,6 @@
 """Whole random sequences of commands, whatever they are, and what must hold throughout."""
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -8,7 +9,7 @@ import numpy as np
 from tvist_lab.recordings import Floats
 from tvist_lab.safety.changes import far_payload
 from tvist_lab.safety.stops import SHAPERS
-from tvist_lab.safety.subject import CLIENT, Subject, disc
+from tvist_lab.safety.subject import CLIENT, Subject
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
@@ -18,7 +19,7 @@ from tvist_protocol.replies import Accepted, Refused
 from tvist_protocol.transitions import Activity
 from tvist_server.collision import CLEARANCE, CollisionModel
 from tvist_server.cycle import STILL
-from tvist_server.setup import body
+from tvist_server.setup import body, paper_payload
 
 COMMANDS = 40
 """In a sequence."""
@@ -64,11 +65,11 @@ class Sequence:
     def __init__(self, description: RobotDescription, seed: int, *, flexible: bool = False) -> None:
         self.seed, self.description = seed, description
         self._random = np.random.default_rng([seed, 15])
-        self._free = CollisionModel(description, body(disc(description, 0.0)))
+        self._free = CollisionModel(description, body(paper_payload(description, 0.0)))
         mass = float(self._random.choice([0.0, 5.0, self._random.uniform(0, 5)]))
-        self._free.carry(body(disc(description, mass)))
+        self._free.carry(body(paper_payload(description, mass)))
         self.robot = Subject(
-            description, self._posture(), disc(description, mass),
+            description, self._posture(), paper_payload(description, mass),
             shaper=str(self._random.choice(SHAPERS)), flexible=flexible,
         )  # fmt: skip
         self.done: list[str] = []
@@ -206,10 +207,10 @@ class Sequence:
             ):
                 raise self._broken(f"a move is not accepted: {reply}")
             self._tick_until_rest()
-        started = [e.id for e in robot.events if e.kind == "motion_started"]
-        ended = [e.id for e in robot.events if e.kind in {"motion_done", "motion_stopped"}]
-        if sorted(started) != sorted(ended):  # type: ignore[type-var]
-            raise self._broken(f"motions {started} ended as {ended}")
+        started = Counter(e.id for e in robot.events if e.kind == "motion_started")
+        ended = Counter(e.id for e in robot.events if e.kind in {"motion_done", "motion_stopped"})
+        if started != ended:
+            raise self._broken(f"motions {dict(started)} ended as {dict(ended)}")
 
     def _tick_until_rest(self) -> None:
         for _ in range(200):
@@ -263,6 +264,14 @@ class Sequence:
             collisions = self.robot.controller.motion.collisions
             self._excused = collisions.meeting(self.robot.references[-1]) is not None
         return reply
+
+    def speed(self) -> object:
+        """Another speed."""
+        return self.robot.send(c.SetSpeed, fraction=float(self._random.uniform(0.05, 1.0)))
+
+    def shaper(self) -> object:
+        """Another shaper."""
+        return self.robot.send(c.SetShaper, name=str(self._random.choice(SHAPERS)))
 
     def estimator(self) -> object:
         """Other modes."""
@@ -320,9 +329,9 @@ _SENT: dict[str, tuple[float, Callable[[Sequence], object]]] = {
     "stop": (5.0, Sequence.halt),
     "pause": (2.0, lambda it: it.robot.send(c.Pause)),
     "resume": (3.0, lambda it: it.robot.send(c.Resume)),
-    "speed": (2.0, lambda it: it.robot.send(c.SetSpeed, fraction=float(it._random.uniform(0.05, 1.0)))),  # noqa: SLF001
+    "speed": (2.0, Sequence.speed),
     "payload": (3.0, Sequence.payload),
-    "shaper": (3.0, lambda it: it.robot.send(c.SetShaper, name=str(it._random.choice(SHAPERS)))),  # noqa: SLF001
+    "shaper": (3.0, Sequence.shaper),
     "estimator": (1.0, Sequence.estimator),
     "power_on": (9.0, lambda it: it.robot.send(c.PowerOn)),
     "power_off": (1.0, lambda it: it.robot.send(c.PowerOff)),

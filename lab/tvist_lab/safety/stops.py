@@ -6,14 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from tvist_lab.recordings import Floats
-from tvist_lab.safety.subject import CLIENT, Subject, disc, refused, torques
+from tvist_lab.safety.subject import CLIENT, Subject, refused, torques
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import RobotDescription
+from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_server.collision import CLEARANCE, CollisionModel
 from tvist_server.outlook import resting_after
 from tvist_server.safety import TORQUE_SHARE
-from tvist_server.setup import body
+from tvist_server.setup import body, paper_payload
 
 ROUNDING = 1e-9
 """Difference of two positions that counts as none [rad]."""
@@ -72,20 +73,18 @@ class Outcome:
     """How much nearer than the clearance two bodies came, by the reference [m]."""
     penetration: float
     """The same by the flexible arm [m]; nan where it was not simulated."""
-    rested: float
-    """How much sooner than the move left alone it rested [s]."""
     duration: float
     """From the stop until it rested [s]."""
     left: float
-    """From that moment until the move left alone rested [s]."""
+    """Time that the move left alone still took at the moment of the stop [s]."""
     told: tuple[float | None, float | None]
     """Duration [s] and way [rad] that the event told."""
     way: float
-    """That the joint that turned most turned [rad]."""
+    """Angle that the leading joint turned after the stop [rad]."""
 
     @property
     def kept(self) -> bool:
-        """Whether the promise was kept."""
+        """True when every figure is within its bound."""
         return (
             self.ahead <= ROUNDING
             and self.off <= ROUNDING
@@ -98,13 +97,12 @@ class Outcome:
 def draw(description: RobotDescription, seed: int, kinds: tuple[str, ...] = tuple(KINDS)) -> Case:
     """A case by its number; its move is accepted."""
     random = np.random.default_rng([seed, 11])
-    collisions = CollisionModel(description, body(disc(description, 0.0)))
+    collisions = CollisionModel(description, body(paper_payload(description, 0.0)))
     n = description.joints
     while True:
         mass = float(random.choice([0.0, 5.0, random.uniform(0.0, 5.0)]))
-        collisions.carry(body(disc(description, mass)))
-        start, target = WORKSPACE.random(2, n, int(random.integers(2**31)))
-        start[4:], target[4:] = random.uniform(-2, 2, n - 4), random.uniform(-2, 2, n - 4)
+        collisions.carry(body(paper_payload(description, mass)))
+        start, target = two_postures(random, n)
         if random.random() < 0.3:  # short moves have no cruise
             target = start + random.uniform(0.02, 0.3) * (target - start)
         if collisions.meeting(start) is None and collisions.on_line(start, target) is None:
@@ -126,9 +124,17 @@ def draw(description: RobotDescription, seed: int, kinds: tuple[str, ...] = tupl
     return Case(**{**vars(case), "moment": int(random.integers(1, max(moved, 2)))})
 
 
+def two_postures(random: np.random.Generator, joints: int) -> Floats:
+    """Two random postures of the workspace with turned wrists, shape (2, joints) [rad]."""
+    pair = WORKSPACE.random(2, joints, int(random.integers(2**31)))
+    for posture in pair:
+        posture[4:] = random.uniform(-2, 2, joints - 4)
+    return pair
+
+
 def judge(description: RobotDescription, case: Case, *, flexible: bool = False) -> Outcome:
     """Stop the move, and compare with the one left alone."""
-    payload = disc(description, case.mass)
+    payload = paper_payload(description, case.mass)
     alone = _left_alone(description, case)
     robot = moving(description, case, flexible=flexible)
     robot.tick(case.moment)
@@ -160,9 +166,8 @@ def judge(description: RobotDescription, case: Case, *, flexible: bool = False) 
         torque=float((taken / np.maximum(limits, asked)).max() - 1.0),
         near=CLEARANCE - collisions.nearest(stopped[after]),
         penetration=penetration,
-        rested=0.002 * (ends[1] - ends[0]),
-        duration=0.002 * max(ends[0] - case.moment, 0),
-        left=0.002 * (ends[1] - case.moment),
+        duration=PERIOD * max(ends[0] - case.moment, 0),
+        left=PERIOD * (ends[1] - case.moment),
         told=(None, None) if told is None else (told.duration, told.way),
         way=float(np.abs(stopped[-1] - stopped[case.moment]).max()),
     )
@@ -171,7 +176,7 @@ def judge(description: RobotDescription, case: Case, *, flexible: bool = False) 
 def moving(description: RobotDescription, case: Case, *, flexible: bool = False) -> Subject:
     """A robot that has just accepted the case's move."""
     robot = Subject(
-        description, case.start, disc(description, case.mass), shaper=case.shaper, flexible=flexible
+        description, case.start, paper_payload(description, case.mass), shaper=case.shaper, flexible=flexible
     )
     robot.send(c.SetSpeed, fraction=case.speed)
     reply = robot.send(

@@ -6,17 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from tvist_lab.recordings import Floats
-from tvist_lab.safety.stops import SHAPERS
-from tvist_lab.safety.subject import CLIENT, Subject, disc, refused
-from tvist_lab.workspace import WORKSPACE
+from tvist_lab.safety.stops import SHAPERS, two_postures
+from tvist_lab.safety.subject import CLIENT, Subject, refused
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_server.collision import CLEARANCE, CollisionModel
-from tvist_server.setup import body
+from tvist_server.setup import body, paper_payload
 
 LENGTH = 3.0
-"""Of a stream that nobody ends [s]."""
+"""How long a stream lasts unless something ends it [s]."""
 
 ENDS: dict[str, Callable[[Subject], object]] = {
     "silence": lambda _: None,
@@ -48,7 +47,7 @@ class StreamCase:
     ends_at: float
     """When it is ended [s]."""
     lost: float
-    """Share of the set-points that never come [-]."""
+    """Share of the set-points that are never sent [-]."""
     wave: float
     """Amplitude of a sine on top [rad]."""
 
@@ -63,26 +62,25 @@ class StreamOutcome:
     penetration: float
     """The same by the flexible arm [m]; nan where it was not simulated."""
     stopped: bool
-    """Whether the robot itself ended the stream since something would have met."""
+    """True when the robot ended the stream because two bodies would have met."""
     beyond: float
     """Farthest beyond a joint's range; to be 0 or less [rad]."""
 
     @property
     def kept(self) -> bool:
-        """Whether the promise was kept."""
+        """True when every figure is within its bound."""
         return self.near <= 0.0 and self.beyond <= 0.0
 
 
 def draw(description: RobotDescription, seed: int) -> StreamCase:
     """A case by its number: most of them lead to where something meets."""
     random = np.random.default_rng([seed, 12])
-    collisions = CollisionModel(description, body(disc(description, 0.0)))
+    collisions = CollisionModel(description, body(paper_payload(description, 0.0)))
     n = description.joints
     mass = float(random.choice([0.0, 5.0, random.uniform(0.0, 5.0)]))
-    collisions.carry(body(disc(description, mass)))
+    collisions.carry(body(paper_payload(description, mass)))
     while True:
-        start, towards = WORKSPACE.random(2, n, int(random.integers(2**31)))
-        start[4:], towards[4:] = random.uniform(-2, 2, n - 4), random.uniform(-2, 2, n - 4)
+        start, towards = two_postures(random, n)
         if random.random() < 0.5:  # at the floor, past it
             towards[1] = start[1] + random.choice([-1.0, 1.0]) * random.uniform(1.0, 3.0)
         if collisions.meeting(start) is not None:
@@ -105,11 +103,17 @@ def draw(description: RobotDescription, seed: int) -> StreamCase:
     )
 
 
+def eased(share: float) -> float:
+    """Share of a way, from rest to rest, after a share of its time [-]."""
+    share = min(share, 1.0)
+    return share * share * (3.0 - 2.0 * share)
+
+
 def judge(description: RobotDescription, case: StreamCase, *, flexible: bool = False) -> StreamOutcome:
     """Send it and watch."""
     random = np.random.default_rng([case.seed, 13])
     robot = Subject(
-        description, case.start, disc(description, case.mass), shaper=case.shaper, flexible=flexible,
+        description, case.start, paper_payload(description, case.mass), shaper=case.shaper, flexible=flexible,
         clock="realtime",
     )  # fmt: skip
     reply = robot.send(
@@ -128,15 +132,14 @@ def judge(description: RobotDescription, case: StreamCase, *, flexible: bool = F
             break
         if tick % every == 0 and random.random() >= case.lost:
             time = tick * PERIOD
-            share = min(time / duration, 1.0)
             bump = case.wave * np.sin(20.0 * time) * min(5.0 * time, 1.0)
-            q = case.start + share * share * (3.0 - 2.0 * share) * way + bump
+            q = case.start + eased(time / duration) * way + bump
             robot.setpoint(tick // every, np.clip(q, -reach, reach))
         robot.tick()
     robot.until_rest(5000)
     robot.tick(20)
     references = np.array(robot.references)
-    collisions = CollisionModel(description, body(disc(description, case.mass)))
+    collisions = CollisionModel(description, body(paper_payload(description, case.mass)))
     penetration = float("nan")
     if flexible:
         penetration = CLEARANCE - collisions.nearest(np.array(robot.actual))

@@ -6,44 +6,35 @@ from typing import Any
 import numpy as np
 
 from tvist_lab.recordings import Floats
-from tvist_plant.description import RobotDescription
+from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import PERIOD, Measurement
+from tvist_plant.plant import PERIOD, Measurement, Plant
 from tvist_protocol import commands as c
+from tvist_protocol.info import Clock
 from tvist_protocol.replies import Accepted, Refused, Reply
 from tvist_protocol.stream import Event
-from tvist_protocol.values import Payload
+from tvist_protocol.values import Payload as Declared
 from tvist_server.calibrations import load
 from tvist_server.control.differentiator import central_differences
 from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.controller import Controller
-from tvist_server.cycle import STILL, ControlCycle
-from tvist_server.setup import Setup, body, paper_payload
+from tvist_server.cycle import STILL
+from tvist_server.setup import Setup, body
 
 CLIENT = "searcher"
 
 
-class RigidArm:
+class RigidArm(Plant):
     """Stands for the arm where only references matter: it is where it is told to be, and feels nothing."""
-
-    def __init__(self, cycle: ControlCycle) -> None:
-        self.payload = cycle.arm.payload
-        self._joints = cycle.description.joints
 
     def step(self, command: DriveCommand) -> Measurement:
         """Be there."""
-        return Measurement(command.q, command.qd, np.zeros(self._joints), np.zeros(3))
+        return Measurement(command.q, command.qd, np.zeros_like(command.q), np.zeros(3))
 
-    def reset(self, command: DriveCommand, *, payload: Any = None, seed: int = 0) -> Measurement:  # noqa: ARG002
+    def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
         """Be there."""
-        self.payload = self.payload if payload is None else payload
+        super().reset(command, payload=payload, seed=seed)
         return self.step(command)
-
-    def push(self, torque: Floats) -> None:
-        """Nothing pushes it."""
-
-    def spoil(self) -> None:
-        """Nothing spoils it."""
 
 
 @dataclass
@@ -56,21 +47,22 @@ class Subject:
         payload: Declared and carried.
         shaper: Its shaper.
         flexible: Whether the flexible arm is simulated, or only the references.
-        clock: Whether leases run out.
+        clock: Of the robot: in real time leases run out.
+        lease_s: Length of the lease [s].
     """
 
     description: RobotDescription
     q: Floats
-    payload: Payload
+    payload: Declared
     shaper: str = "zv"
     flexible: bool = False
-    clock: str = "free"
+    clock: Clock = "free"
     lease_s: float = 3600.0
     events: list[Event] = field(default_factory=list)
     references: list[Floats] = field(default_factory=list)
-    """Shaped references played, one a tick; the first is where it rests."""
+    """Shaped references played, one array a tick; the first is the start [rad]."""
     actual: list[Floats] = field(default_factory=list)
-    """Where the links were, one a tick."""
+    """Measured joint angles, one array a tick [rad]."""
 
     def __post_init__(self) -> None:
         """Build it and take control."""
@@ -81,11 +73,11 @@ class Subject:
             payload=self.payload,
             calibration=load("ur5e_5kg"),
             shaper="none" if undamped else self.shaper,
-            clock=self.clock,  # type: ignore[arg-type]
+            clock=self.clock,
         )
         self.controller = Controller(setup)
         if not self.flexible:
-            self.controller.cycle.arm = RigidArm(self.controller.cycle)  # type: ignore[assignment]
+            self.controller.cycle.arm = RigidArm(self.description, body(self.payload))
         self.controller.client_seen(CLIENT)
         self.token = self.take_control()
         self.references.append(np.array(self.q))
@@ -127,19 +119,14 @@ class Subject:
 
     @property
     def resting(self) -> bool:
-        """Whether the shaped reference moves no more: at rest, or paused."""
+        """True when the shaped reference stands still, at rest or paused."""
         q = self.references
         cycle = self.controller.cycle
         still = len(q) > 2 and max(np.abs(q[-1] - q[-2]).max(), np.abs(q[-2] - q[-3]).max()) <= STILL
         return cycle.at_rest or (still and cycle.trajectory.standing)
 
 
-def disc(description: RobotDescription, mass: float) -> Payload:
-    """The robot file's payload scaled to a mass [kg]; none at all where that is 0."""
-    return paper_payload(description, mass)
-
-
-def torques(description: RobotDescription, payload: Payload, references: Floats) -> Floats:
+def torques(description: RobotDescription, payload: Declared, references: Floats) -> Floats:
     """Torques of the rigid arm for references, one a tick, by central differences, shape (k - 2, n) [N m]."""
     dynamics = InverseDynamics(description, body(payload))
     states = zip(*central_differences(references, PERIOD), strict=True)
@@ -147,5 +134,5 @@ def torques(description: RobotDescription, payload: Payload, references: Floats)
 
 
 def refused(reply: Reply) -> bool:
-    """Whether a command was refused."""
+    """Tell whether a reply is a refusal."""
     return isinstance(reply, Refused)
