@@ -34,11 +34,11 @@ class Stopping(Struct, frozen=True, kw_only=True, gc=False):
     speed: float
     """Velocity of the joint when the stop begins, as a share of its limit [-]."""
     joint: str
-    """Which joint that is."""
+    """The joint that is the slowest to stop."""
     duration: float
-    """Until it rests [s]."""
+    """Time until the joint rests [s]."""
     way: float
-    """That it turns until then [rad]."""
+    """Angle the joint turns until it rests [rad]."""
 
 
 class CalibrationInfo(Struct, frozen=True, kw_only=True, gc=False):

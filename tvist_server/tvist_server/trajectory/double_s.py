@@ -68,7 +68,7 @@ class DoubleS(Trajectory):
         self._brakes_at = self.duration - sum(leading.t[:3])
         self._period = period
         self.limits = limits
-        """That it keeps."""
+        """Limits it keeps."""
         self.speed = speed
         """Rate that its time is to go at, 0 to 1 [-]."""
         self._pace = Pace(limits, period, speed)
