@@ -91,8 +91,9 @@ def main() -> None:
         def next_state() -> dict[str, Any]:
             return msgpack.unpackb(inbox.get(timeout=5.0))
 
-        # While this token is there the robot knows that we are: if we die, control ends at once.
-        alive = session.liveliness().declare_token(f"tvist/{ROBOT}/client/bare")
+        # While this token is there the robot knows that we are: if we die, control ends at once. The session's id tells
+        # us from another program of that name.
+        alive = session.liveliness().declare_token(f"tvist/{ROBOT}/client/bare/{session.info.zid()}")
         token = ask(session, "command", type="take_control", client="bare", lease_s=30.0)["token"]
         q = next_state()["target_q"]
         ask(session, "command", type="servo_start", token=token, period=PERIOD, acceleration=4.0)

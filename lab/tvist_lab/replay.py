@@ -5,11 +5,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tvist_lab.mcap_file import RecordingFile
-from tvist_protocol.commands import Setpoint
+from tvist_protocol.commands import HandOver, Setpoint, TakeControl
 from tvist_protocol.errors import TvistError
 from tvist_protocol.journal import Entry, message_of
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.controller import Controller
+from tvist_server.presence import Presence
 from tvist_server.recording import Recorder
 from tvist_server.setup import Setup
 
@@ -37,14 +38,14 @@ def replay(setup: Setup, journal: Sequence[Entry], states: Sequence[State]) -> R
         journal: What reached it.
         states: What it put out, from its first tick on; only their number and values are used.
     """
-    controller, done = Controller(setup), Replay()
+    controller, presence, done = Controller(setup), Presence(), Replay()
     entries = iter(journal)
     entry = next(entries, None)
     for recorded in states:
         while entry is not None and entry.tick <= recorded.tick:
             while controller.tick_number + 1 < entry.tick:
                 _tick(controller, setup, done)
-            _give(controller, entry)
+            _give(controller, entry, presence)
             entry = next(entries, None)
         while controller.tick_number < recorded.tick:
             _tick(controller, setup, done)
@@ -104,20 +105,24 @@ def _tick(controller: Controller, setup: Setup, done: Replay) -> None:
         done.truths.append(controller.truth())
 
 
-def _give(controller: Controller, entry: Entry) -> None:
+def _give(controller: Controller, entry: Entry, presence: Presence) -> None:
     match entry.kind:
-        case "client_seen":
-            controller.client_seen(entry.client or "")
+        case "client_seen":  # of recordings made before sessions were told apart
+            presence.seen(entry.client or "", entry.session or "")
         case "client_gone":
-            controller.client_gone(entry.client or "")
+            presence.gone(entry.client or "", entry.session or "")
+            controller.client_gone(entry.client or "", entry.session or "")
         case "missed":
             controller.missed(entry.count or 0)
         case _:
             message = message_of(entry)
             if isinstance(message, Setpoint):
                 controller.receive_setpoint(message)
-            else:
-                controller.receive(message)
+                return
+            session = entry.session
+            if session is None and isinstance(message, TakeControl | HandOver):
+                session = presence.session_of(message.client)
+            controller.receive(message, session=session)
 
 
 def _difference(recorded: State, replayed: State) -> str | None:

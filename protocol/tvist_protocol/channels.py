@@ -119,7 +119,8 @@ CHANNELS = (
         key="tvist/{robot}/client/{client}",
         kind="liveliness",
         by="client",
-        meaning="optional; where it is there when control is taken, its going ends the lease at once",
+        meaning="optional; where it is there when control is taken, its going ends the lease at once. "
+        "`/<session>`, Zenoh's id of the client's session, may follow: it tells the client from another of that name",
     ),
 )
 

@@ -7,7 +7,12 @@ a server compares them with its own.
 import re
 
 from tvist_protocol.errors import ProtocolError
-from tvist_protocol.values import CLIENT_NAME_PATTERN, PATTERN_MEANINGS, ROBOT_NAME_PATTERN
+from tvist_protocol.values import (
+    CLIENT_NAME_PATTERN,
+    PATTERN_MEANINGS,
+    ROBOT_NAME_PATTERN,
+    SESSION_PATTERN,
+)
 
 PREFIX = "tvist"
 ANY_ALIVE = f"{PREFIX}/*/alive"
@@ -15,6 +20,7 @@ ANY_ALIVE = f"{PREFIX}/*/alive"
 
 _ROBOT = re.compile(ROBOT_NAME_PATTERN)
 _CLIENT = re.compile(CLIENT_NAME_PATTERN)
+_SESSION = re.compile(SESSION_PATTERN)
 
 
 def check_robot_name(name: str) -> str:
@@ -81,20 +87,43 @@ def alive(robot: str) -> str:
     return _key(robot, "alive")
 
 
-def client(robot: str, name: str) -> str:
-    """Liveliness token of a client."""
-    return f"{_key(robot, 'client')}/{check_client_name(name)}"
+def client(robot: str, name: str, session: str = "") -> str:
+    """Liveliness token of a client.
+
+    Args:
+        robot: The robot's name.
+        name: The client's.
+        session: Zenoh's id of its session, which tells it from another one of that name; empty leaves it out.
+
+    Raises:
+        ProtocolError: A name or the id is none; code `out_of_range`.
+    """
+    key = f"{_key(robot, 'client')}/{check_client_name(name)}"
+    return f"{key}/{_checked('session', session, _SESSION)}" if session else key
 
 
 def any_client(robot: str) -> str:
     """Selects the liveliness tokens of all clients of a robot."""
-    return f"{_key(robot, 'client')}/*"
+    return f"{_key(robot, 'client')}/**"
 
 
 def client_name(robot: str, key: str) -> str | None:
     """Name in a client's liveliness token, None where the key is not one of this robot's."""
-    name = key.removeprefix(f"{_key(robot, 'client')}/")
-    return name if name != key and _CLIENT.match(name) else None
+    found = _client(robot, key)
+    return None if found is None else found[0]
+
+
+def client_session(robot: str, key: str) -> str:
+    """Session in a client's liveliness token; empty where the token has none."""
+    found = _client(robot, key)
+    return "" if found is None else found[1]
+
+
+def _client(robot: str, key: str) -> tuple[str, str] | None:
+    prefix = f"{_key(robot, 'client')}/"
+    name, slash, session = key.removeprefix(prefix).partition("/")
+    sound = _CLIENT.match(name) and bool(_SESSION.match(session)) == bool(slash)
+    return (name, session) if key.startswith(prefix) and sound else None
 
 
 def _key(robot: str, leaf: str) -> str:

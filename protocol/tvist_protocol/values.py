@@ -18,8 +18,12 @@ CLIENT_NAME_PATTERN = r"^(?!@)(?!.*[/*?#$])[ -~]{1,64}$(?!\n)"
 """A client's name too is one chunk of a key, `client/<client>`: printable ASCII without `/ * ? # $`. No
 wildcard matches a chunk that begins with `@`: the server would not see such a client leave."""
 
+SESSION_PATTERN = r"^[0-9a-f]{1,32}$(?!\n)"
+"""Zenoh's id of a session."""
+
 PATTERN_MEANINGS: dict[str, str] = {
     ROBOT_NAME_PATTERN: "1 to 64 of a-z 0-9 _ -, the first a letter or a digit",
+    SESSION_PATTERN: "1 to 32 of 0-9 a-f, Zenoh's id of a session",
     CLIENT_NAME_PATTERN: "1 to 64 printable ASCII characters other than / * ? # $, the first not @",
 }
 """What to say to a person whose string does not match."""

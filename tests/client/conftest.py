@@ -230,11 +230,14 @@ class Served:
     def setpoint(self, data):
         self.post(lambda: self.robot.put_setpoint("", data))
 
-    def client_seen(self, name):
+    def client_seen(self, name, _session=""):
         self.post(lambda: self.robot.notes.put(f"seen {name}"))
 
-    def client_gone(self, name):
+    def client_gone(self, name, _session=""):
         self.post(lambda: self.robot.notes.put(f"gone {name}"))
+
+    def session_gone(self, session):
+        pass
 
     def post(self, job):
         self._jobs.put(job)

@@ -17,16 +17,44 @@ def test_a_clients_key_and_its_name_back():
     key = keys.client("ur5e", "palletizer 2")
     assert key == "tvist/ur5e/client/palletizer 2"
     assert keys.client_name("ur5e", key) == "palletizer 2"
-    assert keys.any_client("ur5e") == "tvist/ur5e/client/*"
+    assert keys.client_session("ur5e", key) == ""
+    assert keys.any_client("ur5e") == "tvist/ur5e/client/**"
     assert keys.ANY_ALIVE == "tvist/*/alive"
+
+
+@pytest.mark.parametrize("session", ["1", "81fda21f27353ac9aa45cc45f98872fc"])
+def test_a_clients_key_may_say_which_session_it_is_of(session):
+    key = keys.client("ur5e", "palletizer 2", session)
+    assert key == f"tvist/ur5e/client/palletizer 2/{session}"
+    assert (keys.client_name("ur5e", key), keys.client_session("ur5e", key)) == ("palletizer 2", session)
+
+
+@pytest.mark.parametrize("session", ["*", "A1", "a/b", "x", "a" * 33, "a\n", " "])
+def test_what_is_no_session_is_refused(session):
+    with pytest.raises(ProtocolError) as caught:
+        keys.client("ur5e", "a", session)
+    assert (caught.value.code, caught.value.where) == ("out_of_range", "session")
 
 
 @pytest.mark.parametrize(
     "key",
-    ["tvist/ur5e/client/*", "tvist/ur5e/client/a/b", "tvist/ur10/client/a", "tvist/ur5e/client/", "x", ""],
+    [
+        "tvist/ur5e/client/*",
+        "tvist/ur5e/client/a/",
+        "tvist/ur5e/client/a/x",
+        "tvist/ur5e/client/a/b/c",
+        "tvist/ur5e/client/a/**",
+        "tvist/ur5e/client//b",
+        "tvist/ur5e/client",
+        "tvist/ur10/client/a",
+        "tvist/ur5e/client/",
+        "x",
+        "",
+    ],
 )
-def test_a_key_that_is_no_clients_has_no_name(key):
+def test_a_key_that_is_no_clients_has_neither_name_nor_session(key):
     assert keys.client_name("ur5e", key) is None
+    assert keys.client_session("ur5e", key) == ""
 
 
 @pytest.mark.parametrize("name", ["a", "0", "ur5e", "cell-3_left", "a" * 64])

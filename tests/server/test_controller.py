@@ -581,14 +581,14 @@ def test_releasing_control_ends_a_stream():
 
 def test_a_client_that_goes_takes_its_lease_and_its_motion_with_it():
     controller = Controller(setup())
-    controller.client_seen("a")
     robot = Robot()
     robot.controller = controller
-    robot.token = controller.receive(c.TakeControl(client="a")).token
+    robot.token = controller.receive(c.TakeControl(client="a"), session="1f").token
     motion = moving(robot)
-    controller.client_gone("b")
-    assert not controller.cycle.stopping
-    controller.client_gone("a")
+    for other in (("b", "1f"), ("a", "2f"), ("a", "")):
+        controller.client_gone(*other)
+        assert not controller.cycle.stopping
+    controller.client_gone("a", "1f")
     robot.tick()
     assert [(e.kind, e.id) for e in robot.events[1:]] == [("lease_lost", None), ("motion_stopped", motion)]
     stopped_within_limits(robot)
@@ -597,7 +597,7 @@ def test_a_client_that_goes_takes_its_lease_and_its_motion_with_it():
 def test_a_client_that_was_not_seen_goes_unnoticed():
     robot = Robot()
     moving(robot)
-    robot.controller.client_gone("a")
+    robot.controller.client_gone("a", "")
     robot.tick()
     assert robot.kinds() == ["motion_started"]
 

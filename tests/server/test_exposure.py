@@ -5,7 +5,7 @@ import socket
 import pytest
 
 from tvist_protocol.codec import MAX_BYTES
-from tvist_server.gateways.access import access_control
+from tvist_server.gateways.access import access_control, open_access
 from tvist_server.gateways.endpoints import is_local
 from tvist_server.gateways.exposure import ExposureError, guarded
 
@@ -50,13 +50,18 @@ def test_a_name_with_one_address_that_leaves_the_machine_is_not_local(monkeypatc
 
 
 def test_local_endpoints_are_left_as_they_are():
-    assert guarded(LOCAL[:3], ["ur5e"], security=None, insecure=False) == (LOCAL[:3], {})
+    endpoints, settings = guarded(LOCAL[:3], ["ur5e"], security=None, insecure=False)
+    assert endpoints == LOCAL[:3]
+    assert settings == {"access_control": open_access(["ur5e"])}
 
 
 def test_insecure_lets_everybody_in_and_still_limits_the_size_of_a_message():
     endpoints, settings = guarded(["tcp/0.0.0.0:7447"], ["ur5e"], security=None, insecure=True)
     assert endpoints == ["tcp/0.0.0.0:7447"]
-    assert settings == {"transport/link/rx/max_message_size": 2 * MAX_BYTES}
+    assert settings == {
+        "transport/link/rx/max_message_size": 2 * MAX_BYTES,
+        "access_control": open_access(["ur5e"]),
+    }
 
 
 @pytest.mark.parametrize("insecure", [False, True])
@@ -97,7 +102,7 @@ class TestAccess:
     def test_an_operator_may_besides_command_stream_and_be_there_and_no_more(self):
         assert self.granted("operator", "ingress", "query") == {"tvist/ur5e/info", "tvist/ur5e/command"}
         assert self.granted("operator", "ingress", "put") == {"tvist/ur5e/setpoint"}
-        assert self.granted("operator", "ingress", "liveliness_token") == {"tvist/ur5e/client/*"}
+        assert self.granted("operator", "ingress", "liveliness_token") == {"tvist/ur5e/client/**"}
         for message in ("delete", "reply", "declare_queryable"):
             assert not self.granted("operator", "ingress", message)
 

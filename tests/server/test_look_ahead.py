@@ -9,6 +9,7 @@ from tvist_lab.safety import changes, streams
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_server.about import info_of
 from tvist_server.collision import CLEARANCE, CollisionModel
 from tvist_server.cycle import STILL
 from tvist_server.outlook import MOST_AHEAD, Outlook, resting_after
@@ -131,7 +132,7 @@ def test_no_point_travels_farther_than_the_reach_of_the_joints_that_turn():
 
 
 def test_info_says_how_long_stops_last():
-    info = Robot().controller.stopping
+    info = info_of(Robot().controller).stopping
     assert [(row.payload, row.speed) for row in info] == [
         (mass, speed) for mass in (0.0, UR5E.limits.payload) for speed in (0.33, 0.66, 1.0)
     ]

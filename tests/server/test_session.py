@@ -86,38 +86,29 @@ def test_without_a_lease_nothing_runs_out(session):
     assert not session.expired(1e9)
 
 
-def test_a_client_that_was_seen_is_missed(session):
-    session.client_seen("a")
-    assert session.take("a", 30.0, 0.0).watched
-    assert session.client_gone("a")
+def test_the_going_of_its_session_ends_a_lease(session):
+    assert session.take("a", 30.0, 0.0, "1f").session == "1f"
+    assert session.client_gone("a", "1f")
 
 
-def test_a_client_that_was_never_seen_is_not_missed(session):
-    assert not session.take("a", 30.0, 0.0).watched
-    assert not session.client_gone("a")
+@pytest.mark.parametrize("gone", [("a", "2f"), ("b", "1f"), ("a", "")])
+def test_the_going_of_another_one_ends_nothing(session, gone):
+    session.take("a", 30.0, 0.0, "1f")
+    assert not session.client_gone(*gone)
 
 
-def test_a_client_seen_after_it_took_control_is_not_watched(session):
+def test_a_client_of_which_no_session_is_known_is_not_missed(session):
     session.take("a", 30.0, 0.0)
-    session.client_seen("a")
-    assert not session.client_gone("a")
+    assert not session.client_gone("a", "")
 
 
 def test_renewal_keeps_watching(session):
-    session.client_seen("a")
-    session.renew(session.take("a", 30.0, 0.0).token, 1.0)
-    assert session.client_gone("a")
+    session.renew(session.take("a", 30.0, 0.0, "").token, 1.0)
+    assert session.client_gone("a", "")
 
 
-def test_another_client_s_going_ends_nothing(session):
-    session.client_seen("a")
-    session.client_seen("b")
-    session.take("a", 30.0, 0.0)
-    assert not session.client_gone("b")
-    assert not session.client_gone("c")
-
-
-def test_one_that_went_before_it_took_control_is_not_watched(session):
-    session.client_seen("a")
-    assert not session.client_gone("a")
-    assert not session.take("a", 30.0, 0.0).watched
+def test_control_that_was_handed_over_is_not_the_giver_s_any_more(session):
+    session.take("a", 30.0, 0.0, "1f")
+    session.hand_over("b", 1.0)
+    assert not session.client_gone("a", "1f")
+    assert (session.lease.client, session.lease.session) == ("b", None)

@@ -27,6 +27,7 @@ from tvist_server.streaming import TIMEOUT
 from .robots import Q1, setup
 
 CLIENTS = st.sampled_from(["anna", "bert"])
+SESSION = "1f"
 LEASES = st.sampled_from([0.1, 0.4, 30.0, 30.0])
 TOKENS = st.sampled_from(["own", "own", "own", "own", "own", "old", "none of ours"])
 """Whose token a command carries."""
@@ -114,12 +115,15 @@ class Sessions(RuleBasedStateMachine):
         """Send a command that needs control; whether it was carried out."""
         token = self.token(whose)
         code = self.refusal(token)
-        reply = self.robot.receive(kind(token=token, **fields))
+        reply = self.robot.receive(kind(token=token, **fields), session=self.session(fields.get("client")))
         if code is None:
             return reply
         assert isinstance(reply, Refused)
         assert (reply.code, reply.where) == (code, "token")
         return None
+
+    def session(self, client):
+        return SESSION if client in self.present else None
 
     # ---------------------------------------------------------------- control
 
@@ -159,7 +163,9 @@ class Sessions(RuleBasedStateMachine):
                 self.leave(client)
 
     def take(self, client, seconds):
-        reply = self.robot.receive(c.TakeControl(client=client, lease_s=seconds))
+        reply = self.robot.receive(
+            c.TakeControl(client=client, lease_s=seconds), session=self.session(client)
+        )
         if self.lease is not None and self.lease.client != client:
             assert isinstance(reply, Refused)
             assert reply.code == "no_control"
@@ -187,11 +193,10 @@ class Sessions(RuleBasedStateMachine):
             self.lease = Lease(client, None, seconds, self.robot.now + seconds, client in self.present)
 
     def come(self, client):
-        self.robot.client_seen(client)
         self.present.add(client)
 
     def leave(self, client):
-        self.robot.client_gone(client)
+        self.robot.client_gone(client, SESSION)
         self.present.discard(client)
         if self.lease is not None and self.lease.client == client and self.lease.watched:
             self.lose_lease()

@@ -44,12 +44,11 @@ def test_a_stop_that_torque_would_let_go_through_the_floor_is_no_later_than_the_
     lasted = []
     for end in (
         lambda: None,
-        lambda: robot.controller.client_gone("a"),
+        lambda: robot.controller.client_gone("a", "1f"),
         lambda: robot.send(c.SimulationInject, fault="protective_stop"),
         lambda: robot.send(c.PowerOff),
     ):
-        robot.controller.client_seen("a")
-        robot.token = robot.controller.receive(c.TakeControl(client="a")).token
+        robot.token = robot.controller.receive(c.TakeControl(client="a"), session="1f").token
         robot.send(c.SimulationReset, q=(0.0, -1.57, 0.0, -1.57, 0.0, 0.0), mode="RUNNING")
         started = robot.controller.tick_number
         assert isinstance(robot.send(c.MoveJ, q=target, **limits), Accepted)

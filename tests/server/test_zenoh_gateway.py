@@ -38,14 +38,21 @@ class NotingDesk:
         self.notes.put(("info", b""))
         self._answer(reply, b"info")
 
-    def client_seen(self, name):
-        self.notes.put(("seen", name))
+    def client_seen(self, name, session=""):
+        self.notes.put(("seen", name, session))
 
-    def client_gone(self, name):
-        self.notes.put(("gone", name))
+    def client_gone(self, name, session=""):
+        self.notes.put(("gone", name, session))
 
-    def next(self):
-        return self.notes.get(timeout=WAIT)
+    def session_gone(self, session):
+        self.notes.put(("ended", session))
+
+    def next(self, *, ended=False):
+        """The next note; of the ends of sessions only where they are asked for."""
+        while True:
+            note = self.notes.get(timeout=WAIT)
+            if ended or note[0] != "ended":
+                return note
 
     def _answer(self, reply, data):
         if self.hold:
@@ -169,18 +176,31 @@ def test_a_client_is_seen_before_the_command_it_sends_next_and_its_going_is_seen
         client = connect(endpoint)
         _token = client.liveliness().declare_token(f"tvist/ur5e/client/me {number}")
         replies(client, "tvist/ur5e/command", b"take")
-        assert desk.next() == ("seen", f"me {number}")
+        assert desk.next() == ("seen", f"me {number}", "")
         assert desk.next() == ("request", b"take")
         client.close()
-        assert desk.next() == ("gone", f"me {number}")
+        assert desk.next() == ("gone", f"me {number}", "")
 
 
 def test_a_client_that_was_there_before_the_gateway_asked_is_seen(desk, endpoint, gateway):
     with connect(endpoint) as client:
         token = client.liveliness().declare_token("tvist/ur5e/client/early")
-        assert desk.next() == ("seen", "early")
+        assert desk.next() == ("seen", "early", "")
         token.undeclare()
-        assert desk.next() == ("gone", "early")
+        assert desk.next() == ("gone", "early", "")
+
+
+def test_the_end_of_a_session_is_told_while_its_token_is_held_elsewhere(gateway, desk, endpoint):
+    with connect(endpoint) as copy:
+        client = connect(endpoint)
+        session = str(client.info.zid())
+        _tokens = [
+            each.liveliness().declare_token(f"tvist/ur5e/client/me/{session}") for each in (client, copy)
+        ]
+        assert desk.next() == ("seen", "me", session)
+        client.close()
+        assert desk.next(ended=True) == ("ended", session)
+    assert desk.next() == ("gone", "me", session)
 
 
 def test_what_is_published_arrives_with_its_encoding(gateway, session):
@@ -308,8 +328,9 @@ class Desk:
     def request(self, data, reply): reply(b"")
     def setpoint(self, data): pass
     def info(self, reply): reply(b"")
-    def client_seen(self, name): pass
-    def client_gone(self, name): pass
+    def client_seen(self, name, session=""): pass
+    def client_gone(self, name, session=""): pass
+    def session_gone(self, session): pass
 gateway = Network([sys.argv[1]]).gateway("ur5e", Desk(), lockstep=False, truth=False)
 gateway.publish("state", None, b"x")
 print("end of main")

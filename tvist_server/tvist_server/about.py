@@ -8,6 +8,7 @@ from tvist_protocol.values import PROTOCOL_VERSION
 from tvist_server.calibrations import available, fits
 from tvist_server.choices import shapers
 from tvist_server.controller import Controller
+from tvist_server.stopping import stopping
 
 VERSION = version("tvist")
 
@@ -52,5 +53,5 @@ def info_of(controller: Controller) -> Info:
         shapers=shapers(),
         control=None if lease is None else lease.client,
         tick=controller.tick_number,
-        stopping=controller.stopping,
+        stopping=list(stopping(setup.description)),
     )

@@ -5,17 +5,15 @@ It owns a `Session` (who may) and a `ControlCycle` (what moves), which do not kn
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Unpack
 
 import numpy as np
 
 from tvist_plant.plant import PERIOD, PlantError
 from tvist_protocol import commands as c
-from tvist_protocol.info import Stopping
 from tvist_protocol.io import Io, SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.modes import RobotMode
-from tvist_protocol.replies import Accepted, Done, Refused, Reply
+from tvist_protocol.replies import Accepted, Done, Reply
 from tvist_protocol.stream import Event, EventKind, State, Truth
 from tvist_protocol.values import PROTOCOL_VERSION, Payload
 from tvist_server.collision import CollisionModel
@@ -26,13 +24,16 @@ from tvist_server.filters import Filters
 from tvist_server.motion import MotionControl
 from tvist_server.payload_monitor import PayloadMonitor
 from tvist_server.peripherals import Peripherals
+from tvist_server.planning.basis import Basis
+from tvist_server.planning.filter_planner import PlannedFilter
+from tvist_server.planning.planner import Plan, Planner
 from tvist_server.refusal import RefusalError, check_body, check_joints, check_motion
 from tvist_server.reporting import Reporter
 from tvist_server.safety_control import SafetyControl
 from tvist_server.session import NoControlError, Session
 from tvist_server.setup import Setup, body
-from tvist_server.stopping import stopping
 from tvist_server.trajectory import Limits
+from tvist_shaping.base import Filter
 
 
 @dataclass
@@ -64,7 +65,10 @@ class Controller:
         self.declared = setup.payload
         self._events: list[Event] = []
         self.session = Session(timeouts=setup.clock == "realtime")
-        self.filters = Filters(setup, self._emit)
+        self._planner = Planner(setup)
+        self._plan: Plan | None = None
+        self._client_session: str | None = None
+        self.filters = Filters(setup, self._planner.filters, self._emit)
         self.cycle = ControlCycle(
             setup.description,
             self.filters.first,
@@ -90,22 +94,30 @@ class Controller:
         """Time of the present tick [s]; it passes by ticks alone."""
         return self.tick_number * PERIOD
 
-    @cached_property
-    def stopping(self) -> list[Stopping]:
-        """How long stops last and how far they go."""
-        return stopping(self.setup.description)
-
     # ------------------------------------------------------------------ what comes in
 
-    def receive(self, command: c.Command) -> Reply:
-        """Carry out a command between two ticks. A refused one changes nothing."""
+    @property
+    def basis(self) -> Basis:
+        """What plans for commands depend on, as it is now."""
+        on = self.filters.basis(self.declared)
+        return Basis(on, self.motion.basis(on))
+
+    def receive(self, command: c.Command, plan: Plan | None = None, session: str | None = None) -> Reply:
+        """Carry out a command between two ticks. A refused one changes nothing.
+
+        Args:
+            command: The command.
+            plan: For it, where it was planned beforehand; it must hold on `basis`.
+            session: Of the client that it gives control to, where its going is told by `client_gone`.
+        """
         self.counters.commands += 1
+        self._plan, self._client_session = plan, session
         try:
             reply = _HANDLERS[type(command)](self, command)
         except RefusalError as refusal:
             reply = refusal.reply
         except NoControlError as refusal:
-            reply = Refused(code=refusal.code, where="token", why=refusal.why)
+            reply = refusal.reply
         else:
             self._io_changed |= type(command) in _TOLD_IN_IO
             return reply
@@ -131,13 +143,9 @@ class Controller:
         self.session.renew(setpoint.token, self.now)
         self.motion.offer(setpoint.sequence, np.array(setpoint.q, dtype=float), self.now)
 
-    def client_seen(self, client: str) -> None:
-        """A client's liveliness token is there."""
-        self.session.client_seen(client)
-
-    def client_gone(self, client: str) -> None:
-        """A client's liveliness token is gone; where it held control, motion ends with it."""
-        if self.session.client_gone(client):
+    def client_gone(self, client: str, session: str) -> None:
+        """A client's session has ended; where it held control, motion ends with it."""
+        if self.session.client_gone(client, session):
             self._lose_lease(f"client {client!r} is gone")
 
     def missed(self, ticks: int) -> None:
@@ -216,7 +224,7 @@ class Controller:
                 "unsupported_version", "protocol",
                 f"protocol is {command.protocol}; this server speaks {PROTOCOL_VERSION}", PROTOCOL_VERSION,
             )  # fmt: skip
-        lease = self.session.take(command.client, command.lease_s, self.now)
+        lease = self.session.take(command.client, command.lease_s, self.now, self._client_session)
         return Accepted(token=lease.token, lease_s=lease.seconds)
 
     def keep_alive(self, command: c.KeepAlive) -> Reply:
@@ -227,7 +235,7 @@ class Controller:
     def hand_over(self, command: c.HandOver) -> Reply:
         """Give the lease to another client, who then takes control and gets a token of its own."""
         self._authorize(command.token)
-        self.session.hand_over(command.client, self.now)
+        self.session.hand_over(command.client, self.now, self._client_session)
         return Done()
 
     def release_control(self, command: c.ReleaseControl) -> Reply:
@@ -242,8 +250,8 @@ class Controller:
         self._authorize(command.token)
         check_joints(command.q, self.setup.description)
         check_motion(command.velocity, command.acceleration, command.jerk, self.setup.description)
-        limits = Limits(command.velocity, command.acceleration, command.jerk)
-        return Accepted(id=self.motion.move(np.array(command.q, dtype=float), limits))
+        self.motion.check_move()
+        return Accepted(id=self.motion.move(self._planned(command)))
 
     def servo_start(self, command: c.ServoStart) -> Reply:
         """Start to follow set-points."""
@@ -342,7 +350,7 @@ class Controller:
     def set_shaper(self, command: c.SetShaper) -> Reply:
         """Choose the shaper."""
         self._authorize(command.token)
-        chosen = self.filters.choose(command.name, self.declared, command.modes, "name")
+        chosen: PlannedFilter = self._planned(command)
         self.motion.ahead.check_filter(chosen[1])
         self.filters.use(chosen)
         return Done()
@@ -350,7 +358,7 @@ class Controller:
     def set_estimator(self, command: c.SetEstimator) -> Reply:
         """Choose the estimator."""
         self._authorize(command.token)
-        chosen = self.filters.estimate(command, self.declared)
+        chosen: PlannedFilter = self._planned(command)
         self.motion.ahead.check_filter(chosen[1])
         self.filters.use(chosen)
         self.filters.warn_of_payload(self.declared)
@@ -361,7 +369,7 @@ class Controller:
         self._authorize(command.token)
         payload = Payload(mass=command.mass, com=command.com, inertia=command.inertia)
         check_body(payload, rated=self.setup.description.limits.payload)
-        tvist = self.filters.with_payload(payload)
+        tvist: Filter | None = self._planned(command)
         self.motion.ahead.check_payload(body(payload), tvist)
         self.declared = payload
         self.cycle.declare(body(payload))
@@ -377,7 +385,7 @@ class Controller:
             check_joints(command.q, description)
         if command.payload is not None:
             check_body(command.payload, "payload")
-        chosen = None if command.shaper is None else self.filters.choose(command.shaper, self.declared)
+        chosen: PlannedFilter | None = self._planned(command)
         self.motion.abandon("simulation.reset")
         self._faults.clear()
         q = self.cycle.position if command.q is None else np.array(command.q, dtype=float)
@@ -416,6 +424,17 @@ class Controller:
 
     def _authorize(self, token: str) -> None:
         self.session.renew(token, self.now)
+
+    def _planned(self, command: c.Command) -> Any:
+        """What was planned for a command, or is now.
+
+        Raises:
+            RefusalError: It cannot be done.
+        """
+        found = (self._plan or self._planner.plan(command, self.basis)).found
+        if isinstance(found, RefusalError):
+            raise found
+        return found
 
 
 _HANDLERS: dict[type, Callable[[Controller, Any], Reply]] = {

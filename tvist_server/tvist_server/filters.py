@@ -1,91 +1,64 @@
-"""Which filter shapes, and where it has its modes from: chosen by name, changed with the payload, watched."""
+"""Which filter shapes, and where it has its modes from: changed on the line, and watched."""
 
-import numpy as np
-
-from tvist_protocol.commands import SetEstimator
 from tvist_protocol.values import Payload
 from tvist_server.calibrations import fits
-from tvist_server.choices import choose_filter, choose_source, make_estimator, wanted_modes
 from tvist_server.cycle import ControlCycle
 from tvist_server.events import Emit
-from tvist_server.mode_source import ModeSource, modal_source
+from tvist_server.planning.basis import FilterBasis
+from tvist_server.planning.filter_planner import FilterPlanner, PlannedFilter
 from tvist_server.refusal import RefusalError
 from tvist_server.setup import Setup
 from tvist_shaping.base import Filter
 
 
 class Filters:
-    """Chooses the control line's filter.
+    """The control line's filter.
 
     Args:
         setup: With the first shaper.
+        planner: Makes filters.
         emit: Takes what happens.
 
     Raises:
         ValueError: There is no such shaper for this robot.
     """
 
-    def __init__(self, setup: Setup, emit: Emit) -> None:
-        self._setup = setup
+    def __init__(self, setup: Setup, planner: FilterPlanner, emit: Emit) -> None:
         self._emit = emit
         self._clipped = False
         self.source = setup.source()
         """Where the filter's modes come from."""
-        self._modal = modal_source(setup.description, setup.calibration)
         try:
-            self.source, self.first = self._choose(setup.shaper, self.source, 1, setup.payload, "shaper")
+            self.source, self.first = planner.choose(setup.shaper, 1, self.source, setup.payload)
         except RefusalError as error:
             raise ValueError(str(error)) from error
-        if self._modal is not None:  # what it takes is compiled code, which lasts many ticks to load: now
-            _, tvist = self._choose("auto", self._modal, 1, setup.payload, "shaper")
-            tvist.filter(np.zeros(setup.description.joints))
+        planner.load()
 
     def attach(self, cycle: ControlCycle) -> None:
         """Say whose filter it is; it has the first one."""
         self._cycle = cycle
 
-    def choose(
-        self, name: str, declared: Payload, modes: int = 1, where: str = "shaper"
-    ) -> tuple[ModeSource, Filter]:
-        """A filter by its name, for `use`.
+    def basis(self, declared: Payload) -> FilterBasis:
+        """What another filter depends on.
 
-        It has the estimator that was chosen, or the arm's own modal one where it takes that.
-
-        Raises:
-            RefusalError: There is none for this robot.
+        Args:
+            declared: What the controller believes that the arm carries.
         """
-        return self._choose(name, self.source, modes, declared, where)
+        tvist = self._cycle.tvist
+        return FilterBasis(tvist.name, tvist.estimator.modes, self.source, declared)
 
-    def use(self, chosen: tuple[ModeSource, Filter]) -> None:
+    def use(self, chosen: PlannedFilter) -> None:
         """Shape with it from now on."""
         self.source, tvist = chosen
         self._cycle.use(tvist)
         self._emit("shaper_changed", why=f"{tvist.name} with estimator {self.source.name}")
-
-    def estimate(self, command: SetEstimator, declared: Payload) -> tuple[ModeSource, Filter]:
-        """The present filter with modes from elsewhere, for `use`.
-
-        Raises:
-            RefusalError: That is not possible.
-        """
-        source, present = choose_source(command, self._setup), self._cycle.tvist
-        where = "f_d" if source.calibration is None else "calibration"
-        estimator = make_estimator(source, present.estimator.modes, declared, where)
-        return source, choose_filter(present.name, estimator, self._setup.description.joints, where=where)
-
-    def with_payload(self, payload: Payload) -> Filter | None:
-        """The present filter with the modes of the arm with another payload; None where they are not known."""
-        if not self.source.knows_payload:
-            return None
-        present = self._cycle.tvist
-        return present.with_estimator(self.source.estimator(present.estimator.modes, payload))
 
     def declare(self, payload: Payload, tvist: Filter | None) -> None:
         """The arm carries something else: so it may have other modes.
 
         Args:
             payload: What the controller believes that it carries.
-            tvist: The filter for it, from `with_payload`.
+            tvist: The filter for it; None where its modes are not known to change.
         """
         if tvist is not None:
             self._cycle.use(tvist)
@@ -111,12 +84,3 @@ class Filters:
             why = f"{name} cannot do here what it should: a delay is beyond what it holds, or more is left"
             self._emit("warning", code="out_of_range", why=why)
         self._clipped = clipped
-
-    def _choose(
-        self, name: str, source: ModeSource, modes: int, declared: Payload, where: str
-    ) -> tuple[ModeSource, Filter]:
-        wanted = wanted_modes(name, modes, where)
-        if wanted > source.most and self._modal is not None:
-            source = self._modal
-        estimator = make_estimator(source, wanted, declared, "modes" if modes > 1 else where)
-        return source, choose_filter(name, estimator, self._setup.description.joints, where=where)

@@ -1,4 +1,4 @@
-"""Bytes around one controller: what arrives is decoded, carried out and journaled, what comes out goes to a sink.
+"""Bytes around one controller: what is admitted is carried out and journaled, what comes out goes to a sink.
 
 Still without clock, thread or socket: whoever calls `tick` lets time pass. In lockstep and free it is the client,
 through `simulation.step`.
@@ -7,15 +7,17 @@ through `simulation.step`.
 import logging
 from typing import Protocol
 
-from tvist_protocol.codec import decode_command, decode_setpoint, encode, refusal
-from tvist_protocol.commands import Setpoint, SimulationStep
-from tvist_protocol.errors import ProtocolError
+from tvist_protocol.codec import encode
+from tvist_protocol.commands import Command, Setpoint, SimulationStep
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry, entry_of
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.about import info_of
+from tvist_server.admission import Admitted, admit, admit_setpoint
 from tvist_server.controller import Controller
+from tvist_server.planning.planner import Plan
+from tvist_server.standing import Standing
 
 log = logging.getLogger(__name__)
 
@@ -52,40 +54,52 @@ class Host:
         self.failure: str | None = None
         """Why the controller ticks no more, where it does not."""
         self._sink = sink
+        self.standing = self._standing()
+        """What any thread may know of the controller."""
 
     def request(self, data: bytes) -> bytes:
-        """Carry out a command; its encoded reply."""
-        try:
-            command = decode_command(data)
-        except ProtocolError as error:
+        """Admit and carry out a command; its encoded reply."""
+        admitted = admit(data, self.standing.lease)
+        if isinstance(admitted, Refused):
             self.controller.counters.commands += 1
             self.controller.counters.refused += 1
-            return encode(refusal(error))
-        self._note(entry_of(self._next, command))
-        reply = self.controller.receive(command)
+            return encode(admitted)
+        return self.carry_out(admitted)
+
+    def carry_out(self, admitted: Admitted, plan: Plan | None = None) -> bytes:
+        """Carry out a command; its encoded reply.
+
+        Args:
+            admitted: The command.
+            plan: For it, where it was planned beforehand and the plan holds.
+        """
+        command = admitted.command
+        session = admitted.session
+        entry = Entry(tick=self._next, kind="command", message=admitted.content, session=session)
+        reply = self.controller.receive(command, plan, session)
+        # A command of the lease's holder renews the lease even where it is refused; a stranger's does nothing.
+        if not isinstance(reply, Refused) or self._is_holders(command):
+            self._note(entry)
         if isinstance(command, SimulationStep) and isinstance(reply, Done):
-            return encode(self._step(command, reply))
+            reply = self._step(command, reply)
+        self.standing = self._standing()
         return encode(reply)
 
     def setpoint(self, data: bytes) -> None:
-        """Take a set-point."""
-        try:
-            setpoint = decode_setpoint(data)
-        except ProtocolError:
+        """Admit and take a set-point."""
+        setpoint = admit_setpoint(data, self.standing.lease)
+        if setpoint is None:
             self.controller.counters.setpoints_received += 1
             self.controller.counters.setpoints_refused += 1
-            return
-        self._receive_setpoint(setpoint)
+        else:
+            self.receive_setpoint(setpoint)
 
-    def client_seen(self, client: str) -> None:
-        """A client's liveliness token is there."""
-        self._note(Entry(tick=self._next, kind="client_seen", client=client))
-        self.controller.client_seen(client)
-
-    def client_gone(self, client: str) -> None:
-        """A client's liveliness token is gone."""
-        self._note(Entry(tick=self._next, kind="client_gone", client=client))
-        self.controller.client_gone(client)
+    def client_gone(self, client: str, session: str) -> None:
+        """A client's session has ended; nothing comes of it but where that one has control."""
+        if self.controller.session.client_gone(client, session):
+            self._note(Entry(tick=self._next, kind="client_gone", client=client, session=session))
+            self.controller.client_gone(client, session)
+            self.standing = self._standing()
 
     def missed(self, ticks: int) -> None:
         """Ticks have begun too late."""
@@ -107,6 +121,7 @@ class Host:
         self._sink.state(state)
         if self.controller.setup.truth:
             self._sink.truth(self.controller.truth())
+        self.standing = self._standing()
 
     @property
     def _next(self) -> int:
@@ -115,17 +130,24 @@ class Host:
     def _note(self, entry: Entry) -> None:
         self._sink.journal(entry)
 
-    def _receive_setpoint(self, setpoint: Setpoint) -> None:
-        self._note(entry_of(self._next, setpoint))
+    def receive_setpoint(self, setpoint: Setpoint) -> None:
+        """Take a set-point that was admitted."""
+        if self._is_holders(setpoint):
+            self._note(entry_of(self._next, setpoint))
         self.controller.receive_setpoint(setpoint)
+
+    def _is_holders(self, message: Command | Setpoint) -> bool:
+        lease = self.controller.session.lease
+        return lease is not None and getattr(message, "token", None) == lease.token
+
+    def _standing(self) -> Standing:
+        return Standing(self.controller.session.lease, self.controller.basis)
 
     def _step(self, command: SimulationStep, reply: Done) -> Done | Refused:
         setpoints = iter(command.setpoints or ())
         for _ in range(command.ticks):
             setpoint = next(setpoints, None)
             if setpoint is not None:
-                self._receive_setpoint(
-                    Setpoint(token=command.token, sequence=setpoint.sequence, q=setpoint.q)
-                )
+                self.receive_setpoint(Setpoint(token=command.token, sequence=setpoint.sequence, q=setpoint.q))
             self.tick()
         return reply

@@ -3,7 +3,6 @@
 `tvist_protocol.transitions` says what leads where; here it is done.
 """
 
-from dataclasses import replace
 from typing import Unpack
 
 import numpy as np
@@ -15,13 +14,15 @@ from tvist_protocol.stream import EventKind
 from tvist_protocol.transitions import Activity, after
 from tvist_protocol.values import ResetMode
 from tvist_server.brakes import brake
-from tvist_server.collision import CLEARANCE, CollisionModel
+from tvist_server.collision import CollisionModel
 from tvist_server.control.differentiator import Floats
 from tvist_server.cycle import ControlCycle, Sample
 from tvist_server.events import Emit, Told
 from tvist_server.moving import Move
 from tvist_server.outlook import Outlook
 from tvist_server.overload import Overload
+from tvist_server.planning.basis import FilterBasis, MotionBasis
+from tvist_server.planning.move_planner import PlannedMove
 from tvist_server.refusal import RefusalError, out_of_turn
 from tvist_server.safety import REDUCED_SHARE
 from tvist_server.safety_system import SafetySystem
@@ -95,33 +96,48 @@ class MotionControl:
         """Late, lost and limited set-points since the start, the running stream's included."""
         return self._streaming.counters()
 
-    def move(self, target: Floats, limits: Limits) -> int:
-        """Start a point-to-point motion; its number.
+    def check_move(self) -> None:
+        """Check that a point-to-point motion may begin.
 
         Raises:
-            RefusalError: The arm is busy, there is no such motion, or something would meet on its way.
+            RefusalError: The arm is busy, without power or stopped for safety.
         """
         self._check("move_j")
-        start = self.cycle.reference
-        try:
-            spared = replace(limits, acceleration=limits.acceleration * (1.0 - self.cycle.tvist.excess))
-            trajectory = self.cycle.plan(target, spared, self._rate(limits.velocity))
-        except ValueError as error:
-            raise RefusalError("out_of_range", "velocity", str(error)) from error
-        found = self.collisions.on_line(start, target)
-        if found is not None:
-            share, meeting = found
-            time = trajectory.time_at(share)
-            raise RefusalError("collision", "q", f"{meeting} {time:.2f} s after the start", CLEARANCE)
-        self.cycle.tvist.aim(target)
+
+    def basis(self, on: FilterBasis) -> MotionBasis | None:
+        """What a point-to-point motion from here depends on; None where the arm is busy or without power.
+
+        Args:
+            on: The present filter.
+        """
+        if after(self.activity, "move_j") is None:
+            return None
+        cycle = self.cycle
+        return MotionBasis(
+            q=cycle.reference,
+            speed=self._speed,
+            slowest=self._reduced_velocity if self.safety.reduced else None,
+            excess=cycle.tvist.excess,
+            carried=self.collisions.carried,
+            bodies=cycle.inverse_dynamics.bodies,
+            filter=on,
+        )
+
+    def move(self, planned: PlannedMove) -> int:
+        """Start a point-to-point motion that was planned on what is so now; its number.
+
+        Raises:
+            RefusalError: As `check_move`.
+        """
+        self._go("move_j")
+        trajectory = planned.trajectory
+        self.cycle.tvist.aim(trajectory.target)
         self.cycle.start(trajectory)
         self._started += 1
-        move = self._move = Move(self._started, trajectory, limits.velocity, self.cycle)
-        self._go("move_j")
+        move = self._move = Move(self._started, trajectory, planned.velocity, self.cycle)
         self._emit("motion_started", id=move.number)
-        excess = move.excess_of_torque(self.outlook)
-        if excess is not None:
-            self._emit("warning", id=move.number, code="limit_torque", why=excess)
+        if planned.excess_of_torque is not None:
+            self._emit("warning", id=move.number, code="limit_torque", why=planned.excess_of_torque)
         return move.number
 
     def set_speed(self, fraction: float) -> None:

@@ -1,18 +1,11 @@
-"""A point-to-point motion that is under way: its rate, its pause, the torque it will take."""
+"""A point-to-point motion that is under way: its rate and its pause."""
 
 import numpy as np
 
-from tvist_plant.plant import PERIOD
-from tvist_server.control.differentiator import Floats
 from tvist_server.cycle import STILL, ControlCycle
-from tvist_server.outlook import Outlook
-from tvist_server.safety import acceleration_on_way, largest_torque, torque_along
+from tvist_server.safety import acceleration_on_way
 from tvist_server.trajectory import DoubleS
 
-LOOKS = 64
-"""Moments of a motion at which its torque is looked at before it is run ahead."""
-BLUNTED = 1.05
-"""By how much the shaped motion's torque may be beyond that of the unshaped one, which it lags behind [-]."""
 PAUSE_SHARE = 0.95
 """Share of the acceleration that torque leaves on the way that a pause uses: the filter may add a little [-]."""
 LEAST_PAUSE = 0.2
@@ -65,36 +58,3 @@ class Move:
         if self._held:
             self._trajectory.release(rate)
         self._held = False
-
-    def excess_of_torque(self, outlook: Outlook) -> str | None:
-        """By how much it will pass a limit of torque, in words; None where it will not. For a motion just begun.
-
-        Args:
-            outlook: On the line.
-        """
-        cycle, trajectory = self._cycle, self._trajectory
-        dynamics, allowed = cycle.inverse_dynamics, np.array(cycle.description.limits.torque)
-        start, limits = cycle.position, trajectory.limits
-        bound = largest_torque(
-            dynamics, start, trajectory.target - start, limits.velocity, limits.acceleration
-        )
-        if (bound <= allowed).all() or (BLUNTED * self._before_shaping() <= allowed).all():
-            return None
-        ahead = outlook.foresee()
-        if ahead is None:
-            return None
-        most = torque_along(dynamics, ahead, PERIOD)
-        joint = int(np.argmax(most / allowed))
-        name, limit = cycle.description.robot.joints[joint], allowed[joint]
-        if most[joint] <= limit:
-            return None
-        return (
-            f"torque of joint {name} will reach {most[joint]:.0f} N m, {most[joint] - limit:.1f} beyond its "
-            f"limit of {limit:g}: ask for less acceleration"
-        )
-
-    def _before_shaping(self) -> Floats:
-        """Largest torques that the motion would take without a filter, shape (n,) [N m]."""
-        states = self._trajectory.states(LOOKS)
-        most: Floats = np.max([self._cycle.inverse_dynamics.effort(*state) for state in states], axis=0)
-        return most

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from tvist_plant.plant import PERIOD
-from tvist_server.control.differentiator import Floats
+from tvist_server.control.differentiator import Differentiator, Floats
 from tvist_server.cycle import STILL, ControlCycle, rests
+from tvist_server.line_filter import LineFilter
 from tvist_server.stops import StopPlan, StopPlanner
 from tvist_server.trajectory import Line, LineStop, Stop, Trajectory
 from tvist_shaping.base import Filter
@@ -51,16 +52,7 @@ class Outlook:
         trajectory = present if trajectory is None else trajectory.fork()
         if tvist is not None and not stopping:
             line_filter.use(tvist.fork())
-        ahead = [differentiator.published.q, differentiator.position]
-        for _ in range(MOST_AHEAD):
-            reference = trajectory.next()
-            shaped = reference if stopping else line_filter.filter(reference)
-            target = differentiator.update(shaped)
-            ahead.append(shaped)
-            settled = stopping or line_filter.settled
-            if trajectory.standing and settled and rests(reference, target):
-                return np.array(ahead)
-        return None
+        return run_ahead(trajectory, None if stopping else line_filter, differentiator)
 
     def stop(self, deceleration: float | None) -> StopPlan | None:
         """Come to rest as soon as is permitted.
@@ -150,6 +142,31 @@ class Outlook:
             steady=line.steady if known else 0.0,
             turns=peak > 1.0,
         )
+
+
+def run_ahead(
+    trajectory: Trajectory, line_filter: LineFilter | None, differentiator: Differentiator
+) -> Floats | None:
+    """References of a trajectory until they rest.
+
+    Args:
+        trajectory: What to follow; it is used up.
+        line_filter: What shapes it, used up likewise; None for a stop, which bypasses it.
+        differentiator: Where the shaped reference is, used up likewise.
+
+    Returns:
+        As `Outlook.foresee`.
+    """
+    ahead = [differentiator.published.q, differentiator.position]
+    for _ in range(MOST_AHEAD):
+        reference = trajectory.next()
+        shaped = reference if line_filter is None else line_filter.filter(reference)
+        target = differentiator.update(shaped)
+        ahead.append(shaped)
+        settled = line_filter is None or line_filter.settled
+        if trajectory.standing and settled and rests(reference, target):
+            return np.array(ahead)
+    return None
 
 
 def resting_after(ahead: Floats) -> int:

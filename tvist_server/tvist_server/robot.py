@@ -1,17 +1,21 @@
 """One robot of a server: its controller, and what stands between that and clock, network and file."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from tvist_protocol.stream import Event, Telemetry
 from tvist_server.about import info_of
+from tvist_server.admission import Admitted
 from tvist_server.clock import Driven
 from tvist_server.controller import Controller
 from tvist_server.gateways.base import Gateway, Reply
 from tvist_server.host import Host
 from tvist_server.lateness import Punctuality
 from tvist_server.outlet import Outlet
+from tvist_server.plan_ahead import PlanAhead
+from tvist_server.planning.planner import Planner
+from tvist_server.reception import Reception
 from tvist_server.recording.black_box import BlackBox
 from tvist_server.recording.recorder import Recorder
 from tvist_server.setup import Setup
@@ -22,7 +26,8 @@ log = logging.getLogger(__name__)
 class ServedRobot:
     """A robot with everything that is its own: robots share a process, the tick thread and the network alone.
 
-    It is the desk to its gateway: what arrives waits for the thread that owns the controller.
+    It is the desk to its gateways: what they hand in is admitted in their threads and waits for the one that owns the
+    controller.
 
     Args:
         setup: How it starts.
@@ -37,6 +42,7 @@ class ServedRobot:
     def __init__(self, setup: Setup, record: Path | None, dump: Path) -> None:
         self.setup = setup
         self.controller = Controller(setup)
+        info_of(self.controller)  # what takes longest in it is found once, before the first tick
         lockstep = setup.clock != "realtime"
         self.recorder = None
         if record is not None:
@@ -52,49 +58,75 @@ class ServedRobot:
         self._host = Host(self.controller, self.outlet)
         self.driven = Driven(self._host)
         """For the clock."""
+        # Where a client lets time pass nothing is late, and plans are made where they are used.
+        self._plan_ahead = None if lockstep else PlanAhead(self._host, Planner(setup), self.driven.post)
+        carry_out = self._carry_out if self._plan_ahead is None else self._plan_ahead.submit
+        self._reception = Reception(self._host, self.driven.post, carry_out)
 
-    # ------------------------------------------------------------------ the desk: what its gateway asks for
+    # ------------------------------------------------------------------ the desk: what its gateways ask for
 
     def request(self, data: bytes, reply: Reply) -> None:
-        """Carry out a command; the reply comes from another thread."""
-        self._post_reply(reply, lambda: self._host.request(data))
+        """Carry out a command; the reply comes from another thread, or at once where the command is turned away."""
+        self._reception.request(data, reply, lambda answer: self.outlet.reply(reply, answer))
 
     def setpoint(self, data: bytes) -> None:
         """Take a set-point."""
-        self.driven.post(lambda: self._host.setpoint(data))
+        self._reception.setpoint(data)
 
     def info(self, reply: Reply) -> None:
         """Say what the robot is."""
-        self._post_reply(reply, self._host.info)
+        self.driven.post(lambda: self.outlet.reply(reply, self._host.info()))
 
-    def client_seen(self, name: str) -> None:
+    def client_seen(self, client: str, session: str = "") -> None:
         """A client's liveliness token is there."""
-        self.driven.post(lambda: self._host.client_seen(name))
+        self._reception.client_seen(client, session)
 
-    def client_gone(self, name: str) -> None:
-        """A client's liveliness token is gone."""
-        self.driven.post(lambda: self._host.client_gone(name))
+    def client_gone(self, client: str, session: str = "") -> None:
+        """A client's liveliness token is gone, or its session."""
+        self._reception.client_gone(client, session)
+
+    def session_gone(self, session: str) -> None:
+        """A session has ended."""
+        self._reception.session_gone(session)
 
     def holder(self) -> str | None:
         """Client that has control; None: nobody."""
-        lease = self.controller.session.lease
+        lease = self._host.standing.lease
         return None if lease is None else lease.client
 
-    def _post_reply(self, reply: Reply, answer: Callable[[], bytes]) -> None:
-        self.driven.post(lambda: self.outlet.reply(reply, answer()))
+    def _carry_out(self, admitted: Admitted, reply: Reply) -> None:
+        self.driven.post(lambda: reply(self._host.carry_out(admitted)))
 
     # ------------------------------------------------------------------ how it is doing, and its end
+
+    def start(self) -> None:
+        """Begin to plan; before its clock starts."""
+        if self._plan_ahead is not None:
+            self._plan_ahead.start()
+
+    def stop_planning(self) -> None:
+        """End planning, after what waits; before its clock ends."""
+        if self._plan_ahead is not None:
+            self._plan_ahead.close()
 
     @property
     def failure(self) -> str | None:
         """Why the robot ticks no more, where it does not."""
         return self._host.failure
 
-    def telemetry(self, gateways: Sequence[Gateway], punctuality: Punctuality | None) -> Telemetry:
-        """The server's own figures on this robot."""
-        controller, counters = self.controller, self.controller.counters
+    def tell_telemetry(self, gateways: Sequence[Gateway], punctuality: Punctuality | None) -> None:
+        """Put the server's own figures on this robot, from the controller's thread.
+
+        Args:
+            gateways: The robot's.
+            punctuality: Of its ticks; None where a client lets time pass.
+        """
+        self.driven.post(lambda: self.outlet.telemetry(self._telemetry(gateways, punctuality)))
+
+    def _telemetry(self, gateways: Sequence[Gateway], punctuality: Punctuality | None) -> Telemetry:
+        controller, counters, reception = self.controller, self.controller.counters, self._reception
         late, lost, limited = controller.motion.counters()
-        refused = sum(gateway.setpoints_refused for gateway in gateways)
+        refused = reception.setpoints_refused + sum(gateway.setpoints_refused for gateway in gateways)
         on_time = punctuality or Punctuality(0, 1.0, 0.0, 0.0, 0.0)
         return Telemetry(
             tick=controller.tick_number,
@@ -110,8 +142,8 @@ class ServedRobot:
             setpoints_late=late,
             setpoints_lost=lost,
             setpoints_limited=limited,
-            commands=counters.commands,
-            refused=counters.refused,
+            commands=counters.commands + reception.commands_refused,
+            refused=counters.refused + reception.commands_refused,
         )
 
     def close_recording(self) -> None:

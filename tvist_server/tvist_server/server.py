@@ -85,6 +85,8 @@ class Server:
         sys.setswitchinterval(1e-4)
         for courier in self._couriers:
             courier.start()
+        for robot in self.robots:
+            robot.start()
         for clock in self._clocks:
             clock.start()
 
@@ -92,6 +94,7 @@ class Server:
         """End in order: no more ticks, recordings closed, what waits handed on, as far as clients take it."""
         for robot in self.robots:
             robot.outlet.hurry()
+            robot.stop_planning()
         for clock in self._clocks:
             clock.close()
         for robot in self.robots:
@@ -148,7 +151,7 @@ class Server:
         clocks = self._clocks if len(self._clocks) > 1 else self._clocks * len(self.robots)
         for number, (robot, clock) in enumerate(zip(self.robots, clocks, strict=True)):
             gateways = [self._gateways[number], *self._doors[number : number + 1]]
-            robot.outlet.telemetry(robot.telemetry(gateways, clock.punctuality(robot.driven)))
+            robot.tell_telemetry(gateways, clock.punctuality(robot.driven))
 
 
 def _on_signals(loop: asyncio.AbstractEventLoop) -> asyncio.Event:

@@ -1,8 +1,8 @@
 """Who may move the arm: control by lease. It knows no motion, network or clock: the time is an argument."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from tvist_protocol.replies import Code
+from tvist_protocol.replies import Code, Refused
 
 
 @dataclass(frozen=True)
@@ -15,8 +15,8 @@ class Lease:
     """How long it lasts without a sign of life [s]."""
     ends: float
     """Time at which it is lost without one [s]."""
-    watched: bool
-    """Whether the client's presence was known when it took control: then its going ends the lease at once."""
+    session: str | None
+    """Session whose going ends it at once; empty where the client's token does not say; None where it had none."""
 
 
 class NoControlError(Exception):
@@ -26,6 +26,36 @@ class NoControlError(Exception):
         super().__init__(why)
         self.code = code
         self.why = why
+
+    @property
+    def reply(self) -> Refused:
+        """The answer."""
+        return Refused(code=self.code, where="token", why=self.why)
+
+
+def check_token(lease: Lease | None, token: str) -> Lease:
+    """The lease that a token names.
+
+    Raises:
+        NoControlError: Nobody has control, or the token is another one's or an old one.
+    """
+    if lease is None:
+        raise NoControlError("no_control", "nobody has control: send take_control first")
+    if token != lease.token:
+        why = f"token is not that of the present lease, held by {lease.client!r}"
+        raise NoControlError("stale_token", why)
+    return lease
+
+
+def check_free(lease: Lease | None, client: str) -> None:
+    """Check that a client may take control.
+
+    Raises:
+        NoControlError: Another one has it.
+    """
+    if lease is not None and lease.client != client:
+        why = f"control is held by {lease.client!r} until it releases it"
+        raise NoControlError("no_control", why)
 
 
 class Session:
@@ -38,49 +68,44 @@ class Session:
     def __init__(self, *, timeouts: bool) -> None:
         self._timeouts = timeouts
         self._granted = 0
-        self._present: set[str] = set()
         self.lease: Lease | None = None
 
-    def take(self, client: str, seconds: float, now: float) -> Lease:
+    def take(self, client: str, seconds: float, now: float, session: str | None = None) -> Lease:
         """Give control to a client; one that already has it gets a new lease.
+
+        Args:
+            client: Its name.
+            seconds: How long the lease lasts without a sign of life [s].
+            now: Time [s].
+            session: Session whose going ends it at once; None where nothing tells of its going.
 
         Raises:
             NoControlError: Another client holds it.
         """
-        if self.lease is not None and self.lease.client != client:
-            why = f"control is held by {self.lease.client!r} until it releases it"
-            raise NoControlError("no_control", why)
-        self._granted += 1
-        self.lease = Lease(
-            client=client,
-            token=f"{client}#{self._granted}",
-            seconds=seconds,
-            ends=now + seconds,
-            watched=client in self._present,
-        )
+        check_free(self.lease, client)
+        self.lease = self._grant(client, seconds, now, session)
         return self.lease
 
     def renew(self, token: str, now: float) -> Lease:
         """Check a token and renew its lease.
 
         Raises:
-            NoControlError: Nobody has control, or the token is another one's or an old one.
+            NoControlError: As `check_token`.
         """
-        lease = self.lease
-        if lease is None:
-            raise NoControlError("no_control", "nobody has control: send take_control first")
-        if token != lease.token:
-            why = f"token is not that of the present lease, held by {lease.client!r}"
-            raise NoControlError("stale_token", why)
-        self.lease = Lease(lease.client, lease.token, lease.seconds, now + lease.seconds, lease.watched)
+        lease = check_token(self.lease, token)
+        self.lease = replace(lease, ends=now + lease.seconds)
         return self.lease
 
-    def hand_over(self, client: str, now: float) -> None:
-        """Keep the present lease for another client, from now on: it has only to take it."""
+    def hand_over(self, client: str, now: float, session: str | None = None) -> None:
+        """Keep the present lease for another client, from now on: it has only to take it.
+
+        Args:
+            client: Its name.
+            now: Time [s].
+            session: As in `take`.
+        """
         if self.lease is not None:
-            seconds = self.lease.seconds
-            self.lease = None
-            self.take(client, seconds, now)
+            self.lease = self._grant(client, self.lease.seconds, now, session)
 
     def release(self) -> None:
         """End the lease."""
@@ -90,11 +115,10 @@ class Session:
         """Whether the lease has run out."""
         return self._timeouts and self.lease is not None and now >= self.lease.ends
 
-    def client_seen(self, client: str) -> None:
-        """A client's liveliness token is there."""
-        self._present.add(client)
+    def client_gone(self, client: str, session: str) -> bool:
+        """A client's session has ended; True where the lease ends with it."""
+        return self.lease is not None and (self.lease.client, self.lease.session) == (client, session)
 
-    def client_gone(self, client: str) -> bool:
-        """A client's liveliness token is gone; True where that ends the lease."""
-        self._present.discard(client)
-        return self.lease is not None and self.lease.client == client and self.lease.watched
+    def _grant(self, client: str, seconds: float, now: float, session: str | None) -> Lease:
+        self._granted += 1
+        return Lease(client, f"{client}#{self._granted}", seconds, now + seconds, session)

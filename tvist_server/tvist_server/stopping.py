@@ -1,5 +1,8 @@
 """How long stops last and how far they go: what a safety report asks of a robot."""
 
+from functools import cache
+
+import msgspec
 import numpy as np
 
 from tvist_plant.description import RobotDescription
@@ -16,15 +19,21 @@ POSTURES = 500
 """Random postures among which the one is found that takes most torque to hold: the arm stretched out."""
 
 
-def stopping(description: RobotDescription) -> list[Stopping]:
+def stopping(description: RobotDescription) -> tuple[Stopping, ...]:
     """Stops without payload and with the rated one, of the joint that takes the longest.
 
-    Each is of one joint that turns alone, with the others at rest and the arm stretched out, either way.
+    Each is of one joint that turns alone, with the others at rest and the arm stretched out, either way. They take
+    twenty ticks to find, once for each description.
 
     Args:
         description: The robot.
     """
-    rows = []
+    return _found(msgspec.json.encode(description))
+
+
+@cache
+def _found(described: bytes) -> tuple[Stopping, ...]:
+    description, rows = msgspec.json.decode(described, type=RobotDescription), []
     for mass in (0.0, description.limits.payload):
         dynamics = InverseDynamics(description, body(paper_payload(description, mass)))
         planner = StopPlanner(description, dynamics, PERIOD)
@@ -45,7 +54,7 @@ def stopping(description: RobotDescription) -> list[Stopping]:
             if found:
                 duration, way, name = max(found)
                 rows.append(Stopping(payload=mass, speed=speed, joint=name, duration=duration, way=way))
-    return rows
+    return tuple(rows)
 
 
 def _stretched(description: RobotDescription, dynamics: InverseDynamics) -> Floats:

@@ -123,7 +123,8 @@ class ZenohTransport(Transport):
         """Declare the client's liveliness token. It reaches the robot before any command sent later."""
         if self._closed:
             raise self._gone()
-        self._tokens[client] = self._session.liveliness().declare_token(keys.client(self._robot, client))
+        key = keys.client(self._robot, client, str(self._session.info.zid()))
+        self._tokens[client] = self._session.liveliness().declare_token(key)
 
     async def withdraw(self, client: str) -> None:
         """Undeclare the client's liveliness token."""

@@ -9,7 +9,7 @@ import numpy as np
 from tvist_lab.recordings import Floats
 from tvist_lab.safety.changes import far_payload
 from tvist_lab.safety.stops import SHAPERS
-from tvist_lab.safety.subject import CLIENT, Subject
+from tvist_lab.safety.subject import CLIENT, SESSION, Subject
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
@@ -310,8 +310,7 @@ class Sequence:
 
     def lose(self) -> object:
         """The client's liveliness token goes, and it takes control anew."""
-        self.robot.controller.client_gone(CLIENT)
-        self.robot.controller.client_seen(CLIENT)
+        self.robot.controller.client_gone(CLIENT, SESSION)
         self.robot.token = self.robot.take_control()
         return "gone"
 

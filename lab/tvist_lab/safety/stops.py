@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tvist_lab.recordings import Floats
-from tvist_lab.safety.subject import CLIENT, Subject, refused, torques
+from tvist_lab.safety.subject import CLIENT, SESSION, Subject, refused, torques
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
@@ -28,7 +28,7 @@ KINDS: dict[str, Halt] = {
     "plain": lambda robot, _: robot.send(c.Stop),
     "gentle": lambda robot, random: robot.send(c.Stop, deceleration=float(10 ** random.uniform(-2, 1))),
     "stranger's": lambda robot, _: robot.send(c.Stop, token=None, deceleration=1.0),
-    "token gone": lambda robot, _: robot.controller.client_gone(CLIENT),
+    "token gone": lambda robot, _: robot.controller.client_gone(CLIENT, SESSION),
     "lease over": lambda robot, _: robot.send(c.ReleaseControl),
     "power off": lambda robot, _: robot.send(c.PowerOff),
     "protective": lambda robot, _: robot.send(c.SimulationInject, fault="protective_stop"),

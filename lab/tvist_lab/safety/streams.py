@@ -7,7 +7,7 @@ import numpy as np
 
 from tvist_lab.recordings import Floats
 from tvist_lab.safety.stops import SHAPERS, two_postures
-from tvist_lab.safety.subject import CLIENT, Subject, refused
+from tvist_lab.safety.subject import CLIENT, SESSION, Subject, refused
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
@@ -22,7 +22,7 @@ ENDS: dict[str, Callable[[Subject], object]] = {
     "servo_stop": lambda robot: robot.send(c.ServoStop),
     "stop": lambda robot: robot.send(c.Stop),
     "stranger's stop": lambda robot: robot.send(c.Stop, token=None, deceleration=1.0),
-    "token gone": lambda robot: robot.controller.client_gone(CLIENT),
+    "token gone": lambda robot: robot.controller.client_gone(CLIENT, SESSION),
     "power off": lambda robot: robot.send(c.PowerOff),
     "protective stop": lambda robot: robot.send(c.SimulationInject, fault="protective_stop"),
     "emergency stop": lambda robot: robot.send(c.SimulationInject, fault="emergency_stop"),

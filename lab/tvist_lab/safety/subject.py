@@ -21,7 +21,8 @@ from tvist_server.controller import Controller
 from tvist_server.cycle import STILL
 from tvist_server.setup import Setup, body
 
-CLIENT = "searcher"
+CLIENT, SESSION = "searcher", "5e55"
+"""Name and session of who has control."""
 
 
 class RigidArm(Plant):
@@ -78,7 +79,6 @@ class Subject:
         self.controller = Controller(setup)
         if not self.flexible:
             self.controller.cycle.arm = RigidArm(self.description, body(self.payload))
-        self.controller.client_seen(CLIENT)
         self.token = self.take_control()
         self.references.append(np.array(self.q))
         if undamped:
@@ -87,7 +87,7 @@ class Subject:
 
     def take_control(self) -> str:
         """Take the lease; its token."""
-        reply = self.controller.receive(c.TakeControl(client=CLIENT, lease_s=self.lease_s))
+        reply = self.controller.receive(c.TakeControl(client=CLIENT, lease_s=self.lease_s), session=SESSION)
         assert isinstance(reply, Accepted), reply
         return str(reply.token)
 

@@ -39,11 +39,11 @@ class Desk:
         self.last = decode_command(data)
         reply(self.host.request(data))
 
-    def client_seen(self, name):
-        self.host.client_seen(name)
+    def client_seen(self, name, session=""):
+        """Nobody asks."""
 
-    def client_gone(self, name):
-        self.host.client_gone(name)
+    def client_gone(self, name, session=""):
+        self.host.client_gone(name, session)
 
     def holder(self):
         lease = self.controller.session.lease

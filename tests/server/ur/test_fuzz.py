@@ -58,11 +58,11 @@ class House:
     def request(self, data, reply):
         self.due.append(lambda: reply(self.host.request(data)))
 
-    def client_seen(self, name):
-        self.due.append(lambda: self.host.client_seen(name))
+    def client_seen(self, name, session=""):
+        """Nobody asks."""
 
-    def client_gone(self, name):
-        self.due.append(lambda: self.host.client_gone(name))
+    def client_gone(self, name, session=""):
+        self.due.append(lambda: self.host.client_gone(name, session))
 
     def holder(self):
         lease = self.controller.session.lease

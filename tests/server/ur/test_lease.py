@@ -18,6 +18,7 @@ class Desk:
         self.controller.session.release()
         self.kinds = []
         self._due = deque()
+        self.present = set()
 
     def request(self, data, reply):
         self._due.append((decode_command(data), reply))
@@ -28,11 +29,12 @@ class Desk:
             self.kinds.append(type(command).__name__)
             reply(encode(self.controller.receive(command)))
 
-    def client_seen(self, name):
-        self.controller.client_seen(name)
+    def client_seen(self, name, _session=""):
+        self.present.add(name)
 
-    def client_gone(self, name):
-        self.controller.client_gone(name)
+    def client_gone(self, name, session=""):
+        self.present.discard(name)
+        self.controller.client_gone(name, session)
 
     def holder(self):
         lease = self.controller.session.lease
@@ -108,7 +110,7 @@ def test_who_was_refused_is_not_kept_in_mind():
         desk.answer()
         connection.leave()
     assert len(replies) == 10
-    assert not desk.controller.session._present
+    assert not desk.present
 
 
 def test_another_host_is_somebody_else():

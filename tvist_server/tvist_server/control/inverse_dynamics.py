@@ -57,6 +57,20 @@ class InverseDynamics:
         """Whether one payload is giving way to another."""
         return self._ticks_left > 0
 
+    @property
+    def bodies(self) -> tuple[Floats, ...]:
+        """Inertial parameters of the last link that may be in force: two sets while one payload gives way to another.
+
+        Each has shape (10,), as pinocchio orders them [kg, kg m, kg m^2].
+        """
+        return (self._before, self._after) if self.changing else (self._after,)
+
+    def believe(self, bodies: tuple[Floats, ...]) -> None:
+        """Put other inertial parameters into force, as `bodies` gives them."""
+        self._before, self._after = bodies[0], bodies[-1]
+        self._ticks_left = len(bodies) - 1
+        self._load(self._after)
+
     def settle(self) -> None:
         """Put the payload declared last into force at once."""
         self._ticks_left = 0

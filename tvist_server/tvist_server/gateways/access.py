@@ -46,6 +46,25 @@ def access_control(robots: Sequence[str], roles: Mapping[str, Role]) -> dict[str
     }
 
 
+def open_access(robots: Sequence[str]) -> dict[str, Any]:
+    """Zenoh's `access_control` for a server that knows no certificates: whoever reaches it is an operator.
+
+    Nobody but the server may answer commands or put what the robot says: another session could otherwise swallow a
+    stop, or make up states.
+
+    Args:
+        robots: Names of the robots it serves.
+    """
+    rules = [*_viewing(robots), *_operating(robots)]
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": [{"id": "anybody"}],
+        "policies": [{"id": "anybody", "rules": [rule["id"] for rule in rules], "subjects": ["anybody"]}],
+    }
+
+
 def _viewing(robots: Sequence[str]) -> list[dict[str, Any]]:
     streams = _keys(robots, *ROBOT_PUTS)
     info, alive = _keys(robots, keys.info), _keys(robots, keys.alive)

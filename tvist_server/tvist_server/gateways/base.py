@@ -30,11 +30,19 @@ class Desk(Protocol):
     def info(self, reply: Reply) -> None:
         """Take a question for `info`; `reply` as for `request`."""
 
-    def client_seen(self, name: str) -> None:
-        """Note that a client's liveliness token is there."""
+    def client_seen(self, client: str, session: str = "") -> None:
+        """Note that a client's liveliness token is there.
 
-    def client_gone(self, name: str) -> None:
-        """Note that a client's liveliness token is gone."""
+        Args:
+            client: Its name.
+            session: Session that it is of; empty where the token does not say.
+        """
+
+    def client_gone(self, client: str, session: str = "") -> None:
+        """Note that a client's liveliness token is gone, or its session."""
+
+    def session_gone(self, session: str) -> None:
+        """Note that a session has ended, whoever else holds its clients' liveliness tokens."""
 
     def holder(self) -> str | None:
         """Client that has control; None: nobody."""

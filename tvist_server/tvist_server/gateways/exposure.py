@@ -21,7 +21,7 @@ from typing import Any
 import msgspec
 
 from tvist_protocol.codec import MAX_BYTES
-from tvist_server.gateways.access import Role, access_control
+from tvist_server.gateways.access import Role, access_control, open_access
 from tvist_server.gateways.endpoints import is_local, options, protocol
 
 AUTHORITY, CERTIFICATE, KEY, CLIENTS = "authority.pem", "robot.pem", "robot.key", "clients.toml"
@@ -71,7 +71,7 @@ def guarded(
             f"listen is {exposed[0]}, which others than this machine can reach: add --security DIR (made by "
             "`tvist keys`) and listen on tls/…, or --insecure to let anybody there move the robot"
         )
-    return list(listen), dict(LIMITS) if exposed else {}
+    return list(listen), {**(LIMITS if exposed else {}), "access_control": open_access(robots)}
 
 
 def guarded_doors(address: str, *, insecure: bool) -> None:

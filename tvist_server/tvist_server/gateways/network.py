@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Any
 
 import zenoh
+from zenoh.handlers import Callback
 
 from tvist_server.gateways.base import Desk, GatewayError
 from tvist_server.gateways.zenoh import ZenohGateway
@@ -60,6 +61,7 @@ class Network:
         self._session = _open(endpoints, guard if lockstep else {**REALTIME, **guard})
         self._gateways: list[ZenohGateway] = []
         self._closed = False
+        self._session.info.declare_transport_events_listener(Callback(self._on_transport, indirect=False))
         _OPEN.add(self)
 
     def gateway(self, robot: str, desk: Desk, *, lockstep: bool, truth: bool) -> ZenohGateway:
@@ -84,6 +86,11 @@ class Network:
             gateway.close()
         _OPEN.discard(self)
         self._session.close()  # type: ignore[no-untyped-call]
+
+    def _on_transport(self, event: zenoh.TransportEvent) -> None:
+        if event.kind == zenoh.SampleKind.DELETE:
+            for gateway in tuple(self._gateways):
+                gateway.session_gone(str(event.transport.zid))
 
 
 def _open(endpoints: Sequence[str], guard: Mapping[str, Any]) -> zenoh.Session:

@@ -112,13 +112,19 @@ class ZenohGateway(Gateway):
             self._desk.setpoint(sample.payload.to_bytes())
 
     def _on_client(self, sample: zenoh.Sample) -> None:
-        name = keys.client_name(self._robot, str(sample.key_expr))
+        key = str(sample.key_expr)
+        name, session = keys.client_name(self._robot, key), keys.client_session(self._robot, key)
         if self._closed or name is None:
             return
         if sample.kind == zenoh.SampleKind.PUT:
-            self._desk.client_seen(name)
+            self._desk.client_seen(name, session)
         else:
-            self._desk.client_gone(name)
+            self._desk.client_gone(name, session)
+
+    def session_gone(self, session: str) -> None:
+        """Hear that a session has ended: its liveliness tokens go only with their last copy, wherever that is."""
+        if not self._closed:
+            self._desk.session_gone(session)
 
 
 def _publishers(

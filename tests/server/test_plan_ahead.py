@@ -1,0 +1,215 @@
+"""Plans made beside the controller's thread: the same outcome, in the same order."""
+
+import threading
+from collections import deque
+
+import pytest
+
+from tvist_protocol import commands as c
+from tvist_protocol.codec import decode_reply, encode
+from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.values import Payload
+from tvist_server.controller import Controller
+from tvist_server.host import Host
+from tvist_server.plan_ahead import MOST_WAITING, PlanAhead
+from tvist_server.planning.planner import Planner
+from tvist_server.reception import Reception
+
+from .robots import Q2, Q3, Robot, setup
+
+WAIT = 20.0
+LIGHT = {"mass": 2.0, "com": (0.0, 0.0, 0.04), "inertia": (0.002, 0.0, 0.0, 0.002, 0.0, 0.002)}
+
+
+class Sink:
+    def __init__(self):
+        self.entries, self.states, self.events = [], [], []
+        self.journal, self.state, self.event = self.entries.append, self.states.append, self.events.append
+
+    def io(self, io):
+        pass
+
+    def truth(self, truth):
+        pass
+
+
+class Served:
+    """A robot whose controller's thread is the test's own: jobs run when it says."""
+
+    def __init__(self, **changes):
+        start = setup(clock="realtime", **changes)
+        self.sink = Sink()
+        self.host = Host(Controller(start), self.sink)
+        self.jobs, self.came = deque(), threading.Condition()
+        self.ahead = PlanAhead(self.host, Planner(start), self.post)
+        self.ahead.start()
+        self.reception = Reception(self.host, self.post, self.ahead.submit)
+        self.replies = []
+        self.token = self.ask(c.TakeControl(client="anna", lease_s=3600.0)).token
+
+    def post(self, job):
+        with self.came:
+            self.jobs.append(job)
+            self.came.notify()
+
+    def send(self, command):
+        self.reception.request(encode(command), self.answer, self.answer)
+
+    def answer(self, data):
+        self.replies.append(decode_reply(data))
+
+    def of(self, kind, **fields):
+        return kind(token=self.token, **fields)
+
+    def serve(self, replies):
+        """Run jobs until there are so many replies."""
+        while len(self.replies) < replies:
+            with self.came:
+                assert self.came.wait_for(lambda: self.jobs, WAIT), "no job came"
+                job = self.jobs.popleft()
+            job()
+
+    def ask(self, command):
+        wanted = len(self.replies) + 1
+        self.send(command)
+        self.serve(wanted)
+        return self.replies[-1]
+
+    def tick(self, ticks=1):
+        for _ in range(ticks):
+            self.host.tick()
+
+
+@pytest.fixture
+def served():
+    served = Served()
+    yield served
+    served.ahead.close()
+
+
+def test_what_was_planned_beside_is_what_the_controller_would_have_done(served):
+    commands = [
+        (c.SetShaper, {"name": "auto"}),
+        (c.MoveJ, {"q": tuple(Q2.tolist())}),
+        (c.SetPayload, LIGHT),
+        (c.SetShaper, {"name": "ei3"}),
+        (c.Stop, {}),
+    ]
+    alone = Robot()
+    for kind, fields in commands:
+        assert type(served.ask(served.of(kind, **fields))) is type(alone.send(kind, **fields))
+        served.tick(40)
+        alone.tick(40)
+    assert [state.target_q for state in served.sink.states] == [state.target_q for state in alone.states]
+
+
+def test_a_motion_is_planned_anew_where_what_it_was_planned_on_has_changed(served):
+    """The other payload comes from a client that the queue of the first does not know of."""
+    move = served.of(c.MoveJ, q=tuple(Q3.tolist()))
+    served.send(move)
+    with served.came:
+        assert served.came.wait_for(lambda: served.jobs, WAIT)
+    served.host.controller.receive(served.of(c.SetPayload, **LIGHT))
+    served.tick()  # tells of it
+    served.serve(len(served.replies) + 1)
+    assert isinstance(served.replies[-1], Accepted)
+    alone = Robot()
+    alone.send(c.SetPayload, **LIGHT)
+    alone.tick()
+    alone.send(c.MoveJ, q=move.q)
+    served.tick(300)
+    alone.tick(300)
+    assert [state.target_q for state in served.sink.states] == [state.target_q for state in alone.states]
+    assert served.host.controller.declared == Payload(**LIGHT)
+
+
+def test_one_client_s_commands_keep_their_order(served):
+    sent = [
+        served.of(c.SetShaper, name="zvd"),
+        served.of(c.KeepAlive),
+        served.of(c.SetPayload, **LIGHT),
+        served.of(c.SetSpeed, fraction=0.5),
+        served.of(c.MoveJ, q=tuple(Q2.tolist())),
+        served.of(c.KeepAlive),
+        served.of(c.Stop),
+        c.Stop(),
+    ]
+    for command in sent:
+        served.send(command)
+    served.serve(1 + len(sent))
+    assert [type(reply) for reply in served.replies[1:]] == [Done] * 4 + [Accepted] + [Done] * 3
+    journaled = [entry.message["type"] for entry in served.sink.entries]
+    assert journaled == ["take_control", *(type(command).__struct_config__.tag for command in sent)]
+    served.tick()
+    assert [event.kind for event in served.sink.events if event.id] == ["motion_started", "motion_stopped"]
+
+
+def test_a_stop_of_what_moves_waits_for_no_plan(served):
+    served.ask(served.of(c.MoveJ, q=tuple(Q2.tolist())))
+    served.tick(100)
+    for _ in range(10):
+        served.send(served.of(c.SetShaper, name="auto"))
+    served.send(c.Stop())
+    served.serve(13)
+    kinds = [entry.message["type"] for entry in served.sink.entries]
+    assert kinds.index("stop") < len(kinds) - 5, "most of what was sent before it was still to be planned"
+
+
+def test_refusals_are_told_in_their_turn(served):
+    reply = served.ask(served.of(c.MoveJ, q=(0.0, 1.5, 0.0, 0.0, 0.0, 0.0)))
+    assert (reply.code, reply.where) == ("collision", "q")
+    assert served.ask(served.of(c.MoveJ, q=(0.0,) * 5)).code == "out_of_range"
+    assert served.ask(served.of(c.SetShaper, name="nonsense")).code == "unknown_shaper"
+    served.ask(served.of(c.MoveJ, q=tuple(Q2.tolist())))
+    assert served.ask(served.of(c.MoveJ, q=tuple(Q3.tolist()))).code == "busy"
+
+
+def test_who_sends_more_than_can_be_planned_is_told_so(served):
+    for _ in range(3 * MOST_WAITING):
+        served.send(served.of(c.SetShaper, name="zv"))
+    busy = [reply for reply in served.replies[1:] if isinstance(reply, Refused)]
+    assert {reply.code for reply in busy} == {"busy"}
+    assert 0 < len(busy) <= 2 * MOST_WAITING
+    served.serve(1 + 3 * MOST_WAITING)
+    assert served.ask(served.of(c.KeepAlive)) == Done()
+
+
+def test_nothing_that_a_stranger_sends_is_journaled_or_reaches_the_controller(served):
+    before, jobs = len(served.sink.entries), len(served.jobs)
+    strangers = [
+        c.MoveJ(token="x", q=tuple(Q2.tolist())),
+        c.TakeControl(client="bert"),
+        c.Stop(token="x"),
+        c.SetShaper(token="x", name="auto"),
+    ]
+    for command in strangers:
+        served.send(command)
+    served.reception.request(b"\xc1", served.answer, served.answer)
+    served.reception.setpoint(encode(c.Setpoint(token="x", sequence=0, q=tuple(Q2.tolist()))))
+    assert [type(reply) for reply in served.replies[1:]] == [Refused] * 5
+    assert (len(served.sink.entries), len(served.jobs)) == (before, jobs)
+    assert (served.reception.commands_refused, served.reception.setpoints_refused) == (5, 1)
+
+
+def test_control_that_is_granted_to_one_who_has_gone_ends_at_once(served):
+    served.ask(served.of(c.ReleaseControl))
+    served.reception.client_seen("bert", "1f")
+    served.send(c.TakeControl(client="bert"))
+    served.reception.client_gone("bert", "1f")
+    served.serve(len(served.replies) + 1)
+    while served.jobs:
+        served.jobs.popleft()()
+    assert served.host.standing.lease is None
+
+
+def test_copies_of_a_name_are_not_given_control_and_do_not_keep_it_alive(served):
+    served.ask(served.of(c.ReleaseControl))
+    served.reception.client_seen("bert", "1f")
+    assert isinstance(served.ask(c.TakeControl(client="bert")), Accepted)
+    served.reception.client_seen("bert", "2f")
+    assert served.ask(c.TakeControl(client="bert")).code == "no_control"
+    served.reception.session_gone("1f")
+    while served.jobs:
+        served.jobs.popleft()()
+    assert served.host.standing.lease is None
+    assert isinstance(served.ask(c.TakeControl(client="bert")), Accepted), "one of that name is left"

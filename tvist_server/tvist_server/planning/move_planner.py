@@ -1,0 +1,113 @@
+"""Point-to-point motions, whether they are clear, and what torque they will take."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tvist_plant.plant import PERIOD
+from tvist_protocol.commands import MoveJ
+from tvist_server.collision import CLEARANCE, CollisionModel
+from tvist_server.control.differentiator import Differentiator, Floats
+from tvist_server.control.inverse_dynamics import InverseDynamics
+from tvist_server.line_filter import LineFilter
+from tvist_server.outlook import run_ahead
+from tvist_server.planning.basis import MotionBasis
+from tvist_server.planning.filter_planner import FilterPlanner
+from tvist_server.refusal import RefusalError, check_joints, check_motion
+from tvist_server.safety import largest_torque, torque_along
+from tvist_server.setup import Setup, body
+from tvist_server.trajectory import DoubleS, Limits
+
+LOOKS = 64
+"""Moments of a motion at which its torque is looked at before it is run ahead."""
+BLUNTED = 1.05
+"""By how much the shaped motion's torque may be beyond that of the unshaped one, which it lags behind [-]."""
+
+
+@dataclass(frozen=True)
+class PlannedMove:
+    """A motion that may begin."""
+
+    trajectory: DoubleS
+    """Its reference."""
+    velocity: float
+    """Limit that was asked for [rad/s]."""
+    excess_of_torque: str | None
+    """By how much it will pass a limit of torque, in words; None where it will not."""
+
+
+class MovePlanner:
+    """Plans the motions of one robot.
+
+    Args:
+        setup: How the robot starts.
+        filters: Makes its filters.
+    """
+
+    def __init__(self, setup: Setup, filters: FilterPlanner) -> None:
+        self._description, self._filters = setup.description, filters
+        payload = body(setup.payload)
+        self._collisions = CollisionModel(setup.description, payload)
+        self._dynamics = InverseDynamics(setup.description, payload)
+        self._torque = np.array(setup.description.limits.torque)
+
+    def move(self, command: MoveJ, basis: MotionBasis) -> PlannedMove:
+        """Plan a motion from rest.
+
+        Raises:
+            RefusalError: There is no such motion, or something would meet on its way.
+        """
+        check_joints(command.q, self._description)
+        check_motion(command.velocity, command.acceleration, command.jerk, self._description)
+        limits = Limits(command.velocity, command.acceleration, command.jerk)
+        spared = replace(limits, acceleration=limits.acceleration * (1.0 - basis.excess))
+        rate = basis.speed if basis.slowest is None else min(basis.speed, basis.slowest / limits.velocity)
+        try:
+            trajectory = DoubleS(basis.q, np.array(command.q, dtype=float), spared, PERIOD, rate)
+        except ValueError as error:
+            raise RefusalError("out_of_range", "velocity", str(error)) from error
+        self._check_clear(trajectory, basis)
+        return PlannedMove(trajectory, limits.velocity, self._excess_of_torque(trajectory, basis))
+
+    def _check_clear(self, trajectory: DoubleS, basis: MotionBasis) -> None:
+        if self._collisions.carried is not basis.carried:
+            self._collisions.carry(basis.carried)
+        found = self._collisions.on_line(basis.q, trajectory.target)
+        if found is not None:
+            share, meeting = found
+            time = trajectory.time_at(share)
+            raise RefusalError("collision", "q", f"{meeting} {time:.2f} s after the start", CLEARANCE)
+
+    def _excess_of_torque(self, trajectory: DoubleS, basis: MotionBasis) -> str | None:
+        dynamics, allowed, start, limits = self._dynamics, self._torque, basis.q, trajectory.limits
+        dynamics.believe(basis.bodies)
+        bound = largest_torque(
+            dynamics, start, trajectory.target - start, limits.velocity, limits.acceleration
+        )
+        if (bound <= allowed).all() or (BLUNTED * self._before_shaping(trajectory) <= allowed).all():
+            return None
+        ahead = self._shaped(trajectory, basis)
+        if ahead is None:
+            return None
+        most = torque_along(dynamics, ahead, PERIOD)
+        joint = int(np.argmax(most / allowed))
+        name, limit = self._description.robot.joints[joint], allowed[joint]
+        if most[joint] <= limit:
+            return None
+        return (
+            f"torque of joint {name} will reach {most[joint]:.0f} N m, {most[joint] - limit:.1f} beyond its "
+            f"limit of {limit:g}: ask for less acceleration"
+        )
+
+    def _before_shaping(self, trajectory: DoubleS) -> Floats:
+        """Largest torques that the motion would take without a filter, shape (n,) [N m]."""
+        most: Floats = np.max([self._dynamics.effort(*state) for state in trajectory.states(LOOKS)], axis=0)
+        return most
+
+    def _shaped(self, trajectory: DoubleS, basis: MotionBasis) -> Floats | None:
+        """References of the shaped motion; see `run_ahead`."""
+        tvist = self._filters.present(basis.filter)
+        tvist.reset(basis.q)
+        tvist.aim(trajectory.target)
+        line_filter = LineFilter(tvist, trajectory.limits)
+        return run_ahead(trajectory.fork(), line_filter, Differentiator(basis.q, PERIOD))
