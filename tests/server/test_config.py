@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from importlib import resources
 
 import pytest
 
@@ -98,6 +99,28 @@ def test_another_payload_is_the_same_disc_in_less_steel(mass):
     assert payload.mass == mass
     assert payload.com == UR5E.payload.com
     assert payload.inertia == pytest.approx([value * mass / 5.0 for value in UR5E.payload.inertia])
+
+
+def test_a_payload_above_the_rating_is_refused_and_says_how_to_insist():
+    assert sentence(config(payload=20.0).setup) == (
+        "payload is 20 kg, above the ur5e's rating of 5 kg: give --overload to insist"
+    )
+    assert config(payload=5.0).setup().payload.mass == 5.0
+    assert config(payload=20.0, overload=True).setup().payload.mass == 20.0
+
+
+def test_the_payload_of_a_robot_file_is_declared_too(tmp_path):
+    text = (resources.files("tvist_plant") / "robots" / "ur5e.toml").read_text(encoding="utf-8")
+    path = tmp_path / "heavy.toml"
+    path.write_text(text.replace("mass    = 5.0", "mass    = 7.5"), encoding="utf-8")
+    assert "payload is 7.5 kg" in sentence(config(robot=str(path)).setup)
+    assert config(robot=str(path), payload=4.0).setup().payload.mass == 4.0
+
+
+def test_what_is_carried_may_be_above_the_rating(tmp_path):
+    file = tmp_path / "state.toml"
+    file.write_text(STATE.replace("mass = 1.5", "mass = 20"))
+    assert config(state=str(file)).setup().carried.mass == 20.0
 
 
 def test_a_calibration_file(tmp_path):

@@ -17,7 +17,7 @@ from tvist_protocol.values import RobotName, Seed
 from tvist_server import calibrations
 from tvist_server.fleet import members
 from tvist_server.initial import read_state
-from tvist_server.setup import Setup, paper_payload
+from tvist_server.setup import Setup, check_rating, paper_payload
 from tvist_server.ur_ports import Door, UrPorts
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -49,6 +49,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Let anybody who reaches an endpoint move the robot, on whatever network that is."""
     payload: Annotated[float, Meta(ge=0, le=100)] | None = None
     """Mass of the paper's disc, declared and carried [kg]; default: the robot file's payload."""
+    overload: bool = False
+    """Start even where the payload declared is above the robot's rating."""
     shaper: str = "zv"
     """Shaper to start with."""
     calibration: str | None = calibrations.DEFAULT
@@ -150,6 +152,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             if self.quiet:
                 setup = dataclasses.replace(setup, description=setup.description.quiet())
             setup.check()
+            if not self.overload:
+                check_rating(setup.payload, description)
         except ValueError as error:
             raise ConfigError(str(error)) from error
         if calibration is not None and calibration.robot != description.robot.model:

@@ -124,3 +124,19 @@ def paper_payload(description: RobotDescription, mass: float | None = None) -> P
         com=own.com,
         inertia=(xx * share, xy * share, xz * share, yy * share, yz * share, zz * share),
     )
+
+
+def check_rating(declared: Payload, description: RobotDescription) -> None:
+    """Check that a robot is rated for what it starts with, as `set_payload` does later.
+
+    It is what is declared that counts: what the arm carries besides may be anything, to try what happens then.
+
+    Raises:
+        ValueError: The payload is too heavy; the sentence says by what and how to insist.
+    """
+    rated = description.limits.payload
+    if declared.mass > rated:
+        raise ValueError(
+            f"payload is {declared.mass:g} kg, above the {description.robot.name}'s rating of {rated:g} kg: "
+            "give --overload to insist"
+        )

@@ -24,6 +24,7 @@ def serve(
     security: str | None = None,
     insecure: bool = False,
     payload: float | None = None,
+    overload: bool = False,
     shaper: str | None = None,
     calibration: str | None = None,
     clock: str | None = None,
@@ -50,7 +51,9 @@ def serve(
         listen: Zenoh endpoint, repeatable [tcp/127.0.0.1:7447].
         security: Folder made by tvist keys; the endpoint is then tls/ADDRESS:PORT, and who has no role sees nothing.
         insecure: Listen beyond this machine without: anybody there may move the robot.
-        payload: Mass of the paper's disc on the flange in kg [5].
+        payload: Mass of the paper's disc on the flange in kg, declared and carried [5].
+        overload: Start even where that is above the robot's rating: the drives may give out, and the robot then makes
+            a protective stop.
         shaper: Any that tvist shapers lists, such as none, zv or ei3 [zv].
         calibration: Calibration that comes with the package, or path of one; none for a robot to be identified.
         clock: realtime, or lockstep: a client lets time pass [realtime].
@@ -71,7 +74,7 @@ def serve(
     """
     given: dict[str, Any] = {
         "name": name, "robot": robot, "robots": robots, "listen": listen, "security": security,
-        "insecure": insecure or None, "payload": payload, "shaper": shaper,
+        "insecure": insecure or None, "payload": payload, "overload": overload or None, "shaper": shaper,
         "calibration": calibration, "clock": clock, "speed": speed,
         "realtime_priority": realtime_priority or None, "start": start, "state": state, "seed": seed,
         "record": record, "dump": dump, "truth": truth or None, "quiet": quiet or None,
