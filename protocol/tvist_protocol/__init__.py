@@ -43,7 +43,7 @@ from tvist_protocol.commands import (
     UnlockProtectiveStop,
 )
 from tvist_protocol.errors import ProtocolError, RefusedError, TvistError
-from tvist_protocol.info import CalibrationInfo, Clock, Info, Limits, Stopping
+from tvist_protocol.info import CalibrationInfo, Clock, Info, Limits, Stopping, StopReason
 from tvist_protocol.io import Bank, Io, SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import CODE_MEANINGS, Accepted, Code, Done, Refused, Reply
@@ -102,6 +102,7 @@ __all__ = [
     "State",
     "StepSetpoint",
     "Stop",
+    "StopReason",
     "Stopping",
     "TakeControl",
     "Telemetry",

@@ -143,6 +143,8 @@ class Provenance(_Part, frozen=True, kw_only=True):
     """Of configurations that a fit of polynomials did not see."""
     cross_validated_zeta_percent: Spread | None = None
     """Of configurations that a fit of polynomials did not see."""
+    arm: Annotated[str, Meta(max_length=64)] | None = None
+    """Fingerprint of the arm it was measured on, as `info` has it; null: unknown."""
 
 
 class Calibration(_Part, frozen=True, kw_only=True):

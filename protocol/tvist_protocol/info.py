@@ -4,6 +4,7 @@ from typing import Literal
 
 from msgspec import Struct
 
+from tvist_protocol.replies import Code
 from tvist_protocol.values import Payload
 
 Clock = Literal["realtime", "lockstep", "free"]
@@ -41,6 +42,17 @@ class Stopping(Struct, frozen=True, kw_only=True, gc=False):
     """Angle the joint turns until it rests [rad]."""
 
 
+class StopReason(Struct, frozen=True, kw_only=True, gc=False):
+    """Why the robot stands and may not move."""
+
+    tick: int
+    """Tick at which it stopped."""
+    code: Code | None
+    """The reason, for a program; null where there is none of its own."""
+    why: str
+    """The reason, for a person."""
+
+
 class CalibrationInfo(Struct, frozen=True, kw_only=True, gc=False):
     """The calibration in use."""
 
@@ -50,6 +62,8 @@ class CalibrationInfo(Struct, frozen=True, kw_only=True, gc=False):
     """Mass the arm carried when it was made [kg]."""
     fits_payload: bool
     """Whether that is the payload now declared."""
+    fits_arm: bool | None = None
+    """Whether it was measured on the arm that the robot file describes; null: it does not say on which."""
     seed: int | None
     """Seed of the simulation it was made in; null: a real arm's, or unknown."""
     f_d_range: tuple[float, float]
@@ -97,3 +111,11 @@ class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=F
     """Tick at which this was said."""
     stopping: list[Stopping] = []
     """How long stops last and how far they go: at 33, 66 and 100 % speed, without payload and with the rated one."""
+    robot_mode: int | None = None
+    """As `state` has it, and already before the first tick; null: an older server, which does not say."""
+    safety_mode: int | None = None
+    """Likewise."""
+    stop: StopReason | None = None
+    """The stop that keeps the robot from moving now; null: there is none, or nothing has told why."""
+    arm: str | None = None
+    """Fingerprint of what makes the arm vibrate, as a calibration's `provenance` names it; null: not told."""

@@ -9,7 +9,7 @@ import msgspec
 from tvist_protocol.channels import CHANNELS, COMMANDS, REPLIES, Channel, tag
 from tvist_protocol.commands import Setpoint, StepSetpoint
 from tvist_protocol.faults import FAULTS, Fault
-from tvist_protocol.info import CalibrationInfo, Info, Limits, Stopping
+from tvist_protocol.info import CalibrationInfo, Info, Limits, Stopping, StopReason
 from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import CODE_MEANINGS
@@ -39,7 +39,7 @@ def tables() -> dict[str, str]:
         "codes": _table(("code", "meaning"), ((f"`{code}`", text) for code, text in CODE_MEANINGS.items())),
         "streams": _messages((State, Event, Truth, Telemetry, Io)),
         "events": _table(("kind", "meaning"), ((f"`{kind}`", text) for kind, text in EVENT_MEANINGS.items())),
-        "info": _messages((Info, Limits, Stopping, CalibrationInfo)),
+        "info": _messages((Info, Limits, Stopping, StopReason, CalibrationInfo)),
         "modes": _table(("field", "numbers"), map(_mode_row, (RobotMode, SafetyMode, RuntimeState))),
         "activities": _table(
             ("state", "`robot_mode`", "`safety_mode`", "meaning"), map(_activity_row, Activity)

@@ -15,11 +15,11 @@ from tvist_protocol.asyncapi import asyncapi
 from tvist_protocol.channels import COMMANDS, MESSAGES, tag
 from tvist_protocol.commands import Setpoint, StepSetpoint
 from tvist_protocol.generate import FOLDER, filled, generated, golden, stray
-from tvist_protocol.info import CalibrationInfo, Limits
+from tvist_protocol.info import CalibrationInfo, Limits, StopReason
 from tvist_protocol.schema import field_docs, json_schema
 from tvist_protocol.values import Payload
 
-STRUCTS = (*MESSAGES, Payload, StepSetpoint, Limits, CalibrationInfo)
+STRUCTS = (*MESSAGES, Payload, StepSetpoint, Limits, StopReason, CalibrationInfo)
 INPUT = (*COMMANDS, Setpoint, Payload, StepSetpoint)
 
 

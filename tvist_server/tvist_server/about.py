@@ -54,4 +54,8 @@ def info_of(controller: Controller) -> Info:
         control=None if lease is None else lease.client,
         tick=controller.tick_number,
         stopping=list(stopping(setup.description)),
+        robot_mode=controller.motion.activity.robot_mode,
+        safety_mode=controller.motion.safety_mode,
+        stop=controller.stop_reason,
+        arm=controller.arm,
     )

@@ -152,10 +152,13 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             if self.quiet:
                 setup = dataclasses.replace(setup, description=setup.description.quiet())
             setup.check()
-            if not self.overload:
-                check_rating(setup.payload, description)
         except ValueError as error:
             raise ConfigError(str(error)) from error
+        if not self.overload:
+            try:
+                check_rating(setup.payload, description)
+            except ValueError as error:
+                raise ConfigError(f"{error}: give --overload to insist") from error
         if calibration is not None and calibration.robot != description.robot.model:
             raise ConfigError(
                 f"calibration {calibration.name!r} is of a {calibration.robot}; the robot is a "

@@ -9,8 +9,10 @@ from typing import Any, Unpack
 
 import numpy as np
 
+from tvist_plant.fingerprint import fingerprint
 from tvist_plant.plant import PERIOD, PlantError
 from tvist_protocol import commands as c
+from tvist_protocol.info import StopReason
 from tvist_protocol.io import Io, SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Accepted, Done, Reply
@@ -32,6 +34,7 @@ from tvist_server.reporting import Reporter
 from tvist_server.safety_control import SafetyControl
 from tvist_server.session import NoControlError, Session
 from tvist_server.setup import Setup, body
+from tvist_server.stop_reasons import StopReasons
 from tvist_server.trajectory import Limits
 from tvist_shaping.base import Filter
 
@@ -64,6 +67,7 @@ class Controller:
         self.counters = Counters()
         self.declared = setup.payload
         self._events: list[Event] = []
+        self._stop_reasons = StopReasons()
         self.session = Session(timeouts=setup.clock == "realtime")
         self._planner = Planner(setup)
         self._plan: Plan | None = None
@@ -93,6 +97,16 @@ class Controller:
     def now(self) -> float:
         """Time of the present tick [s]; it passes by ticks alone."""
         return self.tick_number * PERIOD
+
+    @cached_property
+    def arm(self) -> str:
+        """Fingerprint of the arm that the robot file describes."""
+        return fingerprint(self.setup.description)
+
+    @property
+    def stop_reason(self) -> StopReason | None:
+        """The stop that keeps the robot from moving; None: there is none."""
+        return self._stop_reasons.present(self.motion.activity.robot_mode, self.motion.safety_mode)
 
     # ------------------------------------------------------------------ what comes in
 
@@ -165,6 +179,7 @@ class Controller:
             self._payload_monitor.reset()
         self._watch_payload(sample)
         self.filters.watch()
+        self._stop_reasons.update(self.motion.activity.robot_mode, self.motion.safety_mode)
         self.tick_number += 1
         events, self._events = self._events, []
         state = self._reporter.state(
@@ -193,7 +208,10 @@ class Controller:
 
     def _emit(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
         """Put down an event of the tick that is being made; of the next one between two."""
-        self._events.append(Event(tick=self.tick_number + 1, kind=kind, **fields))
+        event = Event(tick=self.tick_number + 1, kind=kind, **fields)
+        self._events.append(event)
+        if kind in {"protective_stop", "safety_stop"}:
+            self._stop_reasons.note(event, self.motion.safety_mode)
 
     def _watch_time(self) -> None:
         """End what is over, and what nobody keeps up."""

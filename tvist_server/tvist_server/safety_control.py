@@ -45,6 +45,10 @@ class SafetyControl:
             self._goes_on = False
             return
         why = "a safeguard asked for a stop"
+        if not motion.activity.moving:
+            # Nothing moves, nothing ends, and yet it is what keeps the robot from moving from now on.
+            self._emit("safety_stop", why=why, category=2, duration=0.0, way=0.0)
+            return
         if after(motion.activity, "pause") is None:
             motion.end("interruption", why, kind="safety_stop", category=2)
             return

@@ -132,11 +132,10 @@ def check_rating(declared: Payload, description: RobotDescription) -> None:
     It is what is declared that counts: what the arm carries besides may be anything, to try what happens then.
 
     Raises:
-        ValueError: The payload is too heavy; the sentence says by what and how to insist.
+        ValueError: The payload is too heavy.
     """
     rated = description.limits.payload
     if declared.mass > rated:
         raise ValueError(
-            f"payload is {declared.mass:g} kg, above the {description.robot.name}'s rating of {rated:g} kg: "
-            "give --overload to insist"
+            f"payload is {declared.mass:g} kg, above the {description.robot.name}'s rating of {rated:g} kg"
         )

@@ -105,6 +105,7 @@ class _Place:
     ) -> None:
         from tvist_lab.in_process import free_setup
         from tvist_server.config import ConfigError, from_mapping
+        from tvist_server.setup import check_rating
 
         self.endpoint, self.robot, self.security, self.mass, self.seed = endpoint, robot, security, mass, seed
         self._setup = None
@@ -112,6 +113,7 @@ class _Place:
             content = {
                 "robot": robot,
                 "payload": mass,
+                "overload": True,  # refused below, without the hint for who serves
                 "calibration": "none",
                 "clock": "free",
                 "seed": seed,
@@ -119,6 +121,8 @@ class _Place:
             }
             with told(ConfigError, code=2):
                 self._setup = free_setup(from_mapping(content, "options"))
+            with told(ValueError, code=2):
+                check_rating(self._setup.payload, self._setup.description)
 
     def run(self, doing: Doing) -> Any:
         """Do something as a client with control."""

@@ -1,0 +1,41 @@
+"""Whether two robot files describe the same arm, as far as its vibration goes."""
+
+from hashlib import sha256
+
+import msgspec
+
+from tvist_plant.description import RobotDescription
+
+_DRIVES = (
+    "gear_stiffness",
+    "gear_damping",
+    "rotor_inertia",
+    "velocity_gain",
+    "position_gain",
+    "integral_gain",
+    "coulomb_friction",
+    "friction_width",
+)
+"""Of the drives: what makes frequency and damping. Feed-forward and gear error only excite."""
+
+
+def fingerprint(description: RobotDescription) -> str:
+    """Name the arm by what makes it vibrate: geometry, masses, springs, dampers and drive gains.
+
+    Names, limits, poses, bodies for collisions, sensors and the payload are left out: a calibration says itself which
+    payload it was measured with.
+
+    Args:
+        description: The robot.
+
+    Returns:
+        16 hexadecimal digits, equal for equal numbers on every machine.
+    """
+    drives = description.drives
+    parts = (
+        description.kinematics,
+        description.links,
+        description.link_flexibility,
+        [getattr(drives, name) for name in _DRIVES],
+    )
+    return sha256(msgspec.json.encode(parts, order="sorted")).hexdigest()[:16]
