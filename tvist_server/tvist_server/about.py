@@ -42,6 +42,7 @@ def info_of(controller: Controller) -> Info:
             name=calibration.name,
             payload_mass=calibration.payload.mass,
             fits_payload=fits(calibration, controller.declared, controller.filters.source.name),
+            fits_arm=controller.filters.source.fits_arm,
             seed=calibration.provenance.seed,
             f_d_range=calibration.provenance.measured_f_d_range,
             zeta_range=calibration.provenance.measured_zeta_range,

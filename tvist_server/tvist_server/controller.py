@@ -92,6 +92,7 @@ class Controller:
         self.peripherals = Peripherals()
         self._io_changed = True
         self.filters.warn_of_payload(self.declared)
+        self.filters.warn_of_arm()
 
     @property
     def now(self) -> float:

@@ -49,9 +49,12 @@ class Filters:
 
     def use(self, chosen: PlannedFilter) -> None:
         """Shape with it from now on."""
+        before = self.source
         self.source, tvist = chosen
         self._cycle.use(tvist)
         self._emit("shaper_changed", why=f"{tvist.name} with estimator {self.source.name}")
+        if self.source is not before:
+            self.warn_of_arm()
 
     def declare(self, payload: Payload, tvist: Filter | None) -> None:
         """The arm carries something else: so it may have other modes.
@@ -75,6 +78,16 @@ class Filters:
                 f"{calibration.payload.mass:g} kg; {declared.mass:g} kg is declared: "
                 "frequencies will be off",
             )
+
+    def warn_of_arm(self) -> None:
+        """Say that modes are of another arm of the same model, where they are."""
+        calibration = self.source.calibration
+        if calibration is not None and self.source.fits_arm is False:
+            why = (
+                f"calibration {calibration.name!r} was measured on another arm than the robot file describes: "
+                "frequencies will be off; tvist identify measures this one"
+            )
+            self._emit("warning", why=why)
 
     def watch(self) -> None:
         """Say when the filter cannot do what it should, once until it can again."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from tvist_plant.description import RobotDescription
+from tvist_plant.fingerprint import fingerprint
 from tvist_protocol.calibration import Calibration
 from tvist_protocol.values import Payload
 from tvist_server.calibrations import available, estimator_of, load
@@ -35,6 +36,12 @@ class ModeSource:
     def knows_payload(self) -> bool:
         """Whether another payload makes other modes."""
         return self.name == "modal"
+
+    @property
+    def fits_arm(self) -> bool | None:
+        """Whether the calibration was measured on the arm that the robot file describes; None: it does not say."""
+        measured = None if self.calibration is None else self.calibration.provenance.arm
+        return None if measured is None else measured == fingerprint(self.description)
 
     @property
     def most(self) -> int:

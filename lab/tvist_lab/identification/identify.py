@@ -201,5 +201,6 @@ def _calibration(
             residual_zeta_percent=fit.residual_zeta,
             cross_validated_f_d_percent=fit.cross_validated_f_d,
             cross_validated_zeta_percent=fit.cross_validated_zeta,
+            arm=info.arm,
         ),
     )

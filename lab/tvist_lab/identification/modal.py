@@ -264,6 +264,7 @@ def calibrate(
             rejected=rejected,
             measured_f_d_range=(low_f, high_f),
             measured_zeta_range=(low_z, high_z),
+            arm=info.arm,
         ),
     )
 
