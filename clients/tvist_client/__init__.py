@@ -7,6 +7,7 @@ from tvist_client.errors import (
     MisuseError,
     MotionStoppedError,
     NotConnectedError,
+    ProtectiveStopError,
     StreamStoppedError,
     UnexpectedReplyError,
 )
@@ -33,6 +34,7 @@ __all__ = [
     "MotionStoppedError",
     "NotConnectedError",
     "Payload",
+    "ProtectiveStopError",
     "ProtocolError",
     "RefusedError",
     "Robot",

@@ -14,7 +14,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m tvist_client", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     checking = commands.add_parser(
-        "check", help="shake hands with a robot, see a state, have a command refused"
+        "check",
+        help="shake hands with a robot, see a state, have a command refused; is it ready to be moved?",
     )
     checking.add_argument(
         "endpoint", nargs="?", default=ENDPOINT, help="where its server listens (%(default)s)"
@@ -23,9 +24,14 @@ def main(arguments: list[str] | None = None) -> int:
     checking.add_argument(
         "--security", metavar="DIR", help="folder with this client's certificate, for tls/HOST:PORT"
     )
+    checking.add_argument(
+        "--alive",
+        action="store_true",
+        help="ask only whether the server answers and ticks, even if the robot has stopped: for orchestrators",
+    )
     checking.add_argument("--json", action="store_true", help="print one JSON object")
     chosen = parser.parse_args(arguments)
-    report = check(chosen.endpoint, chosen.name, security=chosen.security)
+    report = check(chosen.endpoint, chosen.name, alive=chosen.alive, security=chosen.security)
     text = msgspec.json.encode(report).decode() if chosen.json else describe(report)
     sys.stdout.write(text + "\n")
     return 0 if report.ok else 1

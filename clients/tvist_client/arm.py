@@ -6,7 +6,12 @@ import logging
 from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from tvist_client.errors import AnswerTimeoutError, ClientError, UnexpectedReplyError
+from tvist_client.errors import (
+    AnswerTimeoutError,
+    ClientError,
+    ProtectiveStopError,
+    UnexpectedReplyError,
+)
 from tvist_client.motion import Motion
 from tvist_client.servo import Servo
 from tvist_client.values import floats
@@ -35,6 +40,7 @@ from tvist_protocol.commands import (
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.io import Bank, SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.replies import Accepted, Done
+from tvist_protocol.stream import Event
 from tvist_protocol.values import Payload, ResetMode
 
 if TYPE_CHECKING:
@@ -42,6 +48,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+UNLOCKED_TICKS = 150
+"""Ticks, 0.3 s, for which a robot is watched once it is unlocked: an overloaded drive gives out in hundredths."""
 STEP_S = 60.0
 """How long a `simulation.step` may take [s]: a server may compute more slowly than time passes."""
 
@@ -174,8 +182,26 @@ class Arm:
         await self.robot.request(PowerOff(token=self.token))
 
     async def unlock_protective_stop(self) -> None:
-        """Leave a protective stop, once the arm rests."""
-        await self.robot.request(UnlockProtectiveStop(token=self.token))
+        """Leave a protective stop, once the arm rests.
+
+        In real time it waits for `UNLOCKED_TICKS` to see that the robot does not stop again. In lockstep and free time
+        is the caller's: a stop that comes with it is an event, and stands in `Robot.info` as `stop`.
+
+        Raises:
+            ProtectiveStopError: The robot stopped again meanwhile: what made it stop is still there.
+        """
+        again: list[Event] = []
+        forget = self.robot.on_event(
+            lambda event: again.append(event) if event.kind == "protective_stop" else None
+        )
+        try:
+            await self.robot.request(UnlockProtectiveStop(token=self.token))
+            if await self.robot.clock() == "realtime":
+                await self.robot.advance(UNLOCKED_TICKS)
+        finally:
+            forget()
+        if again:
+            raise ProtectiveStopError(again[0])
 
     async def restart_safety(self) -> None:
         """Restart the safety system after a violation or a fault; the arm is without power then."""

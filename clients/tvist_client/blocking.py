@@ -179,7 +179,7 @@ class Arm:
         self._portal.call(self._arm.power_off)
 
     def unlock_protective_stop(self) -> None:
-        """Leave a protective stop, once the arm rests."""
+        """Leave a protective stop, once the arm rests; in real time, look whether it holds."""
         self._portal.call(self._arm.unlock_protective_stop)
 
     def restart_safety(self) -> None:

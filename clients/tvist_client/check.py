@@ -1,4 +1,4 @@
-"""Is there a robot, and does it work? A real handshake, not a port scan."""
+"""Is there a robot, does it work, and is it ready to be moved? A real handshake, not a port scan."""
 
 import asyncio
 from collections.abc import Callable
@@ -6,11 +6,13 @@ from collections.abc import Callable
 import msgspec
 
 from tvist_client.errors import ClientError, NotConnectedError, UnexpectedReplyError
+from tvist_client.readiness import Readiness, look, unlock_command
 from tvist_client.robot import ENDPOINT, NAME, Robot
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.zenoh import robots_at
 from tvist_protocol.commands import MoveJ
 from tvist_protocol.errors import RefusedError, TvistError
+from tvist_protocol.info import StopReason
 from tvist_protocol.keys import check_robot_name
 from tvist_protocol.stream import State
 from tvist_protocol.values import PROTOCOL_VERSION
@@ -34,7 +36,7 @@ class Report(msgspec.Struct, frozen=True):
     """What a check found."""
 
     ok: bool
-    """Whether all is well."""
+    """Whether all that was asked for is well."""
     endpoint: str
     robot: str
     """Name of the robot; empty where none was found."""
@@ -46,22 +48,43 @@ class Report(msgspec.Struct, frozen=True):
     """States a second, by their ticks [Hz]; null where time does not pass by itself, or none came."""
     findings: list[Finding]
     """Step by step; a step that fails is the last."""
+    ready: bool | None
+    """Whether the robot may be moved; null where that was not looked at."""
+    robot_mode: str | None
+    """By its RTDE name; null where it was not looked at, or is not known."""
+    safety_mode: str | None
+    """Likewise."""
+    stop: StopReason | None
+    """The stop that keeps the robot from moving; null: there is none, or it is not known."""
+    next: str | None
+    """What to do to have it ready; null where nothing is known to be missing."""
 
 
-def check(endpoint: str = ENDPOINT, name: str | None = None, *, security: Folder | None = None) -> Report:
-    """Shake hands with a robot, see a state, and have a command refused. Changes nothing.
+def check(
+    endpoint: str = ENDPOINT,
+    name: str | None = None,
+    *,
+    alive: bool = False,
+    security: Folder | None = None,
+) -> Report:
+    """Shake hands with a robot, see a state, have a command refused, and ask whether it may be moved.
+
+    It changes nothing.
 
     Args:
         endpoint: Where the server listens, `tcp/<host>:<port>`.
         name: The robot's name; None: `ur5e` where it is there, otherwise the first of those that are.
+        alive: Ask only whether the server answers and, in real time, ticks: so an orchestrator does not kill a robot
+            that has stopped, and that somebody is about to unlock.
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
     """
-    return asyncio.run(_Check(endpoint, name, security).run())
+    return asyncio.run(_Check(endpoint, name, security, alive=alive).run())
 
 
 class _Check:
-    def __init__(self, endpoint: str, name: str | None, security: Folder | None) -> None:
-        self.endpoint, self.name, self.security = endpoint, name, security
+    def __init__(self, endpoint: str, name: str | None, security: Folder | None, *, alive: bool) -> None:
+        self.endpoint, self.name, self.security, self.alive = endpoint, name, security, alive
+        self.readiness: Readiness | None = None
         self.robots: list[str] = []
         self.protocol: int | None = None
         self.rate: float | None = None
@@ -76,13 +99,27 @@ class _Check:
             self.name = self.name or (self.robots[0] if self.robots and NAME not in self.robots else NAME)
             async with await Robot.connect(self.endpoint, self.name, security=self.security) as robot:
                 self.passed(step, f"{self.name} at {self.endpoint}{self.beside()}")
-                for step, run in (("info", self.info), ("state", self.state), ("refusal", self.refusal)):
+                steps = [("info", self.info), ("state", self.state)]
+                if not self.alive:
+                    steps += [("refusal", self.refusal), ("ready", self.ready)]
+                for step, run in steps:
                     self.passed(step, await run(robot))
         except TvistError as error:
             self.findings.append(Finding(step, ok=False, said=str(error)))
-        ok = all(finding.ok for finding in self.findings)
+        found = self.readiness
         return Report(
-            ok, self.endpoint, self.name or "", self.robots, self.protocol, self.rate, self.findings
+            ok=all(finding.ok for finding in self.findings),
+            endpoint=self.endpoint,
+            robot=self.name or "",
+            robots=self.robots,
+            protocol=self.protocol,
+            state_rate_hz=self.rate,
+            findings=self.findings,
+            ready=None if found is None else found.ready,
+            robot_mode=None if found is None else found.robot_mode,
+            safety_mode=None if found is None else found.safety_mode,
+            stop=None if found is None else found.stop,
+            next=None if found is None else found.next or None,
         )
 
     def beside(self) -> str:
@@ -128,6 +165,19 @@ class _Check:
             await robot.info()  # the robot is still there, so it is this client that is not heard
             return "its commands are not heard: this certificate is a viewer's"
         raise ClientError("a command with a stale token was obeyed: the server does not guard control")
+
+    async def ready(self, robot: Robot) -> str:
+        command = unlock_command(self.endpoint, str(self.name), self.security)
+        found = self.readiness = await look(robot, command)
+        if not found.ready:
+            raise NotReadyError(f"{found.why}. Next: {found.next}" if found.next else found.why)
+        if found.robot_mode is None:
+            return "as far as it says before its first tick"
+        return f"robot_mode {found.robot_mode}, safety_mode {found.safety_mode}"
+
+
+class NotReadyError(ClientError):
+    """The robot is there and works, and may not be moved."""
 
 
 async def _rate(robot: Robot) -> float:

@@ -8,6 +8,7 @@ TvistError
     ├── AnswerTimeoutError   somebody is there and does not answer; also a TimeoutError
     ├── MotionStoppedError   a motion ended before its target
     ├── StreamStoppedError   the robot ended the stream of set-points
+    ├── ProtectiveStopError  an unlocked robot stopped again at once
     ├── UnexpectedReplyError the answer is none of this protocol
     └── MisuseError          called when it makes no sense
 """
@@ -66,3 +67,19 @@ class StreamStoppedError(ClientError):
     def __str__(self) -> str:
         why = f": {self.event.why}" if self.event.why else ""
         return f"the stream of set-points was ended at tick {self.event.tick}{why}"
+
+
+class ProtectiveStopError(ClientError):
+    """A robot that was unlocked stopped again at once: what made it stop is still there.
+
+    Attributes:
+        event: The robot's `protective_stop`.
+    """
+
+    def __init__(self, event: Event) -> None:
+        super().__init__(event)
+        self.event = event
+
+    def __str__(self) -> str:
+        why = f": {self.event.why}" if self.event.why else ""
+        return f"the robot made another protective stop at tick {self.event.tick}{why}"

@@ -88,6 +88,31 @@ def test_a_safeguard_during_a_protective_stop_is_the_reason_once_that_is_unlocke
     assert "safeguard" in said(robot).stop.why
 
 
+def test_what_comes_during_a_graver_stop_does_not_take_its_place():
+    robot = Robot()
+    inject(robot, "violation")
+    for fault in ("safeguard_stop", "emergency_stop"):
+        inject(robot, fault)
+        robot.tick()
+        assert "violation" in said(robot).stop.why
+    inject(robot, "normal")
+    inject(robot, "safeguard_stop")
+    robot.send(c.RestartSafety)
+    robot.tick()
+    assert "safeguard" in said(robot).stop.why
+
+
+def test_a_protective_stop_made_again_under_a_safeguard_has_its_own_tick():
+    robot = Robot()
+    inject(robot, "safeguard_stop")
+    for _ in range(2):
+        inject(robot, "protective_stop")
+        began = robot.tick().tick
+        assert said(robot).stop.tick == began
+        robot.send(c.UnlockProtectiveStop)
+        robot.tick()
+
+
 def test_modes_are_said_before_the_first_tick():
     found = said(Robot(mode="POWER_OFF"))
     assert (found.tick, found.robot_mode, found.safety_mode) == (0, RobotMode.POWER_OFF, SafetyMode.NORMAL)

@@ -21,6 +21,7 @@ from tvist_server.setup import Setup, check_rating, paper_payload
 from tvist_server.ur_ports import Door, UrPorts
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+DEFAULT_NAME = "ur5e"
 _INSTEAD = {
     "name": "several robots are named after their files, leave name out",
     "robot": "put it into the list of robots",
@@ -35,7 +36,7 @@ class ConfigError(ValueError):
 class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What `tvist serve` can be told; every key is optional."""
 
-    name: RobotName = "ur5e"
+    name: RobotName = DEFAULT_NAME
     """Name on the network."""
     robot: str = "ur5e"
     """Robot that comes with the package, or path of a robot file."""
@@ -125,6 +126,18 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 f"ur_address is {self.ur_address}: several robots need an address of their own each"
             )
         return str(address), self.ur_ports.open()
+
+    def unlock_command(self, name: str) -> str:
+        """What to type on this machine to unlock a robot.
+
+        Args:
+            name: The robot's.
+        """
+        words = ["tvist unlock"]
+        if self.listen and self.listen[0] != DEFAULT_ENDPOINT:
+            words.append(self.listen[0].replace("0.0.0.0", "127.0.0.1"))  # noqa: S104  nothing listens by this
+        words += ["--name", name] if name != DEFAULT_NAME else []
+        return " ".join([*words, "--security", "FOLDER"] if self.security is not None else words)
 
     def setup(self) -> Setup:
         """The controller's start, of one robot.

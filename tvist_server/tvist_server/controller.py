@@ -5,6 +5,7 @@ It owns a `Session` (who may) and a `ControlCycle` (what moves), which do not kn
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Unpack
 
 import numpy as np

@@ -14,6 +14,7 @@ from tvist_server.clock import Clock, Lockstep, Realtime
 from tvist_server.config import ConfigError, ServeConfig
 from tvist_server.courier import Courier
 from tvist_server.fleet import recording_of
+from tvist_server.gateways.console import Console, ConsoleGateway
 from tvist_server.gateways.exposure import ExposureError, guarded, guarded_doors
 from tvist_server.gateways.network import Network
 from tvist_server.gateways.ur.doors import UrDoors
@@ -62,12 +63,15 @@ class Server:
                 self._network.gateway(robot.setup.name, robot, lockstep=lockstep, truth=robot.setup.truth)
                 for robot in self.robots
             ]
+            self._console = Console()
             # In real time the clock sees to it that messages are handed on; in lockstep each message does.
             for number, robot in enumerate(self.robots):
                 if config.ur:
                     self._doors.append(_doors(robot, config, number))
                 wake = self._couriers[number].wake if lockstep else None
-                robot.outlet.open([self._gateways[number], *self._doors[number : number + 1]], wake)
+                name = robot.setup.name
+                console = ConsoleGateway(self._console, name, config.unlock_command(name))
+                robot.outlet.open([self._gateways[number], *self._doors[number : number + 1], console], wake)
         except BaseException:  # a signal, too
             for doors in self._doors:
                 doors.close()
@@ -83,6 +87,7 @@ class Server:
         gc.collect()
         gc.freeze()
         sys.setswitchinterval(1e-4)
+        self._console.start()
         for courier in self._couriers:
             courier.start()
         for robot in self.robots:
@@ -111,6 +116,7 @@ class Server:
             courier.close()
         for doors in self._doors:
             doors.close()
+        self._console.close()
         with contextlib.suppress(Exception):
             self._network.close()
 
@@ -152,6 +158,7 @@ class Server:
         for number, (robot, clock) in enumerate(zip(self.robots, clocks, strict=True)):
             gateways = [self._gateways[number], *self._doors[number : number + 1]]
             robot.tell_telemetry(gateways, clock.punctuality(robot.driven))
+        self._console.update()
 
 
 def _on_signals(loop: asyncio.AbstractEventLoop) -> asyncio.Event:

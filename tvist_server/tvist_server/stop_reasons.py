@@ -5,10 +5,13 @@ from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.stream import Event
 
 _MAY_MOVE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
+_EMERGENCIES = frozenset({SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP})
+_LATCHED = frozenset({SafetyMode.VIOLATION, SafetyMode.FAULT})
+_KEEP_POWER = frozenset({SafetyMode.PROTECTIVE_STOP, SafetyMode.SAFEGUARD_STOP})
 
 
 class StopReasons:
-    """Remembers the event of each stop that holds, by the safety mode it led to."""
+    """Remembers the event of each stop that may still hold, by the safety mode that it is the reason of."""
 
     def __init__(self) -> None:
         self._events: dict[SafetyMode, Event] = {}
@@ -18,12 +21,12 @@ class StopReasons:
 
         Args:
             event: Of kind `protective_stop` or `safety_stop`.
-            mode: What the safety system allows from then on; NORMAL where only the power is gone.
+            mode: What the safety system allows now: the gravest of what holds, which another stop may have led to.
         """
-        if event.kind == "safety_stop" and mode is SafetyMode.PROTECTIVE_STOP:
-            mode = SafetyMode.SAFEGUARD_STOP  # which shows once the protective stop is unlocked
-        self._events.pop(mode, None)  # the newest is the last
-        self._events[mode] = event
+        cause = _cause(event, mode)
+        if cause is not None:
+            self._events.pop(cause, None)  # the newest is the last
+            self._events[cause] = event
 
     def update(self, robot: RobotMode, safety: SafetyMode) -> None:
         """Forget what is over: a robot that may move is stopped by nothing any more."""
@@ -42,10 +45,23 @@ class StopReasons:
         Returns:
             None where there is none, or no event told of it.
         """
+        event = None
         if safety not in _MAY_MOVE:
             event = self._events.get(safety)
-        elif robot is not RobotMode.RUNNING and self._events:
-            event = list(self._events.values())[-1]
-        else:
-            event = None
+        elif robot is not RobotMode.RUNNING:
+            took_power = [event for mode, event in self._events.items() if mode not in _KEEP_POWER]
+            event = took_power[-1] if took_power else None
         return None if event is None else StopReason(tick=event.tick, code=event.code, why=event.why or "")
+
+
+def _cause(event: Event, mode: SafetyMode) -> SafetyMode | None:
+    """The safety mode that an event is the reason of, NORMAL for a loss of power alone; None: it cannot be told."""
+    if event.kind == "protective_stop":
+        return SafetyMode.PROTECTIVE_STOP
+    if event.category == 2:
+        return SafetyMode.SAFEGUARD_STOP
+    if event.category == 1:
+        return mode if mode in _EMERGENCIES else None
+    if mode in _LATCHED:
+        return mode
+    return None if mode in _EMERGENCIES else SafetyMode.NORMAL

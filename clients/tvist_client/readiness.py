@@ -1,0 +1,92 @@
+"""Whether a robot is ready to be moved; if not, why, and what to do about it."""
+
+from enum import IntEnum
+
+from msgspec import Struct
+
+from tvist_client.robot import ENDPOINT, NAME, Robot
+from tvist_client.transports.certificates import Folder
+from tvist_protocol.info import Info, StopReason
+from tvist_protocol.modes import RobotMode, SafetyMode
+from tvist_protocol.stream import State
+
+_MAY_MOVE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
+"""Safety modes in which a robot that has its power moves."""
+_RELEASE = "release it (in simulation: simulation.inject with the fault normal)"
+_NEXT: dict[int, str] = {
+    SafetyMode.PROTECTIVE_STOP: "remove its cause, then run {unlock}",
+    SafetyMode.SAFEGUARD_STOP: f"{_RELEASE}, and the robot is ready again",
+    SafetyMode.SYSTEM_EMERGENCY_STOP: f"{_RELEASE}, then run {{unlock}} --power-on",
+    SafetyMode.ROBOT_EMERGENCY_STOP: f"{_RELEASE}, then run {{unlock}} --power-on",
+    SafetyMode.VIOLATION: "run {unlock} --power-on, which restarts the safety system",
+    SafetyMode.FAULT: "run {unlock} --power-on, which restarts the safety system",
+}
+_POWER = "run {unlock} --power-on"
+
+
+class Readiness(Struct, frozen=True):
+    """What keeps a robot from being moved, if anything does."""
+
+    ready: bool
+    """Whether it has its power, and its safety system allows motion."""
+    robot_mode: str | None
+    """By its RTDE name; null where the robot has not said, since it has not ticked yet."""
+    safety_mode: str | None
+    """Likewise."""
+    stop: StopReason | None
+    """The stop that keeps it from moving; null: there is none, or the robot does not say why."""
+    why: str
+    """A sentence; empty where it is ready."""
+    next: str
+    """What to do about it; empty where it is ready."""
+
+
+async def look(robot: Robot, unlock: str = "tvist unlock") -> Readiness:
+    """Ask a robot whether it is ready to be moved.
+
+    Args:
+        robot: The robot.
+        unlock: The command that unlocks it.
+    """
+    info, state = await robot.info(), None
+    if info.robot_mode is None and (info.clock == "realtime" or info.tick > 0):
+        state = await robot.state()
+    return readiness(info, state, unlock)
+
+
+def readiness(info: Info, state: State | None, unlock: str = "tvist unlock") -> Readiness:
+    """Judge by what the robot says of itself.
+
+    Args:
+        info: The robot now.
+        state: Its newest state, for a server whose `info` does not tell the modes; None: not needed, or there is none.
+        unlock: The command that unlocks this robot.
+    """
+    robot = info.robot_mode if info.robot_mode is not None or state is None else state.robot_mode
+    safety = info.safety_mode if info.safety_mode is not None or state is None else state.safety_mode
+    if robot is None or safety is None:
+        return Readiness(True, None, None, None, "", "")
+    robot_mode, safety_mode = _name(RobotMode, robot), _name(SafetyMode, safety)
+    if safety not in _MAY_MOVE:
+        stands, then = f"safety_mode is {safety_mode}", _NEXT.get(safety, "")
+    elif robot != RobotMode.RUNNING:
+        stands, then = f"robot_mode is {robot_mode}", _POWER
+    else:
+        return Readiness(True, robot_mode, safety_mode, None, "", "")
+    since = f" since tick {info.stop.tick}: {info.stop.why}" if info.stop is not None else ""
+    return Readiness(
+        False, robot_mode, safety_mode, info.stop, f"{stands}{since}", then.format(unlock=unlock)
+    )
+
+
+def unlock_command(endpoint: str, name: str, security: Folder | None) -> str:
+    """What to type to unlock a robot, without what is so by default."""
+    words = ["tvist unlock"]
+    words += [endpoint] if endpoint != ENDPOINT else []
+    words += ["--name", name] if name != NAME else []
+    words += ["--security", str(security)] if security is not None else []
+    return " ".join(words)
+
+
+def _name(kind: type[IntEnum], number: int) -> str:
+    return kind(number).name if number in {member.value for member in kind} else str(number)

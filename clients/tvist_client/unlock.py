@@ -1,0 +1,147 @@
+"""Make a robot that has stopped ready to be moved again, as far as a client can."""
+
+import asyncio
+
+import msgspec
+
+from tvist_client.arm import UNLOCKED_TICKS, Arm
+from tvist_client.errors import MisuseError, ProtectiveStopError
+from tvist_client.readiness import look, unlock_command
+from tvist_client.robot import ENDPOINT, NAME, Robot
+from tvist_client.transports.certificates import Folder
+from tvist_client.transports.zenoh import robots_at
+from tvist_protocol.info import StopReason
+from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+
+CLIENT = "tvist unlock"
+"""Who asks for control."""
+_WHAT_IT_FOUND: dict[str | None, str] = {
+    SafetyMode.VIOLATION.name: "had found a violation",
+    SafetyMode.FAULT.name: "had failed",
+}
+_ALLOW_POWER = {mode.name for mode in (SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.SAFEGUARD_STOP)}
+
+
+class Report(msgspec.Struct, frozen=True):
+    """What was done, and what remains."""
+
+    ok: bool
+    """Whether the robot is ready to be moved now."""
+    endpoint: str
+    robot: str
+    """Name of the robot."""
+    done: list[str]
+    """What was done, in order, as sentences without a subject; nothing where there was nothing to do."""
+    robot_mode: str | None
+    """After that, by its RTDE name."""
+    safety_mode: str | None
+    """Likewise."""
+    stop: StopReason | None
+    """The stop that keeps it from moving still, or again."""
+    why: str
+    """What remains, as a sentence; empty where the robot is ready."""
+    next: str
+    """What to do about it; empty where the robot is ready."""
+
+
+def unlock(
+    endpoint: str = ENDPOINT,
+    name: str | None = None,
+    *,
+    power_on: bool = False,
+    security: Folder | None = None,
+) -> Report:
+    """Take control, release what a client can release, and look whether it holds.
+
+    A robot that is ready already is left alone. In lockstep time passes by some hundred ticks.
+
+    Args:
+        endpoint: Where the server listens, `tcp/<host>:<port>`.
+        name: The robot's name; None: the only one there, or `ur5e`.
+        power_on: Switch the power on and release the brakes where the arm has none.
+        security: Folder with this client's certificate, for `tls/<host>:<port>`.
+
+    Raises:
+        NotConnectedError: Nobody listens there, or there is no such robot.
+        MisuseError: There are several robots, and none was named.
+        RefusedError: Another client has control.
+    """
+    return asyncio.run(_unlock(endpoint, name, security, power_on=power_on))
+
+
+async def make_ready(robot: Robot, arm: Arm, *, power_on: bool = False) -> list[str]:
+    """Restart the safety system, unlock a protective stop, switch the power on: what of it is needed and possible.
+
+    Args:
+        robot: The robot.
+        arm: Control of it.
+        power_on: Whether to switch the power on and to release the brakes.
+
+    Returns:
+        What was done, as sentences without a subject. Whether it holds `readiness.look` says.
+    """
+    done: list[str] = []
+    found = await look(robot)
+    if found.safety_mode in _WHAT_IT_FOUND:
+        await arm.restart_safety()
+        done.append(f"restarted the safety system, which {_WHAT_IT_FOUND[found.safety_mode]}")
+        found = await look(robot)
+    if found.safety_mode == SafetyMode.PROTECTIVE_STOP.name:
+        await _rest(robot)
+        done.append("unlocked the protective stop")
+        try:
+            await arm.unlock_protective_stop()
+            if await robot.clock() != "realtime":
+                await robot.advance(UNLOCKED_TICKS)
+        except ProtectiveStopError:
+            pass  # who looks sees why
+        found = await look(robot)
+        if found.safety_mode == SafetyMode.PROTECTIVE_STOP.name:
+            done.append("saw it stop again at once")
+    if power_on and found.safety_mode in _ALLOW_POWER and found.robot_mode != RobotMode.RUNNING.name:
+        await _rest(robot)
+        await arm.power_on()
+        done.append("switched the power on and released the brakes")
+        await robot.advance(UNLOCKED_TICKS)
+    return done
+
+
+async def _rest(robot: Robot) -> None:
+    """Wait until a stop has come to rest; before the first tick nothing moves."""
+    ticks = await robot.clock() == "realtime" or (await robot.info()).tick > 0
+    if ticks and (await robot.state()).runtime_state == RuntimeState.STOPPING:
+        await robot.rest()
+
+
+async def _unlock(endpoint: str, name: str | None, security: Folder | None, *, power_on: bool) -> Report:
+    name = name or await _only(endpoint, security)
+    command = unlock_command(endpoint, name, security)
+    async with await Robot.connect(endpoint, name, security=security) as robot:
+        found, done = await look(robot, command), list[str]()
+        if not found.ready:
+            async with robot.control(CLIENT) as arm:
+                done = await make_ready(robot, arm, power_on=power_on)
+            found = await look(robot, command)
+    return Report(
+        ok=found.ready,
+        endpoint=endpoint,
+        robot=name,
+        done=done,
+        robot_mode=found.robot_mode,
+        safety_mode=found.safety_mode,
+        stop=found.stop,
+        why=found.why,
+        next=found.next,
+    )
+
+
+async def _only(endpoint: str, security: Folder | None) -> str:
+    """Name of the robot that is meant where none is said."""
+    robots = await robots_at(endpoint, security)
+    if not robots or NAME in robots:
+        return NAME
+    if len(robots) > 1:
+        raise MisuseError(
+            f"there are {len(robots)} robots at {endpoint}, {', '.join(robots)}: name one of them"
+        )
+    return robots[0]
