@@ -12,7 +12,7 @@ from tvist_client.transports.certificates import Folder
 from tvist_client.transports.zenoh import robots_at
 from tvist_protocol.commands import MoveJ
 from tvist_protocol.errors import RefusedError, TvistError
-from tvist_protocol.info import StopReason
+from tvist_protocol.info import CalibrationInfo, StopReason
 from tvist_protocol.keys import check_robot_name
 from tvist_protocol.stream import State
 from tvist_protocol.values import PROTOCOL_VERSION
@@ -137,7 +137,8 @@ class _Check:
             raise UnexpectedReplyError(
                 f"the robot speaks protocol {info.protocol}, this client {PROTOCOL_VERSION}: update one"
             )
-        return f"{info.model}, {len(info.joints)} joints, clock {info.clock}, protocol {info.protocol}"
+        said = f"{info.model}, {len(info.joints)} joints, clock {info.clock}, protocol {info.protocol}"
+        return f"{said}{_doubt(info.calibration)}"
 
     async def state(self, robot: Robot) -> str:
         if await robot.clock() != "realtime":
@@ -170,7 +171,7 @@ class _Check:
         command = unlock_command(self.endpoint, str(self.name), self.security)
         found = self.readiness = await look(robot, command)
         if not found.ready:
-            raise NotReadyError(f"{found.why}. Next: {found.next}" if found.next else found.why)
+            raise NotReadyError(found.sentence)
         if found.robot_mode is None:
             return "as far as it says before its first tick"
         return f"robot_mode {found.robot_mode}, safety_mode {found.safety_mode}"
@@ -178,6 +179,16 @@ class _Check:
 
 class NotReadyError(ClientError):
     """The robot is there and works, and may not be moved."""
+
+
+def _doubt(calibration: CalibrationInfo | None) -> str:
+    """What a person should know of the calibration in use; empty where it is in order."""
+    if calibration is not None and calibration.fits_arm is False:
+        return f"; calibration {calibration.name!r} was measured on another arm: frequencies will be off"
+    if calibration is not None and not calibration.fits_payload:
+        mass = f"{calibration.payload_mass:g} kg"
+        return f"; calibration {calibration.name!r} was made with {mass}, not with what is declared"
+    return ""
 
 
 async def _rate(robot: Robot) -> float:

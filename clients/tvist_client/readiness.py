@@ -40,6 +40,11 @@ class Readiness(Struct, frozen=True):
     next: str
     """What to do about it; empty where it is ready."""
 
+    @property
+    def sentence(self) -> str:
+        """Both for a person, in one line."""
+        return f"{self.why}. Next: {self.next}" if self.next else self.why
+
 
 async def look(robot: Robot, unlock: str = "tvist unlock") -> Readiness:
     """Ask a robot whether it is ready to be moved.

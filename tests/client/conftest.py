@@ -50,6 +50,10 @@ class FakeRobot:
         self.holder = None
         self.motions = 0
         self.motion = None
+        self.modes = (7, 1)
+        """Robot mode and safety mode."""
+        self.told = {}
+        """Optional fields of `info`."""
         self.streaming = False
         self.setpoints = []
         self.commands = []
@@ -91,6 +95,7 @@ class FakeRobot:
                 shapers=["none", "zv"],
                 control=self.holder,
                 tick=self.tick,
+                **self.told,
             )
         )
 
@@ -178,8 +183,8 @@ class FakeRobot:
         return State(
             tick=self.tick if tick is None else tick,
             timestamp=self.tick * 0.002,
-            robot_mode=7,
-            safety_mode=1,
+            robot_mode=self.modes[0],
+            safety_mode=self.modes[1],
             runtime_state=2 if self.motion or self.streaming else 1,
             setpoint_sequence=self.setpoints[-1][1] if self.setpoints else None,
             missed_ticks=0,

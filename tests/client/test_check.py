@@ -7,6 +7,8 @@ import pytest
 from tvist_client.__main__ import main
 from tvist_client.check import check
 from tvist_protocol.codec import encode
+from tvist_protocol.info import StopReason
+from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.replies import Done, Refused
 
 
@@ -15,7 +17,7 @@ def test_a_robot_that_works_is_well_and_unchanged(realtime, endpoint):
     assert report.ok
     assert (report.robot, report.protocol) == ("ur5e", 1)
     assert report.state_rate_hz > 0.0
-    assert [finding.what for finding in report.findings] == ["connect", "info", "state", "refusal"]
+    assert [finding.what for finding in report.findings] == ["connect", "info", "state", "refusal", "ready"]
     assert {type(command).__name__ for command in realtime.robot.commands} == {"MoveJ"}
     assert realtime.robot.motions == 0
 
@@ -37,7 +39,7 @@ def test_a_person_reads_a_line_a_step(realtime, endpoint, capsys):
     assert main(["check", endpoint]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[:2] for line in lines] == [
-        ["ok", step] for step in ("connect", "info", "state", "refusal")
+        ["ok", step] for step in ("connect", "info", "state", "refusal", "ready")
     ]
 
 
@@ -88,3 +90,64 @@ def test_a_robot_that_stands_still_is_not_well(realtime, endpoint, monkeypatch):
     report = check(endpoint)
     assert not report.ok
     assert report.findings[-1].what == "state"
+
+
+STOPPED = StopReason(tick=12, code="limit_torque", why="torque of joint elbow is 171 N m")
+
+
+def test_a_robot_that_stands_is_not_ready_and_says_why_since_when_and_what_to_do(realtime, endpoint, capsys):
+    realtime.robot.told = {"robot_mode": 7, "safety_mode": 3, "stop": STOPPED}
+    report = check(endpoint)
+    assert (report.ok, report.ready, report.stop) == (False, False, STOPPED)
+    assert (report.robot_mode, report.safety_mode) == ("RUNNING", "PROTECTIVE_STOP")
+    said = report.findings[-1].said
+    assert "safety_mode is PROTECTIVE_STOP since tick 12: torque of joint elbow is 171 N m" in said
+    assert f"tvist unlock {endpoint}" in report.next
+    assert report.next in said
+    assert main(["check", endpoint, "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["stop"]["code"] == "limit_torque"
+
+
+@pytest.mark.parametrize("mode", sorted({*SafetyMode} - {SafetyMode.NORMAL, SafetyMode.REDUCED}))
+def test_only_normal_and_reduced_are_ready(realtime, endpoint, mode):
+    realtime.robot.modes = (RobotMode.RUNNING, mode)
+    report = check(endpoint)
+    assert (report.ok, report.safety_mode) == (False, mode.name)
+    realtime.robot.modes = (RobotMode.RUNNING, SafetyMode.REDUCED)
+    assert check(endpoint).ready
+
+
+@pytest.mark.parametrize("mode", [RobotMode.POWER_OFF, RobotMode.IDLE])
+def test_an_arm_without_power_or_with_its_brakes_closed_is_not_ready(realtime, endpoint, mode):
+    realtime.robot.modes = (mode, SafetyMode.NORMAL)
+    report = check(endpoint)
+    assert not report.ok
+    assert f"robot_mode is {mode.name}" in report.findings[-1].said
+    assert "--power-on" in report.next
+
+
+def test_a_mode_nobody_knows_is_not_ready(realtime, endpoint):
+    realtime.robot.modes = (RobotMode.RUNNING, 99)
+    assert "safety_mode is 99" in check(endpoint).findings[-1].said
+
+
+def test_before_the_first_tick_info_alone_says_it(lockstep, endpoint):
+    lockstep.robot.told = {"robot_mode": 3, "safety_mode": 1}
+    report = check(endpoint)
+    assert (report.ok, report.robot_mode) == (False, "POWER_OFF")
+
+
+def test_alive_looks_at_the_server_alone(realtime, endpoint, capsys):
+    realtime.robot.modes = (RobotMode.POWER_OFF, SafetyMode.VIOLATION)
+    assert main(["check", "--alive", endpoint]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[1] for line in lines] == ["connect", "info", "state"]
+    report = check(endpoint, alive=True)
+    assert (report.ok, report.ready) == (True, None)
+    assert realtime.robot.commands == []
+
+
+def test_a_robot_that_stands_still_is_not_alive(realtime, endpoint, monkeypatch):
+    monkeypatch.setattr("tvist_client.robot.STATE_S", 0.1)
+    monkeypatch.setattr(realtime.robot, "pass_tick", lambda: None)
+    assert not check(endpoint, alive=True).ok

@@ -1,13 +1,15 @@
 """The `tvist` program: one JSON object with `--json`, words for people without, one sentence when it goes wrong."""
 
 import json
+import re
 import signal
 import subprocess
 import sys
+from importlib import resources
 from pathlib import Path
 
 import pytest
-from tests.conformance.served import NOISE, PATIENCE, free_endpoint
+from tests.conformance.served import NOISE, PATIENCE, Served, free_endpoint
 from tests.conformance.wire import Wire
 
 HERE = "0.1,-3.1,0.1,-1.5,0.1,0.1"
@@ -97,7 +99,9 @@ class TestCheck:
 
     def test_people_get_a_line_for_each_thing_tried(self, realtime):
         said = tvist("check", realtime.endpoint).assert_done().out
-        assert [line.split()[1] for line in said.splitlines()] == ["connect", "info", "state", "refusal"]
+        assert [line.split()[1] for line in said.splitlines()] == [
+            "connect", "info", "state", "refusal", "ready",
+        ]  # fmt: skip
 
     def test_nobody_there_is_a_sentence(self):
         endpoint = free_endpoint()
@@ -111,6 +115,96 @@ class TestCheck:
     def test_a_machine_with_the_client_alone_can_check_too(self, realtime):
         ended = python("-m", "tvist_client", "check", realtime.endpoint, "--json")
         assert ended.assert_done().json["ok"] is True
+
+
+@pytest.fixture
+def overloaded():
+    """A robot in real time that declares and carries more than its drives can hold."""
+    with Served("--payload", "20", "--overload") as served:
+        served.wait_until_said("protective stop at tick")
+        yield served
+
+
+@pytest.fixture
+def stepped():
+    """A robot in lockstep of its own."""
+    with Served("--clock", "lockstep") as served:
+        yield served
+
+
+class TestARobotThatStands:
+    def test_a_payload_above_the_rating_does_not_start_and_says_how_to_insist(self):
+        ended = tvist("serve", "--payload", 20, "--listen", free_endpoint())
+        ended.assert_failed(2, "20 kg", "rating of 5 kg", "--overload")
+
+    def test_its_console_says_why_and_what_to_do(self, overloaded):
+        (line,) = [line for line in overloaded.lines if "protective stop" in line]
+        assert line.startswith("ur5e: protective stop at tick 6: torque of joint")
+        assert f"tvist unlock {overloaded.endpoint}" in line
+
+    def test_check_is_readiness_and_with_alive_liveness(self, overloaded):
+        ended = tvist("check", overloaded.endpoint)
+        ended.assert_failed(1, "not ready", "PROTECTIVE_STOP since tick 6", "torque of joint", "tvist unlock")
+        said = tvist("check", overloaded.endpoint, "--json").assert_failed(1, "not ready").json
+        assert (said["ok"], said["ready"], said["stop"]["code"]) == (False, False, "limit_torque")
+        assert said["state_rate_hz"] > 0.0
+        tvist("check", "--alive", overloaded.endpoint).assert_done()
+        python("-m", "tvist_client", "check", "--alive", overloaded.endpoint).assert_done()
+        assert python("-m", "tvist_client", "check", overloaded.endpoint).code == 1
+
+    def test_an_unlock_that_does_not_hold_says_why_again(self, overloaded):
+        ended = tvist("unlock", overloaded.endpoint)
+        ended.assert_failed(1, "not ready", "torque of joint")
+        assert ended.out.splitlines() == ["unlocked the protective stop", "saw it stop again at once"]
+        (tick,) = re.findall(r"since tick (\d+)", ended.err)
+        assert int(tick) > 6
+        overloaded.wait_until_said(f"protective stop at tick {tick}: ")
+
+    def test_watch_and_move_say_why(self, overloaded):
+        said = tvist("watch", overloaded.endpoint, "--seconds", 1).assert_done().out
+        assert "safety_mode PROTECTIVE_STOP" in said
+        assert "torque of joint" in said
+        tvist("move", "Q2", "--endpoint", overloaded.endpoint).assert_failed(1, "not ready", "tvist unlock")
+
+    def test_unlock_makes_it_ready_and_says_what_it_did(self, stepped):
+        with Wire(stepped.endpoint) as wire, wire.control() as token:
+            wire.command("simulation.inject", token=token, fault="protective_stop")
+            wire.step(token, 5)
+        tvist("check", stepped.endpoint).assert_failed(1, "injected")
+        assert tvist("unlock", stepped.endpoint).assert_done().out.splitlines() == [
+            "unlocked the protective stop",
+            "ur5e is ready to be moved",
+        ]
+        tvist("check", stepped.endpoint).assert_done()
+        assert tvist("unlock", stepped.endpoint, "--json").assert_done().json["done"] == []
+
+    def test_unlock_says_what_remains_and_offers_the_power(self, stepped):
+        with Wire(stepped.endpoint) as wire, wire.control() as token:
+            for fault in ("violation", "safeguard_stop"):
+                wire.command("simulation.inject", token=token, fault=fault)
+            wire.step(token, 5)
+        ended = tvist("unlock", stepped.endpoint)
+        ended.assert_failed(1, "SAFEGUARD_STOP", "a safeguard asked for a stop", "release it")
+        assert "restarted the safety system" in ended.out
+        with Wire(stepped.endpoint) as wire, wire.control() as token:
+            wire.command("simulation.inject", token=token, fault="normal")
+        tvist("unlock", stepped.endpoint).assert_failed(1, "POWER_OFF", "--power-on")
+        said = tvist("unlock", stepped.endpoint, "--power-on", "--json").assert_done().json
+        assert (said["ok"], said["robot_mode"]) == (True, "RUNNING")
+
+    def test_the_only_robot_is_found_and_of_several_one_has_to_be_named(self):
+        with Served(name="left") as served:
+            assert "left is ready" in tvist("unlock", served.endpoint).assert_done().out
+        with Served("--robots", "ur5e*2", name=None) as served:
+            tvist("unlock", served.endpoint).assert_failed(1, "ur5e-1, ur5e-2", "name one")
+            assert "ur5e-2" in tvist("unlock", served.endpoint, "--name", "ur5e-2").assert_done().out
+
+    def test_a_softer_arm_with_the_shipped_calibration_is_a_line_at_the_start(self, tmp_path):
+        text = (resources.files("tvist_plant") / "robots" / "ur5e.toml").read_text(encoding="utf-8")
+        (tmp_path / "soft.toml").write_text(text.replace("27500.0", "9000.0"), encoding="utf-8")
+        with Served("--robot", str(tmp_path / "soft.toml")) as served:
+            served.wait_until_said("measured on another arm")
+            assert "measured on another arm" in tvist("check", served.endpoint).assert_done().out
 
 
 class TestRecordAndAnalyze:
@@ -223,7 +317,13 @@ def test_misuse_is_exit_code_2_and_a_sentence_that_names_it(arguments, named):
 
 @pytest.mark.parametrize(
     "arguments",
-    [("move", "Q2", "--endpoint"), ("record", "never.mcap", "--endpoint"), ("watch",), ("identify",)],
+    [
+        ("move", "Q2", "--endpoint"),
+        ("record", "never.mcap", "--endpoint"),
+        ("watch",),
+        ("identify",),
+        ("unlock",),
+    ],
 )
 def test_nobody_there_is_exit_code_1_and_a_sentence(arguments, tmp_path):
     endpoint = free_endpoint()

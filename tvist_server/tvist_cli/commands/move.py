@@ -32,6 +32,7 @@ def move(
         shaper: Shaper to choose first.
         json: Print one JSON object.
     """
+    from tvist_client.readiness import look, unlock_command
     from tvist_client.robot import Robot
     from tvist_lab.paper.published import published
 
@@ -45,14 +46,15 @@ def move(
         ) from None
 
     async def run() -> tuple[int, int]:
-        async with (
-            await Robot.connect(endpoint, name, security=security) as robot,
-            robot.control("tvist move") as arm,
-        ):
-            if shaper is not None:
-                await arm.set_shaper(shaper)
-            motion = await arm.move_j(q, velocity=velocity, acceleration=acceleration, jerk=jerk)
-            return motion.started or 0, motion.done or 0
+        async with await Robot.connect(endpoint, name, security=security) as robot:
+            found = await look(robot, unlock_command(endpoint, name, security))
+            if not found.ready:
+                raise Failure(f"{name} is not ready: {found.sentence}")
+            async with robot.control("tvist move") as arm:
+                if shaper is not None:
+                    await arm.set_shaper(shaper)
+                motion = await arm.move_j(q, velocity=velocity, acceleration=acceleration, jerk=jerk)
+                return motion.started or 0, motion.done or 0
 
     with told():
         started, done = asyncio.run(run())

@@ -14,6 +14,7 @@ from tvist_cli.failure import told
 from tvist_cli.output import out, print_json
 
 if TYPE_CHECKING:
+    from tvist_client.robot import Robot
     from tvist_protocol.stream import Event, State
 
 
@@ -25,7 +26,9 @@ def watch(
     seconds: float | None = None,
     json: bool = False,
 ) -> None:
-    """Show joints, tool accelerometer, estimates and events of a served robot until Control+C.
+    """Show modes, joints, tool accelerometer, estimates and events of a served robot until Control+C.
+
+    Where the robot stands, the second line says why, even if it stopped before.
 
     Args:
         endpoint: Zenoh endpoint of the robot.
@@ -34,18 +37,22 @@ def watch(
         seconds: End by itself after this time.
         json: Print each event, and the state ten times a second, as a JSON object a line.
     """
+    from tvist_client.readiness import unlock_command
     from tvist_client.robot import Robot
+
+    command = unlock_command(endpoint, name, security)
 
     async def run() -> None:
         async with await Robot.connect(endpoint, name, security=security) as robot:
             events: list[Event] = []
             robot.on_event(events.append)
+            standing = _Standing(robot, command)
             if json:
                 robot.on_event(print_json)
             with contextlib.nullcontext() if json else Live(console=out, refresh_per_second=10) as live:
                 async for state in robot.states(buffer=1):
                     if live is not None:
-                        live.update(_screen(state, events[-5:]))
+                        live.update(_screen(state, events[-5:], await standing.line(state)))
                     else:
                         print_json(state)
                     await asyncio.sleep(0.1)
@@ -54,7 +61,38 @@ def watch(
         asyncio.run(asyncio.wait_for(run(), seconds))
 
 
-def _screen(state: "State", events: "list[Event]") -> Group:
+class _Standing:
+    """Whether the robot may be moved, and why not: asked again where its modes or its events have changed."""
+
+    def __init__(self, robot: "Robot", unlock: str) -> None:
+        self._robot, self._unlock = robot, unlock
+        self._modes: tuple[int, int] | None = None
+        self._line = Text()
+        robot.on_event(self._on_event)
+
+    async def line(self, state: "State") -> Text:
+        """A line for the screen.
+
+        Args:
+            state: The newest.
+        """
+        modes = (state.robot_mode, state.safety_mode)
+        if modes != self._modes:
+            from tvist_client.readiness import look
+
+            self._modes = modes  # first, since an event may come meanwhile
+            found = await look(self._robot, self._unlock)
+            self._line = Text(f"robot_mode {found.robot_mode}   safety_mode {found.safety_mode}")
+            if not found.ready:
+                self._line.append(f"\n{found.sentence}", style="bold red")
+        return self._line
+
+    def _on_event(self, event: "Event") -> None:
+        if event.kind in {"protective_stop", "safety_stop"}:
+            self._modes = None
+
+
+def _screen(state: "State", events: "list[Event]", standing: Text) -> Group:
     joints = Table(show_edge=False, pad_edge=False)
     for column in ("joint", "reference rad", "target rad", "actual rad", "target rad/s²", "moment N m"):
         joints.add_column(column, justify="right")
@@ -70,6 +108,7 @@ def _screen(state: "State", events: "list[Event]") -> Group:
         f"{f:.2f} Hz ζ {d:.3f}" for f, d in zip(state.estimated_f_d, state.estimated_zeta, strict=True)
     )
     return Group(
+        standing,
         Text(
             f"tick {state.tick}   {state.timestamp:.3f} s   missed {state.missed_ticks}   estimated {estimates}"
         ),

@@ -1,0 +1,90 @@
+"""What `tvist unlock` does to a robot that has stopped, on a real controller in process."""
+
+import pytest
+
+from tvist_client import LoopbackTransport, Robot
+from tvist_client.readiness import look
+from tvist_client.unlock import make_ready
+from tvist_lab.in_process import free_setup
+from tvist_server.gateways.loopback import LoopbackHost
+
+
+@pytest.fixture
+async def robot():
+    async with Robot.over(LoopbackTransport(LoopbackHost(free_setup()))) as robot:
+        yield robot
+
+
+async def stopped(robot, arm, *faults, ticks=500):
+    for fault in faults:
+        await arm.inject(fault)
+    await robot.advance(ticks)
+    assert not (await look(robot)).ready
+
+
+async def test_a_protective_stop_is_unlocked(robot):
+    async with robot.control("me") as arm:
+        await stopped(robot, arm, "protective_stop")
+        assert await make_ready(robot, arm) == ["unlocked the protective stop"]
+        assert (await look(robot)).ready
+
+
+async def test_a_stop_that_is_still_on_its_way_is_waited_for(robot):
+    async with robot.control("me") as arm:
+        await arm.move_j([1.0, -3.0, 0.0, -1.57, 0.0, 0.0], wait=False)
+        await robot.advance(300)
+        await stopped(robot, arm, "protective_stop", ticks=2)
+        await make_ready(robot, arm)
+        assert (await look(robot)).ready
+
+
+async def test_an_arm_that_carries_too_much_stops_again_and_that_is_said(robot):
+    async with robot.control("me") as arm:
+        await arm.reset(payload=free_setup(payload=20.0, overload=True).payload)
+        await stopped(robot, arm)
+        assert await make_ready(robot, arm) == ["unlocked the protective stop", "saw it stop again at once"]
+        found = await look(robot)
+        assert found.stop.code == "limit_torque"
+        assert "torque of joint" in found.why
+        assert "tvist unlock" in found.next
+
+
+@pytest.mark.parametrize(("fault", "found"), [("violation", "found a violation"), ("fault", "had failed")])
+async def test_the_safety_system_is_restarted_and_the_power_is_offered(robot, fault, found):
+    async with robot.control("me") as arm:
+        await stopped(robot, arm, fault)
+        (done,) = await make_ready(robot, arm)
+        assert found in done
+        left = await look(robot)
+        assert left.robot_mode == "POWER_OFF"
+        assert "tvist unlock --power-on" in left.next
+        assert len(await make_ready(robot, arm, power_on=True)) == 1
+        assert (await look(robot)).ready
+
+
+@pytest.mark.parametrize(
+    ("fault", "mode"),
+    [("safeguard_stop", "SAFEGUARD_STOP"), ("emergency_stop", "ROBOT_EMERGENCY_STOP")],
+)
+async def test_what_is_not_a_clients_to_release_remains_and_is_said(robot, fault, mode):
+    async with robot.control("me") as arm:
+        await stopped(robot, arm, fault)
+        assert await make_ready(robot, arm, power_on=True) == []
+        found = await look(robot)
+        assert (found.ready, found.safety_mode) == (False, mode)
+        assert "release it" in found.next
+
+
+async def test_behind_a_protective_stop_the_safeguard_remains(robot):
+    async with robot.control("me") as arm:
+        await stopped(robot, arm, "protective_stop", "safeguard_stop")
+        assert await make_ready(robot, arm) == ["unlocked the protective stop"]
+        assert (await look(robot)).safety_mode == "SAFEGUARD_STOP"
+
+
+async def test_a_motion_that_a_safeguard_has_paused_is_not_waited_for(robot):
+    async with robot.control("me") as arm:
+        await arm.move_j([1.0, -3.0, 0.0, -1.57, 0.0, 0.0], wait=False)
+        await robot.advance(300)
+        await stopped(robot, arm, "safeguard_stop")
+        assert await make_ready(robot, arm) == []
