@@ -124,11 +124,22 @@ def test_it_is_nobody_with_no_rights_and_nothing_to_write_to(engine, robot):
         assert "Read-only file system" in touched.stderr
 
 
-def test_the_health_check_runs_and_is_tvist_check(engine, robot):
-    assert engine.inspect("tvist", "image")["Healthcheck"]["Test"] == ["CMD", "tvist", "check"]
+def test_the_health_check_runs_and_is_liveness(engine, robot):
+    assert engine.inspect("tvist", "image")["Healthcheck"]["Test"] == ["CMD", "tvist", "check", "--alive"]
     assert engine.run("podman", "healthcheck", "run", robot.name).returncode == 0
     (entry, *_) = engine.inspect(robot.name)["State"]["Health"]["Log"]
     assert entry["ExitCode"] == 0
+
+
+def test_a_robot_that_has_stopped_is_healthy_and_not_ready(engine):
+    with Contained(engine) as robot:
+        with Wire(robot.endpoint) as wire, wire.control() as token:
+            wire.command("simulation.inject", token=token, fault="protective_stop")
+        assert engine.run("podman", "healthcheck", "run", robot.name).returncode == 0
+        ready = engine.run("podman", "exec", robot.name, "tvist", "check", check=False)
+        assert (ready.returncode, "PROTECTIVE_STOP" in ready.stderr) == (1, True)
+        assert "ready to be moved" in engine("exec", robot.name, "tvist", "unlock")
+        assert engine.run("podman", "exec", robot.name, "tvist", "check").returncode == 0
 
 
 def test_states_leave_it_across_a_bridge_for_a_minute_in_order(robot, measured):
@@ -204,7 +215,7 @@ def test_with_keys_mounted_it_shows_itself_to_who_has_one_and_to_nobody_else(eng
         os.chown(path, 10001, 10001)
     options = (
         f"--volume={keys}:/security:ro",
-        "--health-cmd=tvist check tls/127.0.0.1:7447 --security /security/health",
+        "--health-cmd=tvist check --alive tls/127.0.0.1:7447 --security /security/health",
     )
     command = ("serve", "--listen", "tls/0.0.0.0:7447", "--security", "/security")
     with Contained(engine, *options, command=command) as robot:

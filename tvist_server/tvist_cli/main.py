@@ -7,8 +7,8 @@ import sys
 COMMANDS = {
     "serve": "Run a robot on the network.",
     "demo": "See it work: the paper's motions in real time, with figures.",
-    "check": "Is a robot there, and ready to be moved?",
-    "unlock": "Make a robot that has stopped ready again.",
+    "check": "Is a robot there, and ready to be moved? Exit code 0 if so.",
+    "unlock": "Make a robot that has stopped ready again; exit code 0 if it is then.",
     "move": "Move a served robot to a pose.",
     "watch": "See live what a served robot does.",
     "record": "Record a served robot as MCAP.",

@@ -35,7 +35,7 @@ def check(
     else:
         for finding in report.findings:
             if finding.ok:
-                out.print(f"ok  {finding.what:<8} {finding.said}")
+                out.print(f"ok  {finding.what:<8} {finding.said}", soft_wrap=True, markup=False)
     for finding in report.findings:
         if not finding.ok:
             what = "the robot is not ready" if finding.what == "ready" else f"{finding.what} failed"
