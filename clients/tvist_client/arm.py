@@ -190,18 +190,24 @@ class Arm:
         Raises:
             ProtectiveStopError: The robot stopped again meanwhile: what made it stop is still there.
         """
-        again: list[Event] = []
+        unlock = UnlockProtectiveStop(token=self.token)
+        if await self.robot.clock() != "realtime":
+            await self.robot.request(unlock)
+            return
+        stops: list[Event] = []
         forget = self.robot.on_event(
-            lambda event: again.append(event) if event.kind == "protective_stop" else None
+            lambda event: stops.append(event) if event.kind == "protective_stop" else None
         )
         try:
-            await self.robot.request(UnlockProtectiveStop(token=self.token))
-            if await self.robot.clock() == "realtime":
-                await self.robot.advance(UNLOCKED_TICKS)
+            # The event of the stop that is unlocked may still be on its way; it is of the next tick at the latest.
+            before = (await self.robot.info()).tick + 1
+            await self.robot.request(unlock)
+            await self.robot.advance(UNLOCKED_TICKS)
         finally:
             forget()
-        if again:
-            raise ProtectiveStopError(again[0])
+        for event in stops:
+            if event.tick > before:
+                raise ProtectiveStopError(event)
 
     async def restart_safety(self) -> None:
         """Restart the safety system after a violation or a fault; the arm is without power then."""
