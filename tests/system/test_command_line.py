@@ -12,6 +12,9 @@ import pytest
 from tests.conformance.served import NOISE, PATIENCE, Served, free_endpoint
 from tests.conformance.wire import Wire
 
+from tvist_plant.description import load
+from tvist_plant.fingerprint import fingerprint
+
 HERE = "0.1,-3.1,0.1,-1.5,0.1,0.1"
 
 
@@ -347,6 +350,7 @@ def test_identify_reports_how_good_the_calibration_is_and_serve_takes_it(tmp_pat
     content = json.loads(path.read_text(encoding="utf-8"))
     assert content["name"] == "mine"
     assert content["provenance"]["seed"] == 0
+    assert content["provenance"]["arm"] == fingerprint(load("ur5e"))
 
 
 @pytest.mark.nightly

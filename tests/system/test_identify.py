@@ -5,6 +5,8 @@ import json
 import pytest
 from tests.system.test_command_line import tvist
 
+from tvist_plant.description import load
+from tvist_plant.fingerprint import fingerprint
 from tvist_protocol.calibration import calibration_from_json
 
 KEYS = {"configurations", "ring_downs", "error_f_d_percent", "error_zeta_percent"}
@@ -18,6 +20,7 @@ KEYS = {"configurations", "ring_downs", "error_f_d_percent", "error_zeta_percent
         (("--model", "modal", "--payloads", "heavy"), "payloads"),
         (("--model", "modal", "--payloads", "2,2"), "payloads"),
         (("--payload", "heavy"), "payload"),
+        (("--payload", "20"), "rating of 5 kg"),
         (("--description", "nope"), "nope"),
         (("--output", "nowhere/mine.json"), "output"),
     ],
@@ -53,6 +56,7 @@ def test_a_few_ring_downs_make_a_calibration(tmp_path):
     assert calibration.provenance.command == (
         "tvist identify --model modal --ring-downs 5 --seed 0 --payloads 0,5"
     )
+    assert calibration.provenance.arm == fingerprint(load("ur5e"))
 
 
 @pytest.mark.nightly
