@@ -171,14 +171,10 @@ class _Check:
         command = unlock_command(self.endpoint, str(self.name), self.security)
         found = self.readiness = await look(robot, command)
         if not found.ready:
-            raise NotReadyError(found.sentence)
+            raise ClientError(found.sentence)
         if found.robot_mode is None:
             return "as far as it says before its first tick"
         return f"robot_mode {found.robot_mode}, safety_mode {found.safety_mode}"
-
-
-class NotReadyError(ClientError):
-    """The robot is there and works, and may not be moved."""
 
 
 def _doubt(calibration: CalibrationInfo | None) -> str:

@@ -142,6 +142,6 @@ async def _only(endpoint: str, security: Folder | None) -> str:
         return NAME
     if len(robots) > 1:
         raise MisuseError(
-            f"there are {len(robots)} robots at {endpoint}, {', '.join(robots)}: name one of them"
+            f"there are {len(robots)} robots at {endpoint}, {', '.join(robots)}: say which one with --name"
         )
     return robots[0]

@@ -199,7 +199,7 @@ class TestARobotThatStands:
         with Served(name="left") as served:
             assert "left is ready" in tvist("unlock", served.endpoint).assert_done().out
         with Served("--robots", "ur5e*2", name=None) as served:
-            tvist("unlock", served.endpoint).assert_failed(1, "ur5e-1, ur5e-2", "name one")
+            tvist("unlock", served.endpoint).assert_failed(1, "ur5e-1, ur5e-2", "--name")
             assert "ur5e-2" in tvist("unlock", served.endpoint, "--name", "ur5e-2").assert_done().out
 
     def test_a_softer_arm_with_the_shipped_calibration_is_a_line_at_the_start(self, tmp_path):
