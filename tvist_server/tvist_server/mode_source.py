@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 from tvist_plant.description import RobotDescription
@@ -37,7 +38,7 @@ class ModeSource:
         """Whether another payload makes other modes."""
         return self.name == "modal"
 
-    @property
+    @cached_property
     def fits_arm(self) -> bool | None:
         """Whether the calibration was measured on the arm that the robot file describes; None: it does not say."""
         measured = None if self.calibration is None else self.calibration.provenance.arm

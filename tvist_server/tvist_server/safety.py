@@ -18,6 +18,9 @@ again without damping. A stop bypasses the filter, so its change is sudden."""
 GENTLEST_STOP = 1.0
 """Deceleration below which no stop goes: neither for torque, nor because a client wants it [rad/s^2]."""
 
+MOMENTS = 32
+"""Of a stop at which its torque is looked at."""
+_SPREAD = [8 * row + column for column in range(1, 9) for row in range(4)]
 LOOK_EVERY = 4
 """Ticks between two looks at the torque of references that are known."""
 REDUCED_SHARE = 0.25
@@ -77,25 +80,34 @@ class StopTorque:
         """Whether a stop keeps to it.
 
         The very start is what the motion already asks for: only what follows is the stop's own doing. Thirty-two
-        moments, since torque peaks where a joint's ramp ends; widely spread ones first, which soon show an excess.
+        moments, since torque peaks where a joint's ramp ends: that of the whole stop is looked at first, then some
+        that are widely spread, which soon show an excess.
 
         Args:
             stop: The stop.
             rebound: Whether the limits themselves must hold for what the flexible arm swings beyond the rigid one, at
                 both ends of the stop.
         """
-        times = np.linspace(0.0, stop.duration, 33)[1:].reshape(4, 8).T.ravel()
-        return all(self._holds(*stop.at(time), rebound=rebound) for time in times.tolist())
+        ramp = stop.acceleration / stop.jerk
+        ends = min(math.ceil(ramp / stop.duration * MOMENTS), MOMENTS) if stop.duration > 0.0 else MOMENTS
+        first = [ends, *(moment for moment in _SPREAD if moment != ends)]
+        looks = (first[:1], first[1:4], first[4:])
+        return all(
+            self._holds(stop, np.array(look) / MOMENTS * stop.duration, rebound=rebound) for look in looks
+        )
 
-    def _holds(self, q: Floats, qd: Floats, qdd: Floats, *, rebound: bool) -> bool:
+    def _holds(self, stop: Stop | LineStop, times: Floats, *, rebound: bool) -> bool:
         dynamics = self._dynamics
-        torque = dynamics.torque(q, qd, qdd)
-        effort = dynamics.effort(q, qd, qdd) if dynamics.changing else np.abs(torque)
+        q, qd, qdd = stop.states(times)
+        torque = dynamics.torques(q, qd, qdd)
+        effort = np.abs(torque)
+        if dynamics.changing:
+            effort = np.array([dynamics.effort(*state) for state in zip(q, qd, qdd, strict=True)])
         if (effort > self._share).any():
             return False
         if not rebound:
             return True
-        gravity = dynamics.gravity(q)
+        gravity = dynamics.gravities(q)
         motion = torque - gravity
         begun = np.abs(torque + REBOUND * (motion - self._before))
         ended = np.abs(gravity - REBOUND * motion)

@@ -1,9 +1,10 @@
 """How to come to rest: what decision 13 calls a permitted stop, and the quickest of them."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from tvist_server.control.differentiator import Floats, Target
 from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.safety import GENTLEST_STOP, StopTorque, torque_along
 from tvist_server.trajectory import Line, LineStop, Stop
+
+S = TypeVar("S", Stop, LineStop)
 
 STEP = 0.8
 """From one deceleration that is tried to the next [-]."""
@@ -137,14 +140,10 @@ class StopPlanner:
             None where there is none.
         """
         torque = StopTorque(self._dynamics, state, self._torque)
-        stops = [self.stop(state, acceleration) for acceleration in self._ladder(wanted)]
-        stops = [stop for stop in stops if (np.abs(stop.end) <= self._position).all()]
+        stops = (self.stop(state, acceleration) for acceleration in self._ladder(wanted))
+        within = (stop for stop in stops if (np.abs(stop.end) <= self._position).all())
         fits = cache(clear)
-        for rebound in (True, False):
-            for stop in stops:
-                if torque.holds(stop, rebound=rebound) and fits(stop):
-                    return stop
-        return None
+        return _first(within, lambda stop, rebound: torque.holds(stop, rebound=rebound) and fits(stop))
 
     def stop(self, state: Target, acceleration: float) -> Stop:
         """A stop of every joint by itself within an acceleration [rad/s^2], whatever it asks for."""
@@ -162,19 +161,14 @@ class StopPlanner:
         permitted: Callable[[LineStop], bool],
     ) -> LineStop | None:
         torque = StopTorque(self._dynamics, state, self._torque, asked)
-        stops = [
+        stops = (
             LineStop(
                 newest, newest - state.q, state.qdd, line.direction,
                 acceleration=acceleration, jerk=self.jerk, period=self.period,
             )
             for acceleration in self._ladder(wanted)
-        ]  # fmt: skip
-        stops = [stop for stop in stops if permitted(stop)]
-        for rebound in (True, False):
-            for stop in stops:
-                if torque.holds(stop, rebound=rebound):
-                    return stop
-        return None
+        )  # fmt: skip
+        return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
 
     def _ladder(self, wanted: float | None) -> Iterator[float]:
         """Decelerations in the order in which they are tried: down from the wanted one, then up from it."""
@@ -190,3 +184,13 @@ class StopPlanner:
             up /= STEP
         if first < self.highest:
             yield self.highest
+
+
+def _first(stops: Iterable[S], holds: Callable[[S, bool], bool]) -> S | None:
+    """The first stop that holds counting the rebound, else the first that holds without; each is made once."""
+    made = []
+    for stop in stops:
+        if holds(stop, True):
+            return stop
+        made.append(stop)
+    return next((stop for stop in made if holds(stop, False)), None)

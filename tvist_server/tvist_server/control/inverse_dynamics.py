@@ -80,6 +80,20 @@ class InverseDynamics:
         """τ = M(q) q̈ + C(q, q̇) q̇ + g(q), shape (n,) [N m]."""
         return np.array(pin.rnea(self._model, self._data, q, qd, qdd))
 
+    def torques(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
+        """The same for k states of motion, each argument of shape (k, n): shape (k, n) [N m]."""
+        found = np.empty_like(q)
+        for number in range(len(q)):
+            found[number] = pin.rnea(self._model, self._data, q[number], qd[number], qdd[number])
+        return found
+
+    def gravities(self, q: Floats) -> Floats:
+        """g(q) at k postures, shape (k, n) [N m]."""
+        found = np.empty_like(q)
+        for number in range(len(q)):
+            found[number] = pin.computeGeneralizedGravity(self._model, self._data, q[number])
+        return found
+
     def gravity(self, q: Floats) -> Floats:
         """g(q), shape (n,) [N m]."""
         return np.array(pin.computeGeneralizedGravity(self._model, self._data, q))

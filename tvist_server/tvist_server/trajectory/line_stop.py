@@ -83,6 +83,15 @@ class LineStop(Trajectory):
         along = self._direction
         return self._origin + position[0] * along, velocity[0] * along, acceleration[0] * along
 
+    def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
+        """As `at` at k moments, shape (k,) [s]; each of shape (k, n)."""
+        duration, at_time, along = self.duration, self._trajectory.at_time, self._direction
+        states = [at_time(min(time, duration)) for time in times.tolist()]
+        position, velocity, acceleration = (
+            np.array([state[order][0] for state in states])[:, None] * along for order in range(3)
+        )
+        return self._origin + position, velocity, acceleration
+
     def next(self) -> Floats:
         """Position one tick further."""
         self._ticks += 1

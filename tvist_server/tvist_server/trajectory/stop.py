@@ -48,6 +48,15 @@ class Stop(Trajectory):
         position, velocity, acceleration = self._trajectory.at_time(min(time, self.duration))[:3]
         return np.array(position), np.array(velocity), np.array(acceleration)
 
+    def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
+        """As `at` at k moments, shape (k,) [s]; each of shape (k, n)."""
+        duration, at_time = self.duration, self._trajectory.at_time
+        states = [at_time(min(time, duration)) for time in times.tolist()]
+        position, velocity, acceleration = (
+            np.array([state[order] for state in states]) for order in range(3)
+        )
+        return position, velocity, acceleration
+
     @property
     def end(self) -> Floats:
         """Where it rests, shape (n,) [rad]."""
