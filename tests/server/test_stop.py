@@ -8,7 +8,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted
 from tvist_server.trajectory import DoubleS, Limits, LineStop, Stop
 
-from .robots import PAPER, Q1, Q2, Q3, ROUNDING, UR5E, H, Robot, cycle, stop, without_arm
+from .robots import PAPER, Q1, Q2, Q3, ROUNDING, UR5E, H, Robot, calibration, cycle, stop, without_arm
 
 
 def run(line, ticks):
@@ -243,3 +243,17 @@ def test_a_stop_is_not_ahead_of_a_motion_that_negative_impulses_let_turn_back(na
             stopped.append(robot.controller.cycle.position[0])
         assert (np.array(stopped) - free).max() <= 1e-9, moment
     assert moment > 20
+
+
+@pytest.mark.parametrize("shaper", ["none", "zv", "ei3", "auto", "auto-target", "short"])
+@pytest.mark.parametrize("deceleration", [None, 1.0])
+def test_a_move_that_has_barely_begun_stands_as_soon_as_it_is_stopped(shaper, deceleration):
+    for ticks in range(12):
+        robot = Robot(shaper=shaper, calibration=calibration())
+        robot.send(c.MoveJ, q=tuple(Q3.tolist()))
+        robot.tick(ticks)
+        before = robot.controller.cycle.position
+        robot.send(c.Stop, deceleration=deceleration)
+        stopped = robot.controller.tick_number
+        assert robot.until_rest().tick - stopped <= 25
+        assert np.abs(robot.controller.cycle.position - before).max() < 1e-3

@@ -15,6 +15,8 @@ from tvist_shaping.base import Filter
 
 EVEN = 1e-12
 """Differences of steps below this are rounding [rad]."""
+SOON_OVER = 16
+"""Ticks in which a motion that has barely begun can be stopped."""
 MOST_AHEAD = 4000
 """Ticks that a motion is run ahead at most to see how it will end."""
 
@@ -53,6 +55,13 @@ class Outlook:
         if tvist is not None and not stopping:
             line_filter.use(tvist.fork())
         return run_ahead(trajectory, None if stopping else line_filter, differentiator)
+
+    def _next(self, ticks: int) -> Floats:
+        """The two shaped references played last and those of the next ticks, shape (ticks + 2, n) [rad]."""
+        trajectory, line_filter, differentiator = self._cycle.fork()
+        ahead = [differentiator.published.q, differentiator.position]
+        ahead += [line_filter.filter(trajectory.next()) for _ in range(ticks)]
+        return np.array(ahead)
 
     def stop(self, deceleration: float | None) -> StopPlan | None:
         """Come to rest as soon as is permitted.
@@ -106,6 +115,9 @@ class Outlook:
         cycle, line = self._cycle, self._shaped(line)
         stop = self.stops.on_line(cycle.published, cycle.position, line, deceleration)
         lets_run_out = StopPlan(None, None, deceleration is not None, None, None)
+        if stop is None and line.steady > SOON_OVER * PERIOD and not line.turns:
+            # Barely begun: it will move on for longer than a stop from here takes, so that a little of it is enough.
+            stop = self.stops.under(self._next(SOON_OVER), SOON_OVER + 1, cycle.published, line, deceleration)
         if stop is None:
             ahead = self.foresee()
             if ahead is None:  # it lasts for so long that any stop is sooner

@@ -16,6 +16,10 @@ from tvist_server.outlook import resting_after
 from tvist_server.safety import TORQUE_SHARE
 from tvist_server.setup import body, paper_payload
 
+EARLY = 17
+"""Tick before which some moves are stopped: those that have barely begun."""
+BARELY, BARELY_WAY = 3e-3, 1e-3
+"""What moves no faster [rad/s] goes no farther [rad] when it is stopped."""
 ROUNDING = 1e-9
 """Difference of two positions that counts as none [rad]."""
 TORQUE_ROUNDING = 1e-3
@@ -81,6 +85,8 @@ class Outcome:
     """Duration [s] and way [rad] that the event told."""
     way: float
     """Angle that the leading joint turned after the stop [rad]."""
+    speed: float
+    """Velocity of that joint at the stop [rad/s]."""
 
     @property
     def kept(self) -> bool:
@@ -91,6 +97,7 @@ class Outcome:
             and self.late <= 0
             and self.torque <= TORQUE_ROUNDING
             and self.near <= 0.0
+            and (self.speed > BARELY or self.way <= BARELY_WAY)
         )
 
 
@@ -121,7 +128,8 @@ def draw(description: RobotDescription, seed: int, kinds: tuple[str, ...] = tupl
         moment=0,
     )
     moved = resting_after(_left_alone(description, case))
-    return Case(**{**vars(case), "moment": int(random.integers(1, max(moved, 2)))})
+    last = EARLY if random.random() < 0.1 else max(moved, 2)
+    return Case(**{**vars(case), "moment": int(random.integers(1, last))})
 
 
 def two_postures(random: np.random.Generator, joints: int) -> Floats:
@@ -170,6 +178,7 @@ def judge(description: RobotDescription, case: Case, *, flexible: bool = False) 
         left=PERIOD * (ends[1] - case.moment),
         told=(None, None) if told is None else (told.duration, told.way),
         way=float(np.abs(stopped[-1] - stopped[case.moment]).max()),
+        speed=float(np.abs(stopped[case.moment] - stopped[case.moment - 1]).max()) / PERIOD,
     )
 
 

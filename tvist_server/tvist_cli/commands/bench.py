@@ -2,17 +2,25 @@
 
 import asyncio
 
+from tvist_cli.failure import Failure
 from tvist_cli.output import err, out, print_json, say, table
 
 
-def bench(*, seconds: float = 10.0, soak: float | None = None, json: bool = False) -> None:
+def bench(
+    *, seconds: float = 10.0, soak: float | None = None, hostile: int | None = None, json: bool = False
+) -> None:
     """Measure plant, filter, control cycle and whole line, a served robot, and how many of them a core takes.
 
     Args:
         seconds: How long to watch a served robot tick in real time, with one client and a recorder; 0: not at all.
         soak: Instead, serve a robot for so many minutes under load, and see whether it stays as it is.
+        hostile: Instead, compare how late a served robot ticks with and without 100 messages a second of every type and
+            size, sound and unsound, in so many pairs of runs of --seconds.
         json: Print one JSON object.
     """
+    if hostile is not None:
+        _hostile(hostile, seconds, json)
+        return
     if soak is not None:
         _soak(soak, json)
         return
@@ -28,6 +36,23 @@ def bench(*, seconds: float = 10.0, soak: float | None = None, json: bool = Fals
         if isinstance(values, dict):
             table(key, ("what", "figure"), [(name, f"{value:.4g}") for name, value in values.items()])
     out.print("Figures are of this machine under what else it was doing; ratios travel, microseconds do not.")
+
+
+def _hostile(pairs: int, seconds: float, json: bool) -> None:
+    from tvist_lab.benchmark.hostile import hostile
+
+    if pairs < 2 or not seconds > 0.0:
+        raise Failure("hostile takes two pairs of runs or more, and runs that last some seconds", code=2)
+    result = asyncio.run(hostile(pairs, seconds, tell=err.print))
+    if json:
+        print_json(result)
+        return
+    rows = [
+        (what, *(f"{result[what][name]:.4g}" for name in ("without", "with", "difference", "interval")))
+        for what in ("late_p99_us", "missed")
+    ]
+    title = f"{pairs} pairs of {seconds:g} s, {result['messages_per_second']:g} messages a second"
+    table(title, ("a run", "without", "with", "difference", "± (95 %)"), rows)
 
 
 def _soak(minutes: float, json: bool) -> None:

@@ -18,6 +18,7 @@ class LineStop(Trajectory):
 
     Its first step brakes already, by as much jerk as it may: the second difference b of the positions last played
     becomes b - jerk·h, and the state of motion that it goes on from is that of central differences with this step.
+    What hardly moves, so that the limits let it stand at once, does.
 
     Args:
         q: Newest reference, shape (n,) [rad].
@@ -57,6 +58,9 @@ class LineStop(Trajectory):
             bend = min(before + most, -acceleration)
         goes_on = -jerk if bend > -acceleration else 0.0
         speed = present + 0.5 * period * bend - period * period * goes_on / 6.0
+        halt = -present / period  # the second difference if the next step is none
+        if abs(halt - before) <= most and halt >= -acceleration:
+            speed = bend = 0.0
         request = ruckig.InputParameter(1)
         request.control_interface = ruckig.ControlInterface.Velocity
         request.current_position, request.current_velocity = [0.0], [speed]
