@@ -114,6 +114,8 @@ def _give(controller: Controller, entry: Entry, presence: Presence) -> None:
             controller.client_gone(entry.client or "", entry.session or "")
         case "missed":
             controller.missed(entry.count or 0)
+        case "setpoint_refused":
+            controller.refuse_setpoint(entry.why or "")
         case _:
             message = message_of(entry)
             if isinstance(message, Setpoint):

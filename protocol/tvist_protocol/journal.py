@@ -11,7 +11,7 @@ from msgspec import Meta, Struct
 from tvist_protocol.commands import Command, Setpoint
 from tvist_protocol.errors import ProtocolError, short
 
-EntryKind = Literal["command", "setpoint", "client_seen", "client_gone", "missed"]
+EntryKind = Literal["command", "setpoint", "setpoint_refused", "client_seen", "client_gone", "missed"]
 
 
 class Entry(Struct, frozen=True, kw_only=True, tag_field="type", tag="journal"):
@@ -20,8 +20,9 @@ class Entry(Struct, frozen=True, kw_only=True, tag_field="type", tag="journal"):
     tick: int
     """Number of the first control period computed after it."""
     kind: EntryKind
-    """What it was: a message, the end of the session that had control, or ticks that began too late. Recordings made
-    before sessions were told apart have every liveliness token that came or went."""
+    """What it was: a message, a set-point of the lease's holder that could not be read, the end of the session that had
+    control, or ticks that began too late. Recordings made before sessions were told apart have every liveliness token
+    that came or went."""
     client: str | None = None
     """Client it came from or is about, where that is known."""
     session: str | None = None
@@ -30,6 +31,8 @@ class Entry(Struct, frozen=True, kw_only=True, tag_field="type", tag="journal"):
     """The message as it was decoded, for a command or a set-point."""
     count: int | None = None
     """How many ticks began too late."""
+    why: str | None = None
+    """Why a set-point could not be read: it may stand in the event that says that none came."""
 
 
 def entry_of(tick: int, message: Command | Setpoint, client: str | None = None) -> Entry:

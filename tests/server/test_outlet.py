@@ -10,7 +10,8 @@ from tvist_server.outlet import MAX_WAITING, Outlet
 from .robots import Robot
 
 WAIT = 30.0
-STATE = Robot().tick()
+ROBOT = Robot()
+STATE, IO = ROBOT.tick(), ROBOT.controller.io()
 
 
 class NotingGateway:
@@ -104,10 +105,8 @@ def test_a_gateway_that_fails_is_logged_and_the_next_message_goes_out(caplog):
     assert [topic for topic, _ in gateway.published] == ["state"]
 
 
-def test_the_last_state_is_told_again_to_those_who_come_late():
+def test_the_state_and_io_are_told_again_to_those_who_come_late():
     gateway, made = outlet()
-    made.repeat()
-    made.state(STATE)
-    made.repeat()
+    made.repeat(STATE, IO)
     made.hand_on()
-    assert [topic for topic, _ in gateway.published] == ["state", "state"]
+    assert [topic for topic, _ in gateway.published] == ["io", "state"]

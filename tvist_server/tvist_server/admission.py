@@ -4,6 +4,7 @@ Nothing here changes anything, so that messages can be admitted in any thread. W
 carried out has it checked twice: the lease may have changed.
 """
 
+import contextlib
 from typing import Any, NamedTuple
 
 import msgspec
@@ -51,8 +52,16 @@ def admit(data: bytes, lease: Lease | None) -> Admitted | Refused:
     return Admitted(command, msgspec.to_builtins(command))
 
 
-def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | None:
-    """Read a set-point; None where it is none, or its sender has no control.
+class Unreadable(NamedTuple):
+    """A set-point that cannot be read, of the client that has control."""
+
+    token: str
+    why: str
+    """A sentence with field, value and limit."""
+
+
+def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | None:
+    """Read a set-point; None where its sender has no control, or nothing says that it has.
 
     Args:
         data: The message.
@@ -62,9 +71,16 @@ def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | None:
         return None
     try:
         setpoint = decode_setpoint(data)
-    except ProtocolError:
-        return None
+    except ProtocolError as error:
+        return Unreadable(lease.token, error.why) if _token(data) == lease.token else None
     return setpoint if setpoint.token == lease.token else None
+
+
+def _token(data: bytes) -> str | None:
+    """Token of a message that cannot be read, as far as it has one."""
+    with contextlib.suppress(ProtocolError):
+        return decode_envelope(data).token
+    return None
 
 
 def _authorize(command: Command, lease: Lease | None) -> None:

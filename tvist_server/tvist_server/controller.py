@@ -92,6 +92,8 @@ class Controller:
         self._payload_monitor = PayloadMonitor(setup.description, body(setup.payload))
         self.peripherals = Peripherals()
         self._io_changed = True
+        self.latest = self._state(self.cycle.standing)
+        """State of the last tick; before the first, and where the arm was put somewhere since, how it stands there."""
         self.filters.warn_of_payload(self.declared)
         self.filters.warn_of_arm()
 
@@ -142,22 +144,30 @@ class Controller:
 
     def receive_setpoint(self, setpoint: c.Setpoint) -> None:
         """Take a set-point; one that is not for us is counted and dropped: nobody waits for an answer."""
-        counters = self.counters
-        counters.setpoints_received += 1
         lease = self.session.lease
-        limits = self.setup.description.limits.position
-        wanted = (
-            self.motion.streaming
-            and lease is not None
-            and setpoint.token == lease.token
-            and len(setpoint.q) == len(limits)
-            and all(abs(angle) <= limit for angle, limit in zip(setpoint.q, limits, strict=True))
-        )
-        if not wanted:
-            counters.setpoints_refused += 1
+        if lease is None or setpoint.token != lease.token:
+            self._count_refused()  # a stranger's: it says nothing of the stream, and no journal has it
             return
+        try:
+            check_joints(setpoint.q, self.setup.description)
+        except RefusalError as refusal:
+            self.refuse_setpoint(refusal.reply.why)
+            return
+        if not self.motion.streaming:
+            self.refuse_setpoint("no stream is running")
+            return
+        self.counters.setpoints_received += 1
         self.session.renew(setpoint.token, self.now)
         self.motion.offer(setpoint.sequence, np.array(setpoint.q, dtype=float), self.now)
+
+    def refuse_setpoint(self, why: str) -> None:
+        """Count and drop a set-point of the lease's holder; should the stream fall silent, its end names the reason."""
+        self._count_refused()
+        self.motion.refuse_setpoint(why)
+
+    def _count_refused(self) -> None:
+        self.counters.setpoints_received += 1
+        self.counters.setpoints_refused += 1
 
     def client_gone(self, client: str, session: str) -> None:
         """A client's session has ended; where it held control, motion ends with it."""
@@ -184,7 +194,11 @@ class Controller:
         self._stop_reasons.update(self.motion.activity.robot_mode, self.motion.safety_mode)
         self.tick_number += 1
         events, self._events = self._events, []
-        state = self._reporter.state(
+        self.latest = self._state(sample)
+        return self.latest, events
+
+    def _state(self, sample: Sample) -> State:
+        return self._reporter.state(
             self.tick_number,
             sample,
             self.cycle.tvist,
@@ -195,14 +209,17 @@ class Controller:
             setpoint_sequence=self.motion.sequence,
             missed_ticks=self.counters.missed_ticks,
         )
-        return state, events
+
+    def io(self) -> Io:
+        """Inputs, outputs and registers as they are for the next tick."""
+        return self.peripherals.io(self.tick_number + 1, self.declared, self.motion.wanted_speed)
 
     def changed_io(self) -> Io | None:
         """Inputs, outputs and registers where they changed since this was asked last, before a tick; else None."""
         if not self._io_changed:
             return None
         self._io_changed = False
-        return self.peripherals.io(self.tick_number + 1, self.declared, self.motion.wanted_speed)
+        return self.io()
 
     def truth(self) -> Truth:
         """What no robot can know, after a tick."""
@@ -416,6 +433,7 @@ class Controller:
             self._seed = command.seed
         self.cycle.reset(q, carried=carried, seed=self._seed)
         self.motion.put(command.mode)
+        self.latest = self._state(self.cycle.standing)
         self._payload_monitor.reset()
         self._reporter.forget_modes()
         return Done(tick=self.tick_number)

@@ -220,7 +220,9 @@ class ControlCycle:
         still = np.zeros_like(q)
         torque = self.inverse_dynamics.gravity(q)
         command = self._joint_controllers.command(Target(q, still, still), torque, torque)
-        self.arm.reset(command, payload=carried, seed=seed)
+        measured = self.arm.reset(command, payload=carried, seed=seed)
+        self.standing = Sample(q, Target(q, still, still), torque, command.torque, measured)
+        """What there is to tell before the first tick from there."""
 
     def declare(self, payload: Payload) -> None:
         """Change the payload that inverse dynamics counts on; torque goes there without a step."""

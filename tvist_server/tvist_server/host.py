@@ -14,7 +14,7 @@ from tvist_protocol.journal import Entry, entry_of
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.about import info_of
-from tvist_server.admission import Admitted, admit, admit_setpoint
+from tvist_server.admission import Admitted, Unreadable, admit, admit_setpoint
 from tvist_server.controller import Controller
 from tvist_server.planning.planner import Plan
 from tvist_server.standing import Standing
@@ -130,13 +130,18 @@ class Host:
     def _note(self, entry: Entry) -> None:
         self._sink.journal(entry)
 
-    def receive_setpoint(self, setpoint: Setpoint) -> None:
+    def receive_setpoint(self, setpoint: Setpoint | Unreadable) -> None:
         """Take a set-point that was admitted."""
+        if isinstance(setpoint, Unreadable):
+            if self._is_holders(setpoint):
+                self._note(Entry(tick=self._next, kind="setpoint_refused", why=setpoint.why))
+                self.controller.refuse_setpoint(setpoint.why)
+            return
         if self._is_holders(setpoint):
             self._note(entry_of(self._next, setpoint))
         self.controller.receive_setpoint(setpoint)
 
-    def _is_holders(self, message: Command | Setpoint) -> bool:
+    def _is_holders(self, message: Command | Setpoint | Unreadable) -> bool:
         lease = self.controller.session.lease
         return lease is not None and getattr(message, "token", None) == lease.token
 

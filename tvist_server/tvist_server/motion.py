@@ -27,7 +27,7 @@ from tvist_server.refusal import RefusalError, out_of_turn
 from tvist_server.safety import REDUCED_SHARE
 from tvist_server.safety_system import SafetySystem
 from tvist_server.stops import StopPlan
-from tvist_server.streaming import TIMEOUT, Streaming
+from tvist_server.streaming import Streaming
 from tvist_server.trajectory import Limits
 from tvist_server.way_ahead import WayAhead
 
@@ -304,6 +304,10 @@ class MotionControl:
         """Take a set-point of the running stream."""
         self._streaming.offer(sequence, q, now)
 
+    def refuse_setpoint(self, why: str) -> None:
+        """Remember why a set-point was not taken, for the event that says that none came."""
+        self._streaming.refuse(why)
+
     def end_stream(self) -> None:
         """Bring the stream to rest through the filter.
 
@@ -402,8 +406,9 @@ class MotionControl:
 
     def watch(self, now: float) -> None:
         """End a stream that nobody keeps up."""
-        if self._streaming.is_silent(now):
-            self.interrupt(f"no set-point for {TIMEOUT:g} s")
+        silence = self._streaming.silence(now)
+        if silence is not None:
+            self.interrupt(silence)
 
     def step(self) -> Sample:
         """One tick of the line.

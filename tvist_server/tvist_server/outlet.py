@@ -63,7 +63,6 @@ class Outlet:
         self._wake: Callable[[], None] = _nobody
         self._queue: deque[Message | tuple[Reply, bytes]] = deque()
         self._room = threading.Event()
-        self._last: State | None = None
         self._io: Io | None = None
         self.dropped = 0
         """Messages of a tick that found no room."""
@@ -97,7 +96,6 @@ class Outlet:
 
     def state(self, state: State) -> None:
         """Queue a state; the recorder's own queue takes it at once."""
-        self._last = state
         if self._recorder is not None:
             self._recorder.state(state)
         self._offer(state)
@@ -134,10 +132,11 @@ class Outlet:
         """Queue a reply, behind the states that came before it."""
         self._put((reply, data))
 
-    def repeat(self) -> None:
-        """Tell the last state again, for those who come late."""
-        if self._last is not None:
-            self._put(self._last)
+    def repeat(self, state: State, io: Io) -> None:
+        """Tell the present state, inputs, outputs and registers again, for those who come late."""
+        self._io = io
+        self._put(io)
+        self._put(state)
 
     def _offer(self, message: State | Truth | Io) -> None:
         """Queue a message of every tick, where there is room."""

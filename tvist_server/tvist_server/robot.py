@@ -94,6 +94,10 @@ class ServedRobot:
         lease = self._host.standing.lease
         return None if lease is None else lease.client
 
+    def repeat(self) -> None:
+        """Tell how the robot stands, while no time passes, for those who come late; in the controller's thread."""
+        self.outlet.repeat(self.controller.latest, self.controller.io())
+
     def _carry_out(self, admitted: Admitted, reply: Reply) -> None:
         self.driven.post(lambda: reply(self._host.carry_out(admitted)))
 

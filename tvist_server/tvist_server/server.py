@@ -209,4 +209,4 @@ def _drivers(config: ServeConfig, robots: Sequence[ServedRobot]) -> tuple[list[C
         clock = Realtime(driven, courier.wake, PERIOD, config.speed, priority=config.realtime_priority)
         return [courier], [clock]
     couriers = [Courier([robot.outlet]) for robot in robots]
-    return couriers, [Lockstep(robot.driven, robot.outlet.repeat) for robot in robots]
+    return couriers, [Lockstep(robot.driven, robot.repeat) for robot in robots]

@@ -14,21 +14,29 @@ class Streaming:
         self.stream: SetpointStream | None = None
         """The one that is followed."""
         self._heard = 0.0
+        self._refused: str | None = None
         self._late, self._lost, self._limited = 0, 0, 0
 
     def begin(self, stream: SetpointStream, now: float) -> None:
         """Follow a stream from a time on [s]."""
-        self.stream, self._heard = stream, now
+        self.stream, self._heard, self._refused = stream, now, None
 
     def offer(self, sequence: int, q: Floats, now: float) -> None:
         """Take a set-point."""
         if self.stream is not None:
-            self._heard = now
+            self._heard, self._refused = now, None
             self.stream.offer(sequence, q)
 
-    def is_silent(self, now: float) -> bool:
-        """Whether set-points have failed to come."""
-        return self.stream is not None and now - self._heard >= TIMEOUT
+    def refuse(self, why: str) -> None:
+        """Remember why a set-point was not taken: where none follows that is, this is what went wrong."""
+        self._refused = why
+
+    def silence(self, now: float) -> str | None:
+        """In words, that set-points have failed to come; None while they come."""
+        if self.stream is None or now - self._heard < TIMEOUT:
+            return None
+        refused = "" if self._refused is None else f"; the last one was refused: {self._refused}"
+        return f"no set-point for {TIMEOUT:g} s{refused}"
 
     def end(self) -> bool:
         """Follow it no longer, and keep its counts; whether there was one."""

@@ -41,9 +41,13 @@ class LoopbackHost:
         return self._host.info()
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], object]) -> Callable[[], None]:
-        """Have every message of a topic; the function returned ends that."""
+        """Have every message of a topic, first of all the present state or io; the function returned ends that."""
         callbacks = self._callbacks.setdefault(topic, [])
         callbacks.append(callback)
+        if topic == "state":
+            callback(encode(self.controller.latest))
+        elif topic == "io":
+            callback(encode(self.controller.io()))
         return lambda: callbacks.remove(callback)
 
     def state(self, state: State) -> None:

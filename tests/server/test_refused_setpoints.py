@@ -1,0 +1,125 @@
+"""Nobody answers a set-point: that one was refused stands in the event of the stream that fell silent over it."""
+
+import math
+
+import msgspec
+import pytest
+
+from tvist_protocol import commands as c
+from tvist_protocol.codec import encode
+from tvist_protocol.journal import Entry
+from tvist_server.controller import Controller
+from tvist_server.host import Host
+from tvist_server.streaming import TIMEOUT
+
+from .robots import UR5E, H, setup
+
+Q1 = UR5E.poses["Q1"]
+SILENCE = round(TIMEOUT / H) + 1
+"""Ticks after which a stream without set-points is stopped."""
+
+
+class Sink:
+    """Keeps what a robot said, and what a replay needs."""
+
+    def __init__(self):
+        self.events, self.entries, self.states = [], [], []
+
+    def state(self, state):
+        self.states.append(state)
+
+    def event(self, event):
+        self.events.append(event)
+
+    def journal(self, entry):
+        self.entries.append(entry)
+
+    def truth(self, truth):
+        pass
+
+    def io(self, io):
+        pass
+
+
+@pytest.fixture
+def streaming():
+    """A host in real time whose client streams, and its sink."""
+    sink = Sink()
+    host = Host(Controller(setup(clock="realtime")), sink)
+    host.request(encode(c.TakeControl(client="a")))
+    host.request(encode(c.ServoStart(token=host.controller.session.lease.token)))
+    return host, sink
+
+
+def offered(host, **changes):
+    host.setpoint(encode(c.Setpoint(**{"token": "a#1", "sequence": 0, "q": Q1} | changes)))
+
+
+def end_of(host, sink):
+    for _ in range(SILENCE):
+        host.tick()
+    (event,) = [event for event in sink.events if event.kind == "stream_stopped"]
+    return event.why
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ({"q": Q1[:5]}, "q has 5 angles; the arm has 6"),
+        ({"q": (math.nan, *Q1[1:])}, "q[0] is NaN, not a number"),
+        ({"q": (*Q1[:5], math.inf)}, "q[5] is inf: must be at most 1000"),
+        ({"q": (*Q1[:5], 6.5)}, "q[5] is 6.5 rad; the joint goes to ±6.28319"),
+    ],
+)
+def test_the_end_of_a_silent_stream_names_the_last_refusal(streaming, fault, said):
+    host, sink = streaming
+    offered(host, token=host.controller.session.lease.token, **{"sequence": 1})
+    offered(host, **({"token": host.controller.session.lease.token} | fault))
+    assert end_of(host, sink) == f"no set-point for 0.25 s; the last one was refused: {said}"
+    assert host.controller.counters.setpoints_received == 2
+    assert host.controller.counters.setpoints_refused == 1
+
+
+def test_a_stream_that_simply_ceases_names_no_refusal(streaming):
+    host, sink = streaming
+    token = host.controller.session.lease.token
+    offered(host, token=token, q=Q1[:5])
+    offered(host, token=token)
+    assert end_of(host, sink) == "no set-point for 0.25 s"
+
+
+@pytest.mark.parametrize("fault", [{}, {"q": Q1[:5]}, {"q": (math.nan, *Q1[1:])}])
+def test_a_stranger_s_set_points_are_not_blamed(streaming, fault):
+    host, sink = streaming
+    offered(host, token="other", **fault)
+    assert end_of(host, sink) == "no set-point for 0.25 s"
+    assert host.controller.counters.setpoints_refused == 1
+
+
+def test_what_was_refused_in_an_earlier_stream_is_not_blamed_for_the_end_of_the_next(streaming):
+    host, sink = streaming
+    token = host.controller.session.lease.token
+    offered(host, token=token, q=Q1[:5])
+    host.request(encode(c.ServoStop(token=token)))
+    for _ in range(200):
+        host.tick()
+    sink.events.clear()
+    assert b"done" in host.request(encode(c.ServoStart(token=token)))
+    assert end_of(host, sink) == "no set-point for 0.25 s"
+
+
+def test_equal_journals_give_equal_events_also_where_a_set_point_could_not_be_read():
+    """A replay is given what the journal holds: of bytes that are no set-point, why they are none."""
+    from tvist_lab.replay import replay
+
+    start, sink = setup(clock="realtime"), Sink()
+    host = Host(Controller(start), sink)
+    host.request(encode(c.TakeControl(client="a")))
+    token = host.controller.session.lease.token
+    host.request(encode(c.ServoStart(token=token)))
+    offered(host, token=token, q=(math.nan, *Q1[1:]))
+    end_of(host, sink)
+    kept = [msgspec.convert(msgspec.to_builtins(entry), Entry) for entry in sink.entries]
+    again = replay(start, kept, sink.states)
+    assert again.first_difference is None
+    assert again.events == sink.events
