@@ -1,8 +1,9 @@
 """The Python client: asyncio here, a blocking face of it in `tvist_client.blocking`."""
 
-from tvist_client.arm import Arm, make_payload
+from tvist_client.arm import Arm
 from tvist_client.errors import (
     AnswerTimeoutError,
+    ArgumentError,
     ClientError,
     MisuseError,
     MotionStoppedError,
@@ -12,6 +13,7 @@ from tvist_client.errors import (
     UnexpectedReplyError,
 )
 from tvist_client.motion import Motion
+from tvist_client.payload import make_payload
 from tvist_client.robot import Robot
 from tvist_client.servo import Servo
 from tvist_client.stream import Stream
@@ -23,6 +25,7 @@ from tvist_protocol.values import Payload
 
 __all__ = [
     "AnswerTimeoutError",
+    "ArgumentError",
     "Arm",
     "ClientError",
     "Event",

@@ -3,8 +3,8 @@
 import asyncio
 import contextlib
 import logging
-from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import AsyncIterator, Iterable, Mapping
+from typing import Any
 
 from tvist_client.errors import (
     AnswerTimeoutError,
@@ -13,8 +13,11 @@ from tvist_client.errors import (
     UnexpectedReplyError,
 )
 from tvist_client.motion import Motion
+from tvist_client.payload import make_payload
 from tvist_client.servo import Servo
-from tvist_client.values import floats
+from tvist_client.simulation import Simulation
+from tvist_client.terminals import Terminals
+from tvist_client.values import JointRange, floats, number, whole
 from tvist_protocol.commands import (
     HandOver,
     KeepAlive,
@@ -30,31 +33,21 @@ from tvist_protocol.commands import (
     SetPayload,
     SetShaper,
     SetSpeed,
-    SimulationInject,
-    SimulationReset,
-    SimulationStep,
-    StepSetpoint,
     Stop,
     UnlockProtectiveStop,
 )
 from tvist_protocol.errors import RefusedError
-from tvist_protocol.io import Bank, SetIo, SetRegisters, SetTcp, SimulationSetInputs
-from tvist_protocol.replies import Accepted, Done
+from tvist_protocol.io import SetTcp
+from tvist_protocol.replies import Accepted
 from tvist_protocol.stream import Event
-from tvist_protocol.values import Payload, ResetMode
-
-if TYPE_CHECKING:
-    from tvist_client.robot import Robot
 
 log = logging.getLogger(__name__)
 
 UNLOCKED_TICKS = 150
 """Ticks, 0.3 s, for which a robot is watched once it is unlocked: an overloaded drive gives out in hundredths."""
-STEP_S = 60.0
-"""How long a `simulation.step` may take [s]: a server may compute more slowly than time passes."""
 
 
-class Arm:
+class Arm(Terminals, Simulation):
     """What `Robot.control` gives. Joint values are any sequence of numbers [rad], one a joint.
 
     Every command may raise RefusedError: then it changed nothing.
@@ -63,10 +56,6 @@ class Arm:
         robot: The robot it belongs to.
         token: Names the lease; goes with every command.
     """
-
-    def __init__(self, robot: "Robot", token: str) -> None:
-        self.robot = robot
-        self.token = token
 
     # ------------------------------------------------------------------ motion
 
@@ -97,10 +86,10 @@ class Arm:
         reply = await self.robot.request(
             MoveJ(
                 token=self.token,
-                q=floats(q),
-                velocity=float(velocity),
-                acceleration=float(acceleration),
-                jerk=float(jerk),
+                q=floats(q, "q"),
+                velocity=number(velocity, "velocity"),
+                acceleration=number(acceleration, "acceleration"),
+                jerk=number(jerk, "jerk"),
             )
         )
         if not isinstance(reply, Accepted) or reply.id is None:
@@ -125,15 +114,17 @@ class Arm:
             acceleration: Acceleration beyond which the stream is limited [rad/s²].
             jerk: Jerk beyond which the stream is limited [rad/s³].
         """
+        joints = JointRange(await self.robot.info())
+        every = number(period, "period")
         start = ServoStart(
             token=self.token,
-            period=float(period),
-            velocity=float(velocity),
-            acceleration=float(acceleration),
-            jerk=float(jerk),
+            period=every,
+            velocity=number(velocity, "velocity"),
+            acceleration=number(acceleration, "acceleration"),
+            jerk=number(jerk, "jerk"),
         )
         await self.robot.request(start)
-        servo = Servo(self, float(period))
+        servo = Servo(self, every, joints)
         with servo:
             try:
                 yield servo
@@ -152,7 +143,7 @@ class Arm:
         Args:
             deceleration: Largest deceleration of any joint [rad/s²]; None: what the torque allows.
         """
-        limit = None if deceleration is None else float(deceleration)
+        limit = None if deceleration is None else number(deceleration, "deceleration")
         await self.robot.request(Stop(token=self.token, deceleration=limit))
 
     async def pause(self) -> None:
@@ -169,7 +160,7 @@ class Arm:
         Args:
             fraction: Share of the programmed speed, 0 to 1 [-].
         """
-        await self.robot.request(SetSpeed(token=self.token, fraction=float(fraction)))
+        await self.robot.request(SetSpeed(token=self.token, fraction=number(fraction, "fraction")))
 
     # ------------------------------------------------------------------ power and protective stops
 
@@ -217,7 +208,7 @@ class Arm:
 
     async def set_shaper(self, name: str, modes: int = 1) -> None:
         """Choose the input shaper, one of those in `info`; `none` does not shape."""
-        await self.robot.request(SetShaper(token=self.token, name=name, modes=int(modes)))
+        await self.robot.request(SetShaper(token=self.token, name=name, modes=whole(modes, "modes", 1)))
 
     async def set_estimator(
         self,
@@ -239,8 +230,8 @@ class Arm:
             SetEstimator(
                 token=self.token,
                 name=name,
-                f_d=_modes(f_d),
-                zeta=_modes(zeta),
+                f_d=_modes(f_d, "f_d"),
+                zeta=_modes(zeta, "zeta"),
                 calibration=dict(calibration) if isinstance(calibration, Mapping) else calibration,
             )
         )
@@ -264,133 +255,8 @@ class Arm:
         Args:
             offset: In the flange frame: x y z [m] and rotation vector [rad].
         """
-        x, y, z, rx, ry, rz = floats(offset)
+        x, y, z, rx, ry, rz = floats(offset, "offset", "x y z rx ry rz")
         await self.robot.request(SetTcp(token=self.token, offset=(x, y, z, rx, ry, rz)))
-
-    # ------------------------------------------------------------------ inputs, outputs, registers
-
-    async def set_digital_output(self, number: int, on: bool) -> None:
-        """Switch a digital output: 0–7 standard, 8–15 configurable, 16–17 tool."""
-        bit = 1 << number
-        await self.robot.request(
-            SetIo(token=self.token, digital_output_mask=bit, digital_outputs=bit if on else 0)
-        )
-
-    async def set_analog_output(self, number: int, share: float, *, voltage: bool = False) -> None:
-        """Set an analogue output.
-
-        Args:
-            number: 0 or 1.
-            share: Of its range [-].
-            voltage: Whether it gives 0 to 10 V; otherwise 4 to 20 mA.
-        """
-        bit = 1 << number
-        await self.robot.request(
-            SetIo(
-                token=self.token,
-                standard_analog_output_mask=bit,
-                standard_analog_output_type=bit if voltage else 0,
-                standard_analog_output_0=float(share),
-                standard_analog_output_1=float(share),
-            )
-        )
-
-    async def set_registers(self, bank: Bank, values: Iterable[float], first: int = 0) -> None:
-        """Write registers that stand in a row.
-
-        Args:
-            bank: Which: `input_int`, `output_double` …
-            values: Booleans, integers or numbers, as the bank has them.
-            first: Number of the first.
-        """
-        await self.robot.request(SetRegisters(token=self.token, bank=bank, values=tuple(values), first=first))
-
-    # ------------------------------------------------------------------ simulation
-
-    async def set_digital_input(self, number: int, on: bool) -> None:
-        """Switch a digital input, as what is wired to it would: 0–7 standard, 8–15 configurable, 16–17 tool."""
-        bit = 1 << number
-        await self.robot.request(
-            SimulationSetInputs(token=self.token, digital_input_mask=bit, digital_inputs=bit if on else 0)
-        )
-
-    async def reset(
-        self,
-        q: Iterable[float] | None = None,
-        *,
-        seed: int | None = None,
-        payload: Payload | None = None,
-        mode: ResetMode | None = None,
-        shaper: str | None = None,
-    ) -> int | None:
-        """Put the simulated arm somewhere at rest; what is None stays.
-
-        Args:
-            q: Where [rad].
-            seed: Seed of the sensors' noise, which starts anew.
-            payload: What the arm carries, whatever the controller believes; `make_payload` makes one.
-            mode: Robot mode to put it into.
-            shaper: Shaper to choose.
-
-        Returns:
-            The tick at which it was done.
-        """
-        reply = await self.robot.request(
-            SimulationReset(
-                token=self.token,
-                q=None if q is None else floats(q),
-                seed=None if seed is None else int(seed),
-                payload=payload,
-                mode=mode,
-                shaper=shaper,
-            )
-        )
-        return reply.tick if isinstance(reply, Done) else None
-
-    async def step(self, ticks: int, setpoints: Sequence[StepSetpoint] | None = None) -> int:
-        """Let 1 to 1000 ticks pass at once, in lockstep and free; `Robot.advance` takes any number.
-
-        Args:
-            ticks: How many control periods.
-            setpoints: Set-points of a running stream, one a tick in order; `Servo.step_through` numbers them.
-
-        Returns:
-            The last of the ticks; its state has arrived.
-        """
-        self.robot.watch()
-        played = None if setpoints is None else tuple(setpoints)
-        step = SimulationStep(token=self.token, ticks=int(ticks), setpoints=played)
-        reply = await self.robot.request(step, STEP_S)
-        if not isinstance(reply, Done) or reply.tick is None:
-            raise UnexpectedReplyError(f"simulation.step was answered by {reply}, without a tick")
-        await self.robot.until(reply.tick)
-        return reply.tick
-
-    async def inject(
-        self,
-        fault: str,
-        *,
-        joint: int | None = None,
-        seconds: float | None = None,
-        value: float | None = None,
-    ) -> None:
-        """Cause a fault on purpose; the protocol's README lists them.
-
-        Args:
-            fault: Its name.
-            joint: Joint that it concerns, from the base on.
-            seconds: How long it lasts [s].
-            value: How strong it is, in the fault's own unit.
-        """
-        await self.robot.request(
-            SimulationInject(
-                token=self.token,
-                fault=fault,
-                joint=None if joint is None else int(joint),
-                seconds=None if seconds is None else float(seconds),
-                value=None if value is None else float(value),
-            )
-        )
 
     # ------------------------------------------------------------------ lease
 
@@ -415,20 +281,7 @@ class Arm:
                 return
 
 
-def make_payload(mass: float, com: Iterable[float], inertia: Iterable[float]) -> Payload:
-    """What hangs on a flange.
-
-    Args:
-        mass: Mass [kg].
-        com: Centre of mass x y z in the flange frame [m].
-        inertia: xx xy xz yy yz zz about the centre of mass, flange axes [kg m²].
-    """
-    x, y, z = com
-    xx, xy, xz, yy, yz, zz = floats(inertia)
-    return Payload(mass=float(mass), com=(float(x), float(y), float(z)), inertia=(xx, xy, xz, yy, yz, zz))
-
-
-def _modes(values: float | Iterable[float] | None) -> tuple[float, ...] | None:
+def _modes(values: float | Iterable[float] | None, where: str) -> tuple[float, ...] | None:
     if values is None:
         return None
-    return floats(values) if isinstance(values, Iterable) else (float(values),)
+    return floats(values, where) if isinstance(values, Iterable) else (number(values, where),)

@@ -9,6 +9,7 @@ TvistError
     ├── MotionStoppedError   a motion ended before its target
     ├── StreamStoppedError   the robot ended the stream of set-points
     ├── ProtectiveStopError  an unlocked robot stopped again at once
+    ├── ArgumentError        an argument is no value of its kind; also a ValueError
     ├── UnexpectedReplyError the answer is none of this protocol
     └── MisuseError          called when it makes no sense
 """
@@ -35,6 +36,25 @@ class UnexpectedReplyError(ClientError):
 
 class MisuseError(ClientError):
     """A call that makes no sense now; the sentence says what to do first."""
+
+
+class ArgumentError(ClientError, ValueError):
+    """An argument that cannot be meant: nothing was sent.
+
+    Attributes:
+        where: Which, `q[3]`.
+        why: A sentence with argument, value and what is allowed.
+        limit: The bound that was passed, in the argument's unit; None where there is none.
+    """
+
+    def __init__(self, where: str, why: str, limit: float | None = None) -> None:
+        super().__init__(where, why, limit)
+        self.where = where
+        self.why = why
+        self.limit = limit
+
+    def __str__(self) -> str:
+        return self.why
 
 
 class MotionStoppedError(ClientError):

@@ -6,7 +6,7 @@ import weakref
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
-from tvist_client.errors import AnswerTimeoutError, ClientError
+from tvist_client.errors import AnswerTimeoutError, ClientError, NotConnectedError
 from tvist_client.stream import Stream
 from tvist_client.transports.base import Topic, Transport
 from tvist_protocol.errors import ProtocolError
@@ -47,12 +47,19 @@ class Feed(Generic[M]):
         self._decode = decode
         self._once_a_tick = once_a_tick
         self._subscribed = False
+        self._finished = False
         self._listeners: list[Callable[[M], object]] = []
         self._streams: weakref.WeakSet[Stream[M]] = weakref.WeakSet()
         self._waiting: dict[asyncio.Future[M], Callable[[M], bool]] = {}
 
     def subscribe(self) -> None:
-        """Begin to listen; from then on `latest` is kept."""
+        """Begin to listen; from then on `latest` is kept.
+
+        Raises:
+            NotConnectedError: The connection is closed.
+        """
+        if self._finished:
+            raise NotConnectedError("the connection is closed: open another one")
         if not self._subscribed:
             self._transport.subscribe(self._topic, self._on_message)
             self._subscribed = True
@@ -99,9 +106,14 @@ class Feed(Generic[M]):
                 message.set_exception(error)
 
     def finish(self) -> None:
-        """End every stream."""
+        """The connection was closed: end every stream, and tell whoever waits."""
+        self._finished = True
+        self.latest = None
         for stream in tuple(self._streams):
             stream.finish()
+        for message in tuple(self._waiting):
+            if not message.done():
+                message.set_exception(NotConnectedError("the connection was closed"))
 
     def _on_message(self, data: bytes) -> None:
         try:

@@ -1,7 +1,8 @@
 """Motions, as the robot's events tell of them."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Generator
+from typing import Any
 
 from tvist_client.errors import ClientError, MotionStoppedError
 from tvist_protocol.stream import Event
@@ -48,6 +49,10 @@ class Motion:
         if self.stopped is not None:
             raise MotionStoppedError(self.stopped)
         return self
+
+    def __await__(self) -> Generator[Any, None, "Motion"]:
+        """`await motion` is `await motion.wait()`."""
+        return self.wait().__await__()
 
     async def wait_event(self) -> None:
         """Wait for the event of the end, without letting time pass."""

@@ -8,7 +8,8 @@ from collections.abc import Awaitable, Callable, Iterator
 from contextlib import AbstractAsyncContextManager
 from typing import TypeVar
 
-from tvist_client.errors import NotConnectedError
+from tvist_client.errors import MisuseError, NotConnectedError
+from tvist_protocol.errors import TvistError
 
 T = TypeVar("T")
 
@@ -26,9 +27,19 @@ class Portal:
         self.closed = False
 
     def call(self, function: Callable[[], Awaitable[T]]) -> T:
-        """Await what a function gives, on the loop, while this thread waits; Ctrl-C cancels it."""
+        """Await what a function gives, on the loop, while this thread waits; Ctrl-C cancels it.
+
+        An error of client or protocol comes out as if it were raised here: its way through the loop, and what was
+        the matter underneath, would only hide the sentence from who reads it.
+
+        Raises:
+            NotConnectedError: The connection is closed.
+            MisuseError: Called by a callback, which would wait for itself.
+        """
         if self.closed:
             raise NotConnectedError("the connection is closed: open another one")
+        if threading.current_thread() is self._thread:
+            raise MisuseError("a callback may not wait for the robot: hand the work to another thread")
 
         async def awaited() -> T:
             return await function()
@@ -36,9 +47,12 @@ class Portal:
         future = asyncio.run_coroutine_threadsafe(awaited(), self._loop)
         try:
             return future.result()
+        except TvistError as error:
+            told = error
         except BaseException:
             future.cancel()
             raise
+        raise told.with_traceback(None) from None
 
     def run(self, function: Callable[[], T]) -> T:
         """Call a function that does not wait, on the loop."""

@@ -10,10 +10,12 @@ from tvist_client.arm import Arm
 from tvist_client.errors import ClientError, MisuseError, NotConnectedError, UnexpectedReplyError
 from tvist_client.feed import Feed
 from tvist_client.motion import Motion, Motions
+from tvist_client.simulation import MAX_STEP
 from tvist_client.stream import Stream
 from tvist_client.transports.base import Transport
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.zenoh import ZenohTransport
+from tvist_client.values import number, whole
 from tvist_protocol.codec import (
     decode_event,
     decode_info,
@@ -28,6 +30,7 @@ from tvist_protocol.commands import Command, ReleaseControl, Stop, TakeControl
 from tvist_protocol.errors import ProtocolError, RefusedError
 from tvist_protocol.info import Clock, Info
 from tvist_protocol.io import Io
+from tvist_protocol.keys import check_client_name
 from tvist_protocol.modes import RuntimeState
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.stream import Event, State, Telemetry, Truth
@@ -42,8 +45,6 @@ BUFFER = 5000
 """Messages an iterator holds: 10 s of states."""
 CHUNK = 50
 """Ticks to let pass between two looks at whether a motion has ended: a tenth of a second."""
-MAX_STEP = 1000
-"""Ticks a `simulation.step` may have."""
 
 
 class Robot:
@@ -127,19 +128,19 @@ class Robot:
     async def state(self) -> State:
         """The present state: in real time the next to come, otherwise the last, since time stands still.
 
+        Before the first tick it is how the arm stands. In lockstep the first call may take a second.
+
         Raises:
-            MisuseError: No tick has passed yet, or in a robot in process none since this client listens.
             AnswerTimeoutError: None came within `STATE_S`.
+            MisuseError: A host in process, not one of ours, tells no state before its first tick.
+            NotConnectedError: The connection is closed, or the robot has gone.
         """
         self._states.subscribe()
         clock = await self.clock()
-        if clock == "realtime":
-            return await self._next_state()
-        if self._states.latest is not None:
+        if clock != "realtime" and self._states.latest is not None:
             return self._states.latest
-        # Over the network the last state is told again every second, in process it is not.
-        if clock == "free" or (await self.info()).tick == 0:
-            raise MisuseError("no tick has passed that could be told of: take control and advance(1)")
+        if clock == "free":
+            raise MisuseError("this robot tells its state with its first tick: take control and advance(1)")
         return await self._next_state()
 
     def states(self, buffer: int = BUFFER) -> Stream[State]:
@@ -228,17 +229,20 @@ class Robot:
 
         Raises:
             RefusedError: Another client holds control; its name is in the sentence.
+            ProtocolError: `client` cannot be a client's name.
         """
+        check_client_name(client)
+        seconds = number(lease_s, "lease_s")
         clock = await self.clock()
         await self._transport.announce(client)
         try:
-            accepted = await self.request(TakeControl(client=client, lease_s=float(lease_s)))
+            accepted = await self.request(TakeControl(client=client, lease_s=seconds))
             if not isinstance(accepted, Accepted) or accepted.token is None:
                 raise UnexpectedReplyError(f"take_control was answered by {accepted}, without a token")
             arm = self._arm = Arm(self, accepted.token)
             alive = None
             if clock == "realtime":
-                alive = asyncio.create_task(arm.keep_alive_every((accepted.lease_s or lease_s) / 3))
+                alive = asyncio.create_task(arm.keep_alive_every((accepted.lease_s or seconds) / 3))
             try:
                 yield arm
             finally:
@@ -265,8 +269,10 @@ class Robot:
             The last tick that passed; its state has arrived.
 
         Raises:
+            ArgumentError: `ticks` is less than 1, or no whole number.
             MisuseError: Not in real time, and this client does not hold control.
         """
+        ticks = whole(ticks, "ticks", 1)
         if await self.clock() == "realtime":
             last = (await self._next_state()).tick + ticks
             while (tick := (await self._next_state()).tick) < last:

@@ -5,7 +5,8 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from tvist_client.errors import MisuseError, StreamStoppedError
-from tvist_client.values import floats
+from tvist_client.simulation import MAX_STEP
+from tvist_client.values import JointRange
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Setpoint, StepSetpoint
 from tvist_protocol.stream import Event
@@ -15,22 +16,27 @@ if TYPE_CHECKING:
 
 TICK = 0.002
 """Control period [s]."""
-MAX_STEP = 1000
-"""Set-points a `simulation.step` may have."""
 
 
 class Servo:
-    """What `Arm.servo` gives. Numbers the set-points from 0.
+    """What `Arm.servo` gives. Numbers the set-points from 0, and checks them: a robot answers none of them.
+
+    Args:
+        arm: Which streams.
+        period: Time between two set-points [s].
+        joints: The angles that the robot takes.
 
     Attributes:
         period: Time between two set-points [s].
         sequence: Number of the next set-point.
     """
 
-    def __init__(self, arm: "Arm", period: float) -> None:
+    def __init__(self, arm: "Arm", period: float, joints: JointRange) -> None:
         self.period = period
         self.sequence = 0
         self._arm = arm
+        self._joints = joints
+        self._left = False
         self._stopped: Event | None = None
 
     def __enter__(self) -> Self:
@@ -40,6 +46,7 @@ class Servo:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._left = True
         self._forget()
 
     def set(self, q: Iterable[float]) -> int:
@@ -54,11 +61,14 @@ class Servo:
             Its number; `state.setpoint_sequence` says when it was accepted.
 
         Raises:
+            ArgumentError: It has another number of angles, or one that is not finite or beyond its joint's range.
             StreamStoppedError: The robot has ended the stream.
+            MisuseError: The block of `Arm.servo` has been left.
         """
         self.check()
         sequence = self.sequence
-        self._arm.robot.put_setpoint(encode(Setpoint(token=self._arm.token, sequence=sequence, q=floats(q))))
+        setpoint = Setpoint(token=self._arm.token, sequence=sequence, q=self._joints.check(q))
+        self._arm.robot.put_setpoint(encode(setpoint))
         self.sequence += 1
         return sequence
 
@@ -72,6 +82,7 @@ class Servo:
             The tick of the last one's end; its state has arrived.
 
         Raises:
+            ArgumentError: As `set`; then none of them was played.
             MisuseError: Time passes by itself here, or there are no set-points.
             StreamStoppedError: The robot has ended the stream.
         """
@@ -79,7 +90,8 @@ class Servo:
         if await robot.clock() == "realtime":
             raise MisuseError("time passes by itself here: call set(q) once a period")
         setpoints = [
-            StepSetpoint(sequence=sequence, q=floats(q)) for sequence, q in enumerate(qs, self.sequence)
+            StepSetpoint(sequence=self.sequence + place, q=self._joints.check(q, f"qs[{place}]"))
+            for place, q in enumerate(qs)
         ]
         if not setpoints:
             raise MisuseError("there are no set-points to play")
@@ -99,9 +111,12 @@ class Servo:
 
         Raises:
             StreamStoppedError: The robot has ended it.
+            MisuseError: The block of `Arm.servo` has been left.
         """
         if self._stopped is not None:
             raise StreamStoppedError(self._stopped)
+        if self._left:
+            raise MisuseError("this stream has ended with its block: `servo` begins a new one")
 
     def _on_event(self, event: Event) -> None:
         if event.kind == "stream_stopped":

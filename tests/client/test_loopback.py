@@ -84,7 +84,7 @@ async def test_time_passes_only_for_who_holds_control(free):
         await free.advance(1)
 
 
-async def test_the_state_before_the_first_tick_is_said_to_be_none(free):
+async def test_a_host_that_tells_no_state_before_the_first_tick_is_said_to_tell_none(free):
     with pytest.raises(MisuseError, match="advance"):
         await free.state()
     async with free.control("me"):

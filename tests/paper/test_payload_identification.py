@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from tvist_client.arm import make_payload
+from tvist_client import make_payload
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.payload import identify_payload
 from tvist_lab.in_process import free_setup, robot_in_process

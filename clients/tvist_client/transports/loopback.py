@@ -18,7 +18,7 @@ class LoopbackHost(Protocol):
         """Take an encoded set-point."""
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> Callable[[], None]:
-        """Have every message of a topic; the function returned ends that."""
+        """Have every message of a topic, first of all the present `state` or `io`; the function returned ends that."""
 
     def info(self) -> bytes:
         """Encoded `info`."""

@@ -1,0 +1,19 @@
+"""What every command of a client with control has in common."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tvist_client.robot import Robot
+
+
+class Leased:
+    """A lease on a robot.
+
+    Attributes:
+        robot: The robot it belongs to.
+        token: Names the lease; goes with every command.
+    """
+
+    def __init__(self, robot: "Robot", token: str) -> None:
+        self.robot = robot
+        self.token = token

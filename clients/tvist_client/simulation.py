@@ -1,0 +1,97 @@
+"""What can be done with a simulated arm alone: putting it somewhere, letting time pass, causing faults."""
+
+from collections.abc import Iterable, Sequence
+
+from tvist_client.errors import UnexpectedReplyError
+from tvist_client.leased import Leased
+from tvist_client.values import floats, number, whole
+from tvist_protocol.commands import SimulationInject, SimulationReset, SimulationStep, StepSetpoint
+from tvist_protocol.replies import Done
+from tvist_protocol.values import Payload, ResetMode
+
+MAX_STEP = 1000
+"""Ticks a `simulation.step` may have, and set-points."""
+STEP_S = 60.0
+"""How long a `simulation.step` may take [s]: a server may compute more slowly than time passes."""
+
+
+class Simulation(Leased):
+    """What `Arm` does with a simulated arm."""
+
+    async def reset(
+        self,
+        q: Iterable[float] | None = None,
+        *,
+        seed: int | None = None,
+        payload: Payload | None = None,
+        mode: ResetMode | None = None,
+        shaper: str | None = None,
+    ) -> int | None:
+        """Put the simulated arm somewhere at rest; what is None stays.
+
+        Args:
+            q: Where [rad].
+            seed: Seed of the sensors' noise, which starts anew.
+            payload: What the arm carries, whatever the controller believes; `make_payload` makes one.
+            mode: Robot mode to put it into.
+            shaper: Shaper to choose.
+
+        Returns:
+            The tick at which it was done.
+        """
+        reply = await self.robot.request(
+            SimulationReset(
+                token=self.token,
+                q=None if q is None else floats(q, "q"),
+                seed=None if seed is None else whole(seed, "seed", 0),
+                payload=payload,
+                mode=mode,
+                shaper=shaper,
+            )
+        )
+        return reply.tick if isinstance(reply, Done) else None
+
+    async def step(self, ticks: int, setpoints: Sequence[StepSetpoint] | None = None) -> int:
+        """Let 1 to 1000 ticks pass at once, in lockstep and free; `Robot.advance` takes any number.
+
+        Args:
+            ticks: How many control periods.
+            setpoints: Set-points of a running stream, one a tick in order; `Servo.step_through` numbers them.
+
+        Returns:
+            The last of the ticks; its state has arrived.
+        """
+        self.robot.watch()
+        played = None if setpoints is None else tuple(setpoints)
+        step = SimulationStep(token=self.token, ticks=whole(ticks, "ticks", 1, MAX_STEP), setpoints=played)
+        reply = await self.robot.request(step, STEP_S)
+        if not isinstance(reply, Done) or reply.tick is None:
+            raise UnexpectedReplyError(f"simulation.step was answered by {reply}, without a tick")
+        await self.robot.until(reply.tick)
+        return reply.tick
+
+    async def inject(
+        self,
+        fault: str,
+        *,
+        joint: int | None = None,
+        seconds: float | None = None,
+        value: float | None = None,
+    ) -> None:
+        """Cause a fault on purpose; the protocol's README lists them.
+
+        Args:
+            fault: Its name.
+            joint: Joint that it concerns, from the base on.
+            seconds: How long it lasts [s].
+            value: How strong it is, in the fault's own unit.
+        """
+        await self.robot.request(
+            SimulationInject(
+                token=self.token,
+                fault=fault,
+                joint=None if joint is None else whole(joint, "joint", 0),
+                seconds=None if seconds is None else number(seconds, "seconds"),
+                value=None if value is None else number(value, "value"),
+            )
+        )
