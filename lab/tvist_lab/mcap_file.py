@@ -9,7 +9,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import IO, Any
 
-import msgspec
 from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
 from mcap.stream_reader import StreamReader, breakup_chunk
@@ -17,6 +16,7 @@ from zstandard import ZstdError
 
 from tvist_lab.recordings import Recording, RecordingError
 from tvist_protocol.channels import tag
+from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Info
 from tvist_protocol.journal import Entry
@@ -166,9 +166,11 @@ class _Content:
 
     def _json(self, metadata: Mapping[str, str], name: str, kind: Any) -> Any:
         try:
-            return msgspec.json.decode(metadata[name], type=kind)
-        except (KeyError, msgspec.DecodeError) as error:
-            raise self._error(f"has no valid {name}: {error}") from error
+            return checked(parse_json(metadata[name].encode()), kind)
+        except KeyError as error:
+            raise self._error(f"has no {name}") from error
+        except ProtocolError as error:
+            raise self._error(f"has no valid {name}: {error.why}") from error
 
     def _note(self, last: State, dropped: Mapping[str, int] | None) -> str | None:
         notes = [] if self.damage is None else [f"{self.damage}; it could be read up to tick {last.tick}"]

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta, Struct
 
+from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
-from tvist_protocol.explain import explain_refusal
 from tvist_protocol.values import Angle, DampingRatio, Frequency, Name, Payload, Seed
 
 Coefficient = Annotated[float, Meta(ge=-1e6, le=1e6)]
@@ -183,13 +183,12 @@ def calibration_of(content: Mapping[str, Any]) -> Calibration:
         ProtocolError: A key is unknown, missing or out of range; `where` names it within `calibration`.
     """
     try:
-        return msgspec.convert(content, Calibration)
-    except msgspec.ValidationError as error:
-        fault = explain_refusal(error, msgspec.msgpack.encode(content), {})
+        return checked(content, Calibration)
+    except ProtocolError as fault:
         where = f"calibration.{fault.where}".removesuffix(".")
-        whole, why = "the message", fault.why
+        whole, why = "the content", fault.why
         why = f"calibration{why.removeprefix(whole)}" if why.startswith(whole) else f"calibration.{why}"
-        raise ProtocolError(fault.code, where, why, fault.limit) from error
+        raise ProtocolError(fault.code, where, why, fault.limit) from fault
 
 
 def calibration_from_json(text: bytes) -> Calibration:
@@ -199,9 +198,9 @@ def calibration_from_json(text: bytes) -> Calibration:
         CalibrationError: It is no JSON, or a key is unknown, missing or out of range.
     """
     try:
-        return msgspec.json.decode(text, type=Calibration)
-    except msgspec.MsgspecError as error:
-        raise CalibrationError(str(error)) from error
+        return checked(parse_json(text), Calibration)
+    except ProtocolError as error:
+        raise CalibrationError(error.why) from error
 
 
 def calibration_to_json(calibration: Calibration) -> bytes:

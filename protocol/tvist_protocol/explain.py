@@ -1,4 +1,4 @@
-"""What is wrong with a message that came in, said to a program and to a person.
+"""What is wrong with a message that came in, or with a file, said to a program and to a person.
 
 msgspec finds the fault and says it in one text; here the text becomes code, field, sentence and limit. Only a
 message at fault pays for it: it is decoded a second time, untyped, to name the value. A long one is not: a quarter of
@@ -9,11 +9,12 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
-from typing import Any, Final, get_args, get_type_hints
+from typing import Any
 
 import msgspec
 
 from tvist_protocol.errors import SHOWN, ProtocolError, quoted, short
+from tvist_protocol.places import ABSENT, Place
 from tvist_protocol.values import PATTERN_MEANINGS
 
 FAULTS = (ValueError, TypeError, OverflowError, RecursionError, MemoryError)
@@ -26,8 +27,6 @@ EXPLAINED_BYTES = 4096
 Types = Mapping[str, type[msgspec.Struct]]
 """The messages that were possible, by `type`."""
 
-_ABSENT: Final = object()
-
 
 class _Head(msgspec.Struct):
     """What is read of a long message again."""
@@ -36,23 +35,25 @@ class _Head(msgspec.Struct):
 
 
 class _Fault:
-    """Where msgspec found a fault, and what is there."""
+    """Where msgspec found a fault, and what is there.
 
-    def __init__(self, path: str, data: bytes, types: Types) -> None:
-        self.where = path.removeprefix(".")
-        self.whole = self.where or "the message"
-        self.message = _untyped(data, Any if len(data) <= EXPLAINED_BYTES else _Head)
-        self.value = _at(self.message, path)
+    Args:
+        path: As msgspec writes it.
+        content: What it looked at.
+        kind: What it expected.
+        whole: What to call the whole.
+        types: The messages that were expected, by `type`.
+    """
+
+    def __init__(self, path: str, content: Any, kind: object, whole: str, types: Types) -> None:
+        self.place = Place(content, kind, path)
+        self.where = self.place.where
+        self.whole = self.where or whole
+        self.value = self.place.value
         self.types = types
 
-    @property
-    def expected(self) -> type[msgspec.Struct] | None:
-        """Type of the message, as far as it says."""
-        name = _at(self.message, ".type")
-        return self.types.get(name) if isinstance(name, str) else None
-
     def out_of_range(self, wanted: str, limit: float | None = None) -> ProtocolError:
-        given = "" if self.value is _ABSENT else f" is {quoted(self.value)}:"
+        given = "" if self.value is ABSENT else f" is {quoted(self.value)}:"
         return ProtocolError("out_of_range", self.where, f"{self.where}{given} must be {wanted}", limit)
 
 
@@ -64,10 +65,29 @@ def explain_refusal(error: msgspec.ValidationError, data: bytes, types: Types) -
         data: The message; of one longer than `EXPLAINED_BYTES` no value but its type is named.
         types: The messages that were expected.
     """
+    message = _untyped(data, Any if len(data) <= EXPLAINED_BYTES else _Head)
+    name = message.get("type") if isinstance(message, dict) else None
+    return _explain(error, message, types.get(name) if isinstance(name, str) else None, "the message", types)
+
+
+def explain_content(error: msgspec.ValidationError, content: Any, kind: object) -> ProtocolError:
+    """Error of what a file or a map holds, where it is not what was expected.
+
+    Args:
+        error: What `msgspec.convert` said.
+        content: Maps, lists and plain values.
+        kind: The type that was expected.
+    """
+    return _explain(error, content, kind, "the content", {})
+
+
+def _explain(
+    error: msgspec.ValidationError, content: Any, kind: object, whole: str, types: Types
+) -> ProtocolError:
     said, at, path = str(error), "", ""
     if found := _AT.fullmatch(said):
         said, at, path = found.groups()
-    fault = _Fault(path, data, types)
+    fault = _Fault(path, content, kind, whole, types)
     if at.endswith("in"):
         return ProtocolError("malformed", fault.where, f"{fault.whole} has a key that is no string")
     for pattern, rule in _RULES:
@@ -98,7 +118,8 @@ def explain_bytes(error: Exception) -> ProtocolError:
 
 
 def _unknown_field(fault: _Fault, name: str) -> ProtocolError:
-    known = fault.expected.__struct_fields__ if fault.expected and not fault.where else ()
+    expected = fault.place.struct
+    known = () if expected is None else expected.__struct_fields__
     why = f"{fault.whole} has no field {quoted(name)}{_suggest(get_close_matches(name[:SHOWN], known, n=1))}"
     return ProtocolError("unknown_field", f"{fault.where}.{short(name)}".removeprefix("."), why)
 
@@ -109,9 +130,9 @@ def _missing_field(fault: _Fault, name: str) -> ProtocolError:
 
 
 def _length(fault: _Fault, kind: str, relation: str, limit: str) -> ProtocolError:
-    things = "characters" if kind == "str" else "entries"
+    things, one = ("characters", "character") if kind == "str" else ("entries", "entry")
     has = f" has {len(fault.value)} {things}:" if isinstance(fault.value, str | list) else ""
-    why = f"{fault.where}{has} must have {_RELATIONS[relation]} {limit} {things}"
+    why = f"{fault.whole}{has} must have {_RELATIONS[relation]} {limit} {one if limit == '1' else things}"
     return ProtocolError("out_of_range", fault.where, why, int(limit))
 
 
@@ -126,8 +147,7 @@ def _pattern(fault: _Fault, said: str) -> ProtocolError:
 
 
 def _choice(fault: _Fault) -> ProtocolError:
-    hint = get_type_hints(fault.expected).get(fault.where) if fault.expected else None
-    return fault.out_of_range(f"one of {', '.join(_literals(hint)) or 'those in the protocol'}")
+    return fault.out_of_range(f"one of {', '.join(fault.place.literals) or 'those in the protocol'}")
 
 
 def _tag(fault: _Fault) -> ProtocolError:
@@ -168,11 +188,6 @@ def _kinds(said: str) -> str:
     return " or ".join(_KINDS.get(kind, kind) for kind in said.split(" | "))
 
 
-def _literals(hint: object) -> Iterable[str]:
-    for part in get_args(hint):
-        yield from [repr(part)] if isinstance(part, str) else _literals(part)
-
-
 def _suggest(near: Iterable[str]) -> str:
     names = " or ".join(map(repr, near))
     return f": did you mean {names}?" if names else ""
@@ -182,16 +197,4 @@ def _untyped(data: bytes, kind: Any) -> Any:
     try:
         return msgspec.to_builtins(msgspec.msgpack.decode(data, type=kind))
     except FAULTS:
-        return _ABSENT
-
-
-def _at(message: Any, path: str) -> Any:
-    value, end = message, 0
-    for step in re.finditer(r"\.([^.\[]+)|\[(\d+)\]", path):
-        name, index = step.groups()
-        try:
-            value = value[int(index) if name is None else name]
-        except (TypeError, LookupError):
-            return _ABSENT
-        end = step.end()
-    return value if end == len(path) else _ABSENT
+        return ABSENT

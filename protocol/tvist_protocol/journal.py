@@ -9,7 +9,8 @@ import msgspec
 from msgspec import Meta, Struct
 
 from tvist_protocol.commands import Command, Setpoint
-from tvist_protocol.errors import ProtocolError, short
+from tvist_protocol.errors import ProtocolError
+from tvist_protocol.explain import explain_content
 
 EntryKind = Literal["command", "setpoint", "setpoint_refused", "client_seen", "client_gone", "missed"]
 
@@ -61,7 +62,7 @@ def message_of(entry: Entry) -> Command | Setpoint:
             return msgspec.convert(entry.message, Setpoint)
         command: Command = msgspec.convert(entry.message, Command)
     except msgspec.ValidationError as error:
-        raise ProtocolError(
-            "malformed", "message", f"{where} is no valid message: {short(str(error))}"
-        ) from error
+        kind = Setpoint if entry.kind == "setpoint" else Command
+        fault = explain_content(error, entry.message, kind)
+        raise ProtocolError("malformed", "message", f"{where} is no valid message: {fault.why}") from error
     return command

@@ -11,6 +11,8 @@ import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 
+from tvist_plant._words import in_words
+
 Number = Annotated[float, Meta(ge=-1e7, le=1e7)]
 Positive = Annotated[float, Meta(gt=0, le=1e7)]
 NotNegative = Annotated[float, Meta(ge=0, le=1e7)]
@@ -251,14 +253,21 @@ def load(robot: str | Path) -> RobotDescription:
             text = shipped.read_text(encoding="utf-8")
         else:
             text = Path(robot).read_text(encoding="utf-8")
-        description = msgspec.convert(tomllib.loads(text), RobotDescription)
+        content = tomllib.loads(text)
+        description = msgspec.convert(content, RobotDescription)
     except OSError as error:
         known = ", ".join(robots())
         raise DescriptionError(
-            f"robot {str(robot)!r}: neither one of {known} nor a readable file ({error})"
+            f"robot {str(robot)!r}: neither one of {known} nor a readable file ({error.strerror})"
         ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, msgspec.ValidationError) as error:
-        raise DescriptionError(f"robot file {robot}: {error}") from error
+    except UnicodeDecodeError as error:
+        raise DescriptionError(
+            f"robot file {robot}: it is no text: byte {error.start} is not UTF-8"
+        ) from error
+    except tomllib.TOMLDecodeError as error:
+        raise DescriptionError(f"robot file {robot}: it is no TOML: {error}") from error
+    except msgspec.ValidationError as error:
+        raise DescriptionError(f"robot file {robot}: {in_words(error, content)}") from error
     _check(description, robot)
     _check_bodies(description, robot)
     return description

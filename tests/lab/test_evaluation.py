@@ -83,8 +83,8 @@ class TestFiles:
         ("content", "words"),
         [
             ("[{", ["moves.json"]),
-            ("{}", ["moves.json", "array"]),
-            ([], ["moves.json", "length >= 1"]),
+            ("{}", ["moves.json", "must be a list"]),
+            ([], ["moves.json", "at least 1 entry"]),
             ([{"start": HOME}], ["move 1", "target"]),
             ([{"start": HOME, "target": but(0, 1.0), "load": 1}], ["move 1", "load"]),
             ([{"start": HOME, "target": but(0, 1.0), "payload": -1}], ["move 1", "payload", "0"]),

@@ -64,7 +64,11 @@ def test_a_calibration_keeps_the_difference_between_integers_and_floats():
         (Entry(tick=3, kind="missed", count=2), "missing_field", "missed before tick 3 has no message"),
         (Entry(tick=3, kind="command", message={"type": "fly"}), "malformed", "command before tick 3"),
         (Entry(tick=3, kind="setpoint", message={"type": "stop"}), "malformed", "setpoint before tick 3"),
-        (Entry(tick=3, kind="command", message={"type": "move_j", "token": "t"}), "malformed", "`q`"),
+        (
+            Entry(tick=3, kind="command", message={"type": "move_j", "token": "t"}),
+            "malformed",
+            "q is missing",
+        ),
     ],
 )
 def test_an_entry_that_holds_no_message_says_so(entry, code, says):

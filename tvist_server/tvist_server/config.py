@@ -3,15 +3,15 @@
 import dataclasses
 import ipaddress
 import tempfile
-import tomllib
 from pathlib import Path
 from typing import Annotated
 
-import msgspec
 from msgspec import Meta, Struct
 from msgspec.structs import replace
 
 from tvist_plant.description import RobotDescription, load
+from tvist_protocol.content import checked, parse_toml
+from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Clock
 from tvist_protocol.values import RobotName, Seed
 from tvist_server import calibrations
@@ -182,13 +182,14 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     def _start(self, description: RobotDescription) -> tuple[float, ...]:
         if not isinstance(self.start, str):
             return self.start
-        if self.start in description.poses:
-            return description.poses[self.start]
+        for name, pose in description.poses.items():
+            if name.lower() == self.start.strip().lower():
+                return pose
         try:
             return tuple(float(angle) for angle in self.start.split(","))
         except ValueError:
             known = ", ".join(description.poses)
-            why = f"start is {self.start!r}: must be one of {known}, or angles with commas"
+            why = f"start is {self.start.strip()!r}: must be one of {known}, or angles with commas"
             raise ConfigError(why) from None
 
 
@@ -203,9 +204,9 @@ def from_mapping(content: object, source: str) -> ServeConfig:
             if content.get(key) is not None:
                 raise ConfigError(f"{source}: robots and {key} exclude each other: {_INSTEAD[key]}")
     try:
-        return msgspec.convert(content, ServeConfig)
-    except msgspec.ValidationError as error:
-        raise ConfigError(f"{source}: {error}") from error
+        return checked(content, ServeConfig)
+    except ProtocolError as error:
+        raise ConfigError(f"{source}: {error.why}") from error
 
 
 def read_toml(path: str) -> dict[str, object]:
@@ -215,8 +216,8 @@ def read_toml(path: str) -> dict[str, object]:
         ConfigError: It cannot be read, or is no TOML.
     """
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        return parse_toml(Path(path).read_bytes())
     except OSError as error:
         raise ConfigError(f"configuration {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"configuration {path}: {error}") from error
+    except ProtocolError as error:
+        raise ConfigError(f"configuration {path}: {error.why}") from error

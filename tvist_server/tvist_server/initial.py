@@ -4,9 +4,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import msgspec
 from msgspec import Struct
 
+from tvist_protocol.content import checked, parse_json, parse_toml
+from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import Joints, Name, Payload, ResetMode, Seed
 from tvist_server.setup import Setup
 
@@ -47,11 +48,10 @@ def read_state(path: str) -> InitialState:
     Raises:
         InitialStateError: It cannot be read, or a field is unknown or out of range.
     """
-    decoder = msgspec.json if Path(path).suffix == ".json" else msgspec.toml
+    parse = parse_json if Path(path).suffix == ".json" else parse_toml
     try:
-        state: InitialState = decoder.decode(Path(path).read_bytes(), type=InitialState)
-        return state  # noqa: TRY300  it is one step
+        return checked(parse(Path(path).read_bytes()), InitialState)
     except OSError as error:
         raise InitialStateError(f"state {path}: {error.strerror}") from error
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise InitialStateError(f"state {path}: {error}") from error
+    except ProtocolError as error:
+        raise InitialStateError(f"state {path}: {error.why}") from error

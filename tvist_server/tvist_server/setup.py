@@ -8,6 +8,7 @@ import msgspec
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription, is_real_body
 from tvist_protocol.calibration import Calibration, calibration_of
+from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Clock
 from tvist_protocol.values import Payload, ResetMode
@@ -96,17 +97,21 @@ class Setup:
             calibration = content["calibration"]
             return replace(
                 cls(
-                    description=msgspec.convert(content["description"], RobotDescription),
+                    description=checked(content["description"], RobotDescription),
                     q=tuple(map(float, content["q"])),
-                    payload=msgspec.convert(content["payload"], Payload),
-                    carried=msgspec.convert(content["carried"], Payload | None),
+                    payload=checked(content["payload"], Payload),
+                    carried=None if content["carried"] is None else checked(content["carried"], Payload),
                     mode=msgspec.convert(content["mode"], ResetMode),
                     calibration=None if calibration is None else calibration_of(calibration),
                 ),
                 **{key: content[key] for key in ("name", "shaper", "seed", "clock", "truth")},
             )
-        except (KeyError, TypeError, msgspec.ValidationError, ProtocolError) as error:
+        except KeyError as error:
+            raise ValueError(f"start of the recording: {error.args[0]} is missing") from error
+        except TypeError as error:
             raise ValueError(f"start of the recording: {error}") from error
+        except ProtocolError as error:
+            raise ValueError(f"start of the recording: {error.why}") from error
 
 
 def body(payload: Payload) -> Body:

@@ -1,5 +1,6 @@
 """Moves to evaluate: from a file, or drawn at random."""
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,8 @@ from msgspec import Meta, Struct
 from tvist_lab.recordings import Floats
 from tvist_lab.workspace import WORKSPACE, Region
 from tvist_plant.description import RobotDescription
+from tvist_protocol.content import checked, parse_json
+from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import Angle, Mass
 from tvist_server.collision import CollisionModel
 from tvist_server.setup import body, paper_payload
@@ -67,11 +70,11 @@ def read_moves(path: Path, description: RobotDescription, masses: Callable[[], f
         MovesError: It cannot be read, or a move is beyond a limit or goes nowhere.
     """
     try:
-        entries = msgspec.json.decode(path.read_bytes(), type=Entries)
+        entries = checked(parse_json(path.read_bytes()), Entries)
     except OSError as error:
         raise MovesError(f"moves {path}: {error.strerror}") from error
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise MovesError(f"moves {path}: {_in_words(str(error))}") from error
+    except ProtocolError as error:
+        raise MovesError(f"moves {path}: {_in_words(error.why)}") from error
     moves = [
         Move(entry.start, entry.target, masses() if entry.payload is None else entry.payload)
         for entry in entries
@@ -199,12 +202,10 @@ def _check(number: int, move: Move, description: RobotDescription) -> None:
         raise MovesError(f"move {number} goes nowhere: no joint turns by {LEAST:g} rad or more")
 
 
-def _in_words(message: str) -> str:
-    """A message of msgspec with the place as a person counts: `$[2].start[1]` is move 3, start, joint 2."""
-    what, _, place = message.partition(" - at `$")
-    if not place:
-        return what
-    numbers = place.rstrip("`").replace("]", "").replace(".", "[").split("[")
-    words = [f"move {int(numbers[1]) + 1}"] if len(numbers) > 1 and numbers[1].isdigit() else []
-    words += [f"joint {int(part) + 1}" if part.isdigit() else part for part in numbers[2:]]
-    return f"{', '.join(words)}: {what}"
+def _in_words(why: str) -> str:
+    """A sentence with the place as a person counts: `[2].start[1]` is move 3, start, joint 2."""
+    words = re.sub(r"^\[(\d+)\]\.?", lambda found: f"move {int(found[1]) + 1}, ", why)
+    words = re.sub(
+        r"^(move \d+, \w+)\[(\d+)\]", lambda found: f"{found[1]}, joint {int(found[2]) + 1}", words
+    )
+    return re.sub(r"^(move \d+), (?=has|must|is )", r"\1 ", words)

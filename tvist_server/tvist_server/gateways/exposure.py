@@ -13,14 +13,13 @@ Both sides show a certificate (mutual TLS); the common name of the client's deci
 import contextlib
 import ipaddress
 import ssl
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
 from tvist_protocol.codec import MAX_BYTES
+from tvist_protocol.content import checked, parse_toml
+from tvist_protocol.errors import ProtocolError
 from tvist_server.gateways.access import Role, access_control, open_access
 from tvist_server.gateways.endpoints import is_local, options, protocol
 
@@ -99,11 +98,13 @@ def roles_in(folder: Path) -> dict[str, Role]:
     """
     path = folder / CLIENTS
     try:
-        return msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), dict[str, Role])
+        return checked(parse_toml(path.read_bytes()), dict[str, Role])
     except OSError as error:
         raise ExposureError(f"{path}: {error.strerror}; `tvist keys` makes it") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, msgspec.ValidationError) as error:
-        raise ExposureError(f'{path}: {error}; a line is "NAME" = "operator" or "NAME" = "viewer"') from error
+    except ProtocolError as error:
+        raise ExposureError(
+            f'{path}: {error.why}; a line is "NAME" = "operator" or "NAME" = "viewer"'
+        ) from error
 
 
 def _secured(endpoint: str) -> str:

@@ -1,0 +1,65 @@
+"""What a file or a map holds, checked: a fault is said in words, with key, value and what is allowed."""
+
+import json
+import tomllib
+from typing import Any, NoReturn, TypeVar
+
+import msgspec
+
+from tvist_protocol.errors import ProtocolError
+from tvist_protocol.explain import explain_content
+
+T = TypeVar("T")
+
+
+def checked(content: object, kind: type[T]) -> T:
+    """Maps, lists and plain values as a struct, or as whatever type is expected.
+
+    Raises:
+        ProtocolError: A key is unknown or missing, or a value of another kind or out of range.
+    """
+    try:
+        return msgspec.convert(content, kind)
+    except msgspec.ValidationError as error:
+        raise explain_content(error, content, kind) from error
+
+
+def parse_json(data: bytes) -> Any:
+    """What JSON text holds.
+
+    Raises:
+        ProtocolError: It is none; line and column stand in the sentence.
+    """
+    try:
+        return json.loads(data.decode(), parse_constant=_no_number)
+    except UnicodeDecodeError as error:
+        raise _no_text(error) from error
+    except json.JSONDecodeError as error:
+        why = f"it is no JSON: line {error.lineno}, column {error.colno}: {error.msg}"
+        raise ProtocolError("malformed", "", why) from error
+    except RecursionError as error:
+        raise ProtocolError("malformed", "", "it is nested too deeply") from error
+
+
+def parse_toml(data: bytes) -> dict[str, Any]:
+    """What TOML text holds.
+
+    Raises:
+        ProtocolError: It is none; line and column stand in the sentence.
+    """
+    try:
+        return tomllib.loads(data.decode())
+    except UnicodeDecodeError as error:
+        raise _no_text(error) from error
+    except tomllib.TOMLDecodeError as error:
+        raise ProtocolError("malformed", "", f"it is no TOML: {error}") from error
+    except RecursionError as error:
+        raise ProtocolError("malformed", "", "it is nested too deeply") from error
+
+
+def _no_number(text: str) -> NoReturn:
+    raise ProtocolError("out_of_range", "", f"it holds {text}, which is no number")
+
+
+def _no_text(error: UnicodeDecodeError) -> ProtocolError:
+    return ProtocolError("malformed", "", f"it is no text: byte {error.start} is not UTF-8")

@@ -1,0 +1,97 @@
+"""Where in a value of maps and lists a path of msgspec's leads, and what was expected there."""
+
+import re
+import types
+from collections.abc import Iterator
+from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_hints
+
+import msgspec
+
+ABSENT: Final = object()
+"""There is nothing at the end of the path."""
+_STEP = re.compile(r"\.([^.\[]+)|\[(\d+)\]|\[(\.\.\.)\]")
+
+
+class Place:
+    """The end of a path.
+
+    Args:
+        content: Maps, lists and plain values.
+        kind: What was expected of the whole; None where nobody knows.
+        path: As msgspec writes it, `.payload.com[2]`; `[...]` stands for an entry of a map, by whatever key.
+    """
+
+    def __init__(self, content: Any, kind: object, path: str) -> None:
+        self.where = ""
+        """The path in plain form, `payload.com[2]`."""
+        self.value: Any = content
+        """What is there."""
+        self.kind = kind
+        """The type that was expected there; None where nobody knows."""
+        end = 0
+        for step in _STEP.finditer(path):
+            self._go(*step.groups())
+            end = step.end()
+        if end != len(path):
+            self.where, self.value, self.kind = path.removeprefix("."), ABSENT, None
+
+    def _go(self, name: str | None, index: str | None, any_key: str | None) -> None:
+        entry = next(filter(None, (_entry_type(kind, name, index) for kind in _choices(self.kind))), None)
+        if any_key is not None:
+            name = _culprit(self.value, entry)
+        try:
+            self.value = self.value[int(index) if index is not None else name]
+        except (TypeError, LookupError):
+            self.value = ABSENT
+        self.where += f"[{index}]" if index is not None else f".{name}"
+        self.where, self.kind = self.where.removeprefix("."), entry
+
+    @property
+    def struct(self) -> type[msgspec.Struct] | None:
+        """The struct that was expected there, where it was one."""
+        found = (kind for kind in _choices(self.kind) if isinstance(kind, type))
+        return next((kind for kind in found if issubclass(kind, msgspec.Struct)), None)
+
+    @property
+    def literals(self) -> list[str]:
+        """The strings to choose from there, as Python writes them."""
+        return list(_literals(self.kind))
+
+
+def _choices(kind: object) -> Iterator[object]:
+    """The members of a union, without what annotates them."""
+    origin = get_origin(kind)
+    if origin is Annotated:
+        yield from _choices(get_args(kind)[0])
+    elif origin in {Union, types.UnionType}:
+        for member in get_args(kind):
+            yield from _choices(member)
+    else:
+        yield kind
+
+
+def _entry_type(kind: object, name: str | None, index: str | None) -> object:
+    """The type of an entry of a struct, a map or a list."""
+    origin, parts = get_origin(kind), get_args(kind)
+    if index is not None and origin in {tuple, list}:
+        return parts[0] if origin is list or parts[-1] is Ellipsis else parts[min(int(index), len(parts) - 1)]
+    if index is None and origin is dict:
+        return parts[1]
+    if name is not None and isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        return get_type_hints(kind, include_extras=True).get(name)
+    return None
+
+
+def _culprit(content: Any, kind: object) -> str:
+    """The key of the entry that is none of this type: msgspec does not say which."""
+    for key, value in content.items() if isinstance(content, dict) else ():
+        try:
+            msgspec.convert(value, kind)
+        except (msgspec.ValidationError, TypeError):
+            return str(key)
+    return "..."
+
+
+def _literals(kind: object) -> Iterator[str]:
+    for part in get_args(kind):
+        yield from [repr(part)] if isinstance(part, str) else _literals(part)
