@@ -27,7 +27,15 @@ COMMANDS = {
 
 
 def main() -> None:
-    """Run the program."""
+    """Run the program; Control+C ends it with exit code 130 and without a traceback, whenever it comes."""
+    try:
+        _run()
+    except KeyboardInterrupt:
+        print("tvist: interrupted", file=sys.stderr)
+        sys.exit(130)
+
+
+def _run() -> None:
     if sys.argv[1:2] == ["serve"]:
         # Nothing is served yet, so whoever ends it gets what was asked for. As the first process of a container
         # it has no default to end by.
@@ -40,24 +48,25 @@ def main() -> None:
         import cyclopts
     except ImportError:
         sys.exit("tvist: the command line needs the server's packages: pip install 'tvist[lab]'")
-    from tvist_cli.failure import Failure
+    from tvist_cli.failure import Failure, told
+    from tvist_cli.misuse import check_whole, finite, readable, sentence
 
     app = cyclopts.App(
         name="tvist",
         help="A robot controller for a flexible arm in simulation, with time-varying input shaping.",
         version=version("tvist"),
         help_format="plaintext",
-        default_parameter=cyclopts.Parameter(negative=()),
+        default_parameter=cyclopts.Parameter(negative=(), validator=finite),
+        config=check_whole,
     )
     for place, (name, what) in enumerate(COMMANDS.items()):
         app.command(f"tvist_cli.commands.{name}:{name}", name=name, help=what, sort_key=place)
     try:
-        app(exit_on_error=False, print_error=False)
+        with told(OSError):  # a folder for figures that is none, mostly
+            app(readable(sys.argv[1:]), exit_on_error=False, print_error=False)
     except cyclopts.CycloptsError as error:
-        print(f"tvist: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"tvist: {sentence(error, tuple(COMMANDS))}", file=sys.stderr)
         sys.exit(2)
     except Failure as failure:
         print(f"tvist: {failure}", file=sys.stderr)
         sys.exit(failure.code)
-    except KeyboardInterrupt:
-        sys.exit(130)

@@ -10,6 +10,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from tvist_cli.failure import interrupted
+
 WIDTH = 120
 """Columns where there is no terminal to ask."""
 out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH)
@@ -29,12 +31,33 @@ def print_json(value: Any) -> None:
 
 
 @contextmanager
-def progress(total: int, what: str) -> Iterator[Callable[[int, str | None], None]]:
-    """A bar on stderr, where that is a terminal; the function given advances it and may rename what is done."""
+def progress(
+    total: int, what: str, kept: str = "nothing was written"
+) -> Iterator[Callable[[int, str | None], None]]:
+    """A bar on stderr, where that is a terminal; the function given advances it and may rename what is done.
+
+    Args:
+        total: How many there are.
+        what: Of what, in the plural.
+        kept: What is left of it at Control+C.
+
+    Raises:
+        Failure: Control+C came; the sentence says how far it was.
+    """
+    done = 0
+
+    def advance(steps: int, name: str | None) -> None:
+        nonlocal done
+        done += steps
+        bar.update(task, advance=steps, description=name or what)
+
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
         task = bar.add_task(what, total=total)
-        yield lambda steps, name: bar.update(task, advance=steps, description=name or what)
+        try:
+            yield advance
+        except KeyboardInterrupt:
+            raise interrupted(f"{done} of {total} {what} were done; {kept}") from None
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

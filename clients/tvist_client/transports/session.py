@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import re
 import threading
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -10,7 +11,11 @@ import zenoh
 
 from tvist_client.errors import NotConnectedError
 from tvist_client.transports.certificates import Folder, settings, why_refused
+from tvist_protocol.errors import quoted
 
+_PORT = "[1-9]\\d{0,3}|[1-5]\\d{4}|6[0-4]\\d{3}|65[0-4]\\d{2}|655[0-2]\\d|6553[0-5]"
+_ENDPOINT = re.compile(rf"(?!(tcp|tls|udp|quic|ws)/)[a-z]+[/-].*|[a-z]+/\S+:({_PORT})([?#].*)?")
+"""Those with a port have one that there is; others are Zenoh's to judge."""
 CONFIG: Mapping[str, Any] = {
     "mode": "client",
     # The endpoint is named: nobody has to be looked for.
@@ -30,16 +35,15 @@ def open_session(endpoint: str, security: Folder | None = None) -> zenoh.Session
     Raises:
         NotConnectedError: Nobody listens there, or the certificate is not taken.
     """
+    if not isinstance(endpoint, str) or not _ENDPOINT.fullmatch(endpoint):
+        raise NotConnectedError(_no_endpoint(endpoint))
     config = zenoh.Config()
     shown = settings(endpoint, security)
     try:
         for path, value in {**CONFIG, **shown, "connect/endpoints": [endpoint]}.items():
             config.insert_json5(path, json.dumps(value))
     except zenoh.ZError as error:
-        why = (
-            f"{endpoint!r} is no endpoint: it has the form tcp/<host>:<port>, for instance tcp/127.0.0.1:7447"
-        )
-        raise NotConnectedError(why) from error
+        raise NotConnectedError(_no_endpoint(endpoint)) from error
     try:
         session = zenoh.open(config)
     except zenoh.ZError as error:
@@ -50,6 +54,11 @@ def open_session(endpoint: str, security: Folder | None = None) -> zenoh.Session
         raise NotConnectedError(why) from error
     _OPEN.add(session)
     return session
+
+
+def _no_endpoint(endpoint: object) -> str:
+    form = "it has the form tcp/<host>:<port>, for instance tcp/127.0.0.1:7447, with a port from 1 to 65535"
+    return f"{quoted(endpoint)} is no endpoint: {form}"
 
 
 def close_session(session: zenoh.Session) -> None:

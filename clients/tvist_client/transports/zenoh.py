@@ -249,6 +249,25 @@ async def robots_at(endpoint: str, security: Folder | None = None) -> list[str]:
         await asyncio.to_thread(close_session, session)
 
 
+async def only_robot(endpoint: str, wanted: str, security: Folder | None = None) -> str:
+    """Name of the robot that is meant where none is named: the wanted one, or where it is not there the only one.
+
+    Args:
+        endpoint: Where the server listens, `tcp/127.0.0.1:7447`.
+        wanted: Name of the one that is taken where it is there.
+        security: Folder with this client's certificate, for `tls/<host>:<port>`.
+
+    Raises:
+        NotConnectedError: Nobody listens there, no robot is there, or there are several others.
+    """
+    robots = await robots_at(endpoint, security)
+    if wanted in robots or not robots:
+        return wanted
+    if len(robots) > 1:
+        raise NotConnectedError(f"there are several robots at {endpoint}: name one of {', '.join(robots)}")
+    return robots[0]
+
+
 async def _robots(session: zenoh.Session) -> list[str]:
     """Names of the robots that can be reached, sorted: ur5e-2 before ur5e-10."""
     loop = asyncio.get_running_loop()

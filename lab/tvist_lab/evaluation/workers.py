@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
 
@@ -27,5 +28,7 @@ def spread(
     if cores == 1 or len(tasks) <= few:
         yield from map(work, tasks)
         return
-    with multiprocessing.get_context("spawn").Pool(min(cores, len(tasks))) as pool:
+    # Control+C reaches every process of a terminal: this one ends the others, which say nothing.
+    ignored = (signal.SIGINT, signal.SIG_IGN)
+    with multiprocessing.get_context("spawn").Pool(min(cores, len(tasks)), signal.signal, ignored) as pool:
         yield from pool.imap(work, tasks, chunk)

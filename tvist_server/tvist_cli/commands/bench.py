@@ -2,7 +2,7 @@
 
 import asyncio
 
-from tvist_cli.failure import Failure
+from tvist_cli.failure import Failure, interrupted
 from tvist_cli.output import err, out, print_json, say, table
 
 
@@ -18,15 +18,24 @@ def bench(
             size, sound and unsound, in so many pairs of runs of --seconds.
         json: Print one JSON object.
     """
-    if hostile is not None:
-        _hostile(hostile, seconds, json)
-        return
-    if soak is not None:
-        _soak(soak, json)
-        return
-    from tvist_lab.bench import bench as run
+    if seconds < 0.0:
+        raise Failure(f"seconds is {seconds:g}: must be at least 0", code=2)
+    if soak is not None and soak <= 0.0:
+        raise Failure(f"soak is {soak:g} minutes: must be more than 0", code=2)
+    if hostile is not None and not (hostile >= 2 and seconds > 0.0):
+        raise Failure(f"hostile is {hostile}: must be at least 2 pairs of runs, of more than 0 seconds", code=2)
+    try:
+        if hostile is not None:
+            _hostile(hostile, seconds, json)
+            return
+        if soak is not None:
+            _soak(soak, json)
+            return
+        from tvist_lab.bench import bench as run
 
-    result = run(seconds, tell=lambda what: err.print(f"measuring {what} ..."))
+        result = run(seconds, tell=lambda what: err.print(f"measuring {what} ..."))
+    except KeyboardInterrupt:
+        raise interrupted("what was measured so far is lost; what was served has ended") from None
     if json:
         print_json(result)
         return
@@ -41,8 +50,6 @@ def bench(
 def _hostile(pairs: int, seconds: float, json: bool) -> None:
     from tvist_lab.benchmark.hostile import hostile
 
-    if pairs < 2 or not seconds > 0.0:
-        raise Failure("hostile takes two pairs of runs or more, and runs that last some seconds", code=2)
     result = asyncio.run(hostile(pairs, seconds, tell=err.print))
     if json:
         print_json(result)

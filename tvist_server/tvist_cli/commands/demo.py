@@ -18,7 +18,10 @@ def demo(*, output: Path = Path("tvist-demo"), seed: int = 0, json: bool = False
     from tvist_lab.demo import DemoError, run_demo
     from tvist_lab.paper.experiment import count
 
-    with progress(count(1, baselines=False), "starting a robot") as bar, told(DemoError, OSError):
+    with (
+        progress(count(1, baselines=False), "motions", f"the recording so far is in {output}") as bar,
+        told(DemoError, OSError),
+    ):
 
         def advance(what: str) -> None:
             bar(1, what)

@@ -71,7 +71,8 @@ def evaluate(
     from tvist_lab.evaluation.evaluate import evaluate as run
     from tvist_plant.description import DescriptionError, load
 
-    _check(moves, random, seed, modes, frequency_error)
+    _check(moves, random, seed, modes, frequency_error, wrists=wrists)
+    shaper = shaper.lower()
     with told(DescriptionError, code=2):
         description = load(robot)
     masses = _masses(payload, description)
@@ -115,9 +116,13 @@ def evaluate(
         _print(result)
 
 
-def _check(moves: Path | None, random: int | None, seed: int, modes: int, frequency_error: float) -> None:
+def _check(
+    moves: Path | None, random: int | None, seed: int, modes: int, frequency_error: float, *, wrists: bool
+) -> None:
     if (moves is None) == (random is None):
         raise Failure("give either --moves FILE or --random N", code=2)
+    if wrists and moves is not None:
+        raise Failure("wrists goes with --random: moves of a file turn what they turn", code=2)
     if random is not None and not 1 <= random <= 100_000:
         raise Failure(f"random is {random}: must be 1 to 100000", code=2)
     if not 0 <= seed < 2**63:

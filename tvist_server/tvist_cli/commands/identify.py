@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from tvist_cli.failure import Failure, told
 from tvist_cli.identified import report_modal, report_payload, report_polynomial
 from tvist_cli.output import err, progress
+from tvist_cli.poses import pose
 
 if TYPE_CHECKING:
     from tvist_client.arm import Arm
@@ -244,7 +245,9 @@ def _endpoint_and_mass(endpoint: str | None, payload: list[str] | None) -> tuple
     mass = None
     for word in payload or []:
         try:
-            mass = float(word)
+            given, mass = mass, float(word)
+            if given is not None:
+                raise Failure(f"payload is {given:g} and {mass:g}: give one mass", code=2)
         except ValueError:
             if endpoint is not None or "/" not in word:
                 raise Failure(f"payload is {word!r}: must be a mass in kg, or nothing", code=2) from None
@@ -263,14 +266,7 @@ def _masses(text: str) -> tuple[float, ...]:
 
 
 def _pose(text: str, poses: dict[str, tuple[float, ...]], joints: int) -> tuple[float, ...]:
-    if text in poses:
-        return poses[text]
-    try:
-        angles = tuple(float(angle) for angle in text.split(","))
-    except ValueError:
-        angles = ()
+    angles = pose(text, poses, "at")
     if len(angles) != joints:
-        raise Failure(
-            f"at is {text!r}: must be one of {', '.join(poses)}, or {joints} angles with commas", code=2
-        )
+        raise Failure(f"at has {len(angles)} angles, {text.strip()}: the arm has {joints} joints", code=2)
     return angles

@@ -2,30 +2,37 @@
 
 import asyncio
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, interrupted, told
 from tvist_cli.output import out, print_json
+from tvist_cli.poses import pose
+
+if TYPE_CHECKING:
+    from tvist_client.arm import Arm
 
 
 def move(
     target: str,
     *,
     endpoint: str = "tcp/127.0.0.1:7447",
-    name: str = "ur5e",
+    name: str | None = None,
     security: Path | None = None,
+    degrees: bool = False,
     velocity: float = 1.5,
     acceleration: float = 2.0,
     jerk: float = 100.0,
     shaper: str | None = None,
     json: bool = False,
 ) -> None:
-    """Move a served robot to a pose and say how long it took.
+    """Move a served robot to a pose and say how long it took; Control+C stops the motion.
 
     Args:
-        target: Q1, Q2, Q3, or joint angles in rad with commas.
+        target: Q1, Q2, Q3, or joint angles with commas, in rad: -0.5,-3.1,0,-1.57,0,0.
         endpoint: Zenoh endpoint of the robot.
-        name: Its name.
+        name: Its name [ur5e, or where there is none the only robot that is there].
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
+        degrees: The angles of the target are in degrees; limits stay in rad.
         velocity: Limit for every joint in rad/s.
         acceleration: Limit for every joint in rad/s².
         jerk: Limit for every joint in rad/s³.
@@ -33,32 +40,45 @@ def move(
         json: Print one JSON object.
     """
     from tvist_client.readiness import look, unlock_command
-    from tvist_client.robot import Robot
+    from tvist_client.robot import NAME, Robot
+    from tvist_client.transports.zenoh import only_robot
     from tvist_lab.paper.published import published
 
     poses = {key: tuple(value["q"]) for key, value in published()["configurations"].items()}
-    try:
-        q = poses[target] if target in poses else tuple(float(angle) for angle in target.split(","))
-    except ValueError:
-        known = ", ".join(poses)
-        raise Failure(
-            f"target is {target!r}: must be one of {known}, or joint angles with commas", code=2
-        ) from None
+    q = pose(target, poses, "target", degrees=degrees)
+    held = False
 
     async def run() -> tuple[int, int]:
-        async with await Robot.connect(endpoint, name, security=security) as robot:
-            found = await look(robot, unlock_command(endpoint, name, security))
-            if not found.ready:
-                raise Failure(f"{name} is not ready: {found.sentence}")
+        nonlocal held
+        found = name if name is not None else await only_robot(endpoint, NAME, security)
+        async with await Robot.connect(endpoint, found, security=security) as robot:
+            standing = await look(robot, unlock_command(endpoint, found, security))
+            if not standing.ready:
+                raise Failure(f"{found} is not ready: {standing.sentence}")
             async with robot.control("tvist move") as arm:
                 if shaper is not None:
-                    await arm.set_shaper(shaper)
-                motion = await arm.move_j(q, velocity=velocity, acceleration=acceleration, jerk=jerk)
+                    await arm.set_shaper(shaper.lower())
+                held = True
+                try:
+                    motion = await arm.move_j(q, velocity=velocity, acceleration=acceleration, jerk=jerk)
+                except asyncio.CancelledError:
+                    await _stop(arm)
+                    raise
                 return motion.started or 0, motion.done or 0
 
     with told():
-        started, done = asyncio.run(run())
+        try:
+            started, done = asyncio.run(run())
+        except KeyboardInterrupt:
+            ended = "the motion was stopped; the robot is at rest" if held else "nothing was moved"
+            raise interrupted(ended) from None
     if json:
         print_json({"started_tick": started, "done_tick": done, "seconds": (done - started) * 0.002})
     else:
-        out.print(f"moved to {target} in {(done - started) * 0.002:.3f} s")
+        out.print(f"moved to {target.strip()} in {(done - started) * 0.002:.3f} s", markup=False)
+
+
+async def _stop(arm: "Arm") -> None:
+    """Bring the robot to rest, whether or not the answer to the motion has come."""
+    await arm.stop()
+    await arm.robot.rest()

@@ -46,17 +46,15 @@ def paper(
         setup = free_setup(calibration=calibration, seed=seed)
 
     async def run() -> "Experiment":
-        with progress(count(runs, baselines=baselines), "motions") as bar:
+        async with robot_in_process(setup) as robot, robot.control("paper") as arm:
+            return await experiment(robot, arm, runs=runs, seed=seed, baselines=baselines, progress=advance)
 
-            def advance(what: str) -> None:
-                bar(1, what)
+    with progress(count(runs, baselines=baselines), "motions") as bar:
 
-            async with robot_in_process(setup) as robot, robot.control("paper") as arm:
-                return await experiment(
-                    robot, arm, runs=runs, seed=seed, baselines=baselines, progress=advance
-                )
+        def advance(what: str) -> None:
+            bar(1, what)
 
-    done = asyncio.run(run())
+        done = asyncio.run(run())
     if figures is not None:
         from tvist_lab.paper.drawing import draw
 

@@ -5,7 +5,7 @@ import contextlib
 import signal
 from pathlib import Path
 
-from tvist_cli.failure import Failure, told
+from tvist_cli.failure import Failure, interrupted, told
 from tvist_cli.output import print_json, say
 
 
@@ -30,14 +30,24 @@ def record(
         seconds: End by itself after this time.
         json: Print one JSON object at the end.
     """
+    if seconds is not None and seconds <= 0.0:
+        raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
     from tvist_client.robot import Robot
     from tvist_server.recording import Recorder, RecordingError
+
+    cut = False
 
     async def run() -> tuple[int, int]:
         ticks: list[int] = []
         ended = asyncio.Event()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            asyncio.get_running_loop().add_signal_handler(number, ended.set)
+
+        def interrupt() -> None:
+            nonlocal cut
+            cut = True
+            ended.set()
+
+        asyncio.get_running_loop().add_signal_handler(signal.SIGINT, interrupt)
+        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
         async with await Robot.connect(endpoint, name, security=security) as robot:
             with Recorder(file, await robot.info(), {}) as recorder:
                 robot.on_state(recorder.state)
@@ -60,3 +70,8 @@ def record(
         print_json({"file": str(file), "states": states, "lost": lost})
     else:
         say(f"{states} states recorded, {lost} lost")
+    if cut:
+        said = f"{states * 0.002:.1f} s recorded into {file}"
+        if seconds is not None:  # without it, Control+C is how a recording ends
+            raise interrupted(said)
+        say(f"interrupted: {said}")

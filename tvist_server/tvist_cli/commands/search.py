@@ -58,7 +58,7 @@ def search(
     with told(DescriptionError, code=2):
         if load(robot).joints != 6:
             raise Failure(f"robot {robot} has other than six joints: the postures to try are for six", code=2)
-    with progress(counts.all, "searching") as advance:
+    with progress(counts.all, "cases") as advance:
         result = run(counts, seed, robot=robot, flexible=flexible, progress=lambda what: advance(1, what))
     found = broken(result)
     if markdown is not None:

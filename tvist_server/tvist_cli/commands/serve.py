@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import Failure, told
+from tvist_cli.misuse import lower
 from tvist_cli.output import say
 
 if TYPE_CHECKING:
@@ -74,8 +75,8 @@ def serve(
     """
     given: dict[str, Any] = {
         "name": name, "robot": robot, "robots": robots, "listen": listen, "security": security,
-        "insecure": insecure or None, "payload": payload, "overload": overload or None, "shaper": shaper,
-        "calibration": calibration, "clock": clock, "speed": speed,
+        "insecure": insecure or None, "payload": payload, "overload": overload or None, "shaper": lower(shaper),
+        "calibration": calibration, "clock": lower(clock), "speed": speed,
         "realtime_priority": realtime_priority or None, "start": start, "state": state, "seed": seed,
         "record": record, "dump": dump, "truth": truth or None, "quiet": quiet or None,
         "ur": (ur or ur_address is not None or ur_port is not None) or None, "ur_address": ur_address,

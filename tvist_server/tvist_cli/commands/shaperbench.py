@@ -61,6 +61,7 @@ def shaperbench(
         raise Failure(f"seed is {seed}: must be at least 0 and less than 2^62", code=2)
     description = load("ur5e")
     known = _calibration(calibration)
+    against = None if against is None else [name.lower() for name in against]
     standing = _candidates(shaper, against, known)
     drawn = bench.draw(description, count, seed)
     faults = [bench.inspect(one, description, drawn) for one in standing]

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from tvist_cli.failure import told
+from tvist_cli.failure import Failure, interrupted, told
 from tvist_cli.output import out, print_json
 
 if TYPE_CHECKING:
@@ -37,6 +38,8 @@ def watch(
         seconds: End by itself after this time.
         json: Print each event, and the state ten times a second, as a JSON object a line.
     """
+    if seconds is not None and seconds <= 0.0:
+        raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
     from tvist_client.readiness import unlock_command
     from tvist_client.robot import Robot
 
@@ -57,8 +60,12 @@ def watch(
                         print_json(state)
                     await asyncio.sleep(0.1)
 
+    began = time.monotonic()
     with told(), contextlib.suppress(TimeoutError):
-        asyncio.run(asyncio.wait_for(run(), seconds))
+        try:
+            asyncio.run(asyncio.wait_for(run(), seconds))
+        except KeyboardInterrupt:
+            raise interrupted(f"{time.monotonic() - began:.1f} s watched; the robot goes on") from None
 
 
 class _Standing:

@@ -1,0 +1,193 @@
+"""What a person mistypes: one sentence that says what is wrong and what is allowed, and nothing on stdout.
+
+The program's own entry is called in this process, as the console script does; what a shell adds is nothing.
+"""
+
+import re
+import signal
+import sys
+
+import pytest
+from tests.conformance.served import free_endpoint
+
+from tvist_cli import main
+
+MSGSPEC = re.compile(
+    r"Expected `|Object (missing|contains)|Invalid enum|at `\$|is malformed|Traceback|Errno|Unused"
+)
+NOWHERE = "tcp/127.0.0.1:1"
+"""Where nobody listens: port 1 is the system's."""
+
+
+@pytest.fixture
+def tvist(monkeypatch, capfd, tmp_path):
+    """Run the program; its exit code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(signal, "signal", lambda *_: None)  # this process keeps its own
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["tvist", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            main.main()
+        out, err = capfd.readouterr()
+        return ended.value.code, out, err
+
+    return run
+
+
+def assert_said(ended, code, words):
+    found, out, err = ended
+    assert (found, out) == (code, ""), err
+    assert err.startswith("tvist: ")
+    assert err.count("\n") == 1, err
+    assert not MSGSPEC.search(err), err
+    assert all(word in err for word in words), err
+
+
+MISUSE = [
+    # commands and options
+    (("dance",), ["'dance'", "--help"]),
+    (("mvoe", "Q1"), ["did you mean move?"]),
+    (("",), ["''"]),
+    (("--colour",), ["'--colour'"]),
+    (("check", "--colour"), ["--colour is no option of tvist check"]),
+    (("move", "Q1", "--velcity", "2"), ["--velcity", "did you mean --velocity?"]),
+    (("move", "Q1", "-x"), ["-x is no option"]),
+    (("move",), ["target is missing"]),
+    (("analyze",), ["file is missing"]),
+    (("keys",), ["folder is missing"]),
+    (("move", "Q1", "Q2"), ["'Q2'"]),
+    (("replay", "a", "b", "c"), ["'c'"]),
+    (("move", "Q1", "--velocity"), ["--velocity needs a value"]),
+    (("move", "Q1", "--endpoint"), ["--endpoint needs a value"]),
+    (("move", "Q1", "--velocity", "1", "--velocity", "2"), ["--velocity", "twice"]),
+    # numbers
+    (("move", "Q1", "--velocity", "fast"), ["--velocity is 'fast'", "a number"]),
+    (("move", "Q1", "--velocity", "nan"), ["--velocity is nan", "finite"]),
+    (("move", "Q1", "--jerk=-inf"), ["--jerk is -inf", "finite"]),
+    (("shapers", "--f-d", "inf"), ["--f-d is inf"]),
+    (("shapers", "--f-d", "0"), ["f_d", "0"]),
+    (("shapers", "--zeta", "2"), ["zeta is 2", "less than 1"]),
+    (("paper", "--runs", "0"), ["runs is 0", "at least 1"]),
+    (("paper", "--runs", "1.5"), ["--runs is '1.5'", "a whole number"]),
+    (("search", "--stops", "-1"), ["stops is -1", "0 to 1000000"]),
+    (("search", "--stops", "0", "--streams", "0", "--changes", "0", "--sequences", "0"), ["nothing to search"]),
+    (("bench", "--seconds", "-1"), ["seconds is -1", "at least 0"]),
+    (("bench", "--soak", "0"), ["soak is 0"]),
+    (("watch", "--seconds", "0"), ["seconds is 0", "more than 0"]),
+    (("record", "x.mcap", "--seconds", "-3"), ["seconds is -3"]),
+    (("shaperbench", "--moves", "0"), ["moves is 0", "1 to 10000"]),
+    (("evaluate", "--random", "0"), ["random is 0"]),
+    (("evaluate", "--random", "2", "--modes", "9"), ["modes is 9", "1 to 6"]),
+    (("evaluate", "--random", "2", "--payload", "heavy"), ["payload is 'heavy'", "0 to 100 kg"]),
+    (("identify", "--configurations", "0"), ["configurations"]),
+    (("identify", "--payload", "5", "--payload", "6"), ["5 and 6"]),
+    (("keys", "ring", "--days", "0"), ["days is 0", "1 to 3650"]),
+    # poses
+    (("move", "there"), ["target is 'there'", "Q1, Q2, Q3"]),
+    (("move", ""), ["target is ''"]),
+    (("move", "-0.5,x"), ["'", "joint angles"]),
+    (("move", "nan,0,0,0,0,0"), ["target is 'nan,0,0,0,0,0'"]),
+    (("move", "90°", "--degrees"), ["target is '90°'", "degrees"]),
+    (("identify", "--at", "q9"), ["at is 'q9'", "Q1, Q2, Q3"]),
+    (("identify", "--at", "-0.5,1"), ["at has 2 angles", "6 joints"]),
+    (("serve", "--start", "-0.5,x"), ["start is '-0.5,x'", "Q1, Q2, Q3"]),
+    (("serve", "--start", "-0.5,1"), ["start has 2 angles"]),
+    # names and choices
+    (("identify", "--model", "best"), ["--model is 'best'", "polynomial, modal"]),
+    (("identify", "--robot", "nope"), ["robot 'nope'", "ur5e"]),
+    (("evaluate", "--random", "2", "--shaper", "zzz"), ["'zzz'", "zvd"]),
+    (("evaluate",), ["--moves FILE or --random N"]),
+    (("evaluate", "--random", "2", "--disturbances", "wind"), ["'wind'", "friction"]),
+    (("shaperbench", "--against", "zzz"), ["against is 'zzz'"]),
+    (("paper", "--calibration", "nope"), ["calibration 'nope'"]),
+    (("serve", "--shaper", "zzz"), ["'zzz'", "zvd"]),
+    (("serve", "--clock", "sometimes"), ["clock is 'sometimes'", "'realtime'"]),
+    (("serve", "--name", "UPPER"), ["name is 'UPPER'", "a-z"]),
+    (("serve", "--robots", "ur5e*0"), ["1 to 64"]),
+    (("serve", "--robots", "ur5e", "--name", "x"), ["exclude each other"]),
+    (("serve", "--payload", "-1"), ["payload is -1", "at least 0"]),
+    (("serve", "--speed", "0"), ["speed is 0", "more than 0"]),
+    (("serve", "--ur-port", "rtde"), ["DOOR=PORT"]),
+    (("keys", "ring", "--robot", "UPPER", "--host", "x"), ["robot is 'UPPER'"]),
+    # files
+    (("serve", "--config", "nope.toml"), ["nope.toml", "No such file"]),
+    (("serve", "--state", "."), ["state .", "directory"]),
+    (("serve", "--robot", "."), ["robot '.'", "ur5e"]),
+    (("evaluate", "--moves", "nope.json"), ["nope.json", "No such file"]),
+    (("shaperbench", "--shaper", "nope.py"), ["nope.py"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"), MISUSE, ids=[" ".join(case[0]) or "empty" for case in MISUSE]
+)
+def test_misuse_is_a_sentence_and_exit_code_2(tvist, arguments, words):
+    assert_said(tvist(*arguments), 2, words)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("move", "-0.5,-3,0,0,0,0", "--endpoint", NOWHERE), ["nobody answers", NOWHERE, "tvist serve"]),
+        (("move", "q1", "--endpoint", "localhost"), ["'localhost'", "tcp/<host>:<port>"]),
+        (("move", "Q1", "--endpoint", "tcp/127.0.0.1:99999"), ["1 to 65535"]),
+        (("watch", ""), ["''", "tcp/<host>:<port>"]),
+        (("check", "tls/127.0.0.1:7447"), ["certificate"]),
+        (("check", NOWHERE, "--security", "nope"), ["tls/<host>:<port>"]),
+        (("check", "tls/127.0.0.1:7447", "--security", "nope"), ["nope", "tvist keys"]),
+        (("record", "x.mcap", "--endpoint", NOWHERE), ["nobody answers"]),
+        (("analyze", "."), [".", "directory"]),
+        (("replay", "nope.mcap"), ["nope.mcap"]),
+        (("serve", "--record", "nope/x.mcap"), ["nope/x.mcap", "No such file"]),
+        (("shapers", "--figures", "/dev/null/x"), ["/dev/null/x"]),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_what_cannot_be_done_is_a_sentence_and_exit_code_1(tvist, arguments, words):
+    assert_said(tvist(*arguments), 1, words)
+
+
+FILES = [
+    ("--config", "x.toml", "payload = -1.0", ["payload is -1.0", "at least 0"]),
+    ("--config", "x.toml", "payload = true", ["payload must be a number", "not a boolean"]),
+    ("--config", "x.toml", "clock = 'never'", ["clock is 'never'", "'lockstep'"]),
+    ("--config", "x.toml", "shapr = 'zv'", ["'shapr'", "did you mean 'shaper'?"]),
+    ("--config", "x.toml", "payload =", ["no TOML", "end of document"]),
+    ("--config", "x.toml", "ur_ports = {rtde = 70000}", ["ur_ports.rtde is 70000", "65535"]),
+    ("--state", "x.json", '{"q": [1, 2', ["no JSON", "line 1"]),
+    ("--state", "x.json", '{"q": [NaN]}', ["NaN"]),
+    ("--state", "x.json", '{"q": [1, "two"]}', ["q[1] must be a number", "not a string"]),
+    ("--state", "x.toml", "mode = 'DANCING'", ["mode is 'DANCING'", "'POWER_OFF'"]),
+    ("--state", "x.toml", "payload = {mass = 1}", ["payload.com is missing"]),
+    ("--state", "x.toml", "payload = {mass = 1, com = [0, 0]}", ["com has 2 entries", "3"]),
+    ("--robot", "x.toml", "[robot]\nname = 3", ["robot.name", "text"]),
+    ("--robot", "x.toml", "colour = 'red'", ["colour is no key"]),
+    ("--robot", "x.toml", "[limits]\npayload = 5", ["missing"]),
+    ("--calibration", "x.json", "{}", ["is missing"]),
+    ("--calibration", "x.json", "[1]", ["must be a map", "not a list"]),
+    ("--calibration", "x.json", "hello", ["no JSON"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("option", "name", "content", "words"), FILES)
+def test_a_wrong_file_is_a_sentence_with_file_key_value_and_what_is_allowed(
+    tvist, tmp_path, option, name, content, words
+):
+    (tmp_path / name).write_text(content, encoding="utf-8")
+    assert_said(tvist("serve", option, name), 2, [name, *words])
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('anna = "king"', ["anna is 'king'", "'operator'"]),
+        ("anna = 3", ["anna must be a string", "'NAME' = 'operator'".replace("'", '"')]),
+        ("anna", ["no TOML"]),
+    ],
+)
+def test_a_wrong_line_of_the_roles_is_named(tvist, tmp_path, line, words):
+    (tmp_path / "clients.toml").write_text(line, encoding="utf-8")
+    ended = tvist("serve", "--security", ".", "--listen", f"tls/{free_endpoint().partition('/')[2]}")
+    assert_said(ended, ended[0], ["clients.toml", *words])
+    assert ended[0] in {1, 2}

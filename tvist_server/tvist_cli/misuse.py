@@ -1,0 +1,121 @@
+"""What is wrong with a command line, in one sentence that says what to do."""
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
+
+from cyclopts import (
+    CoercionError,
+    CycloptsError,
+    MissingArgumentError,
+    UnknownCommandError,
+    UnknownOptionError,
+)
+from cyclopts.exceptions import RepeatArgumentError, UnusedCliTokensError, ValidationError
+
+from tvist_protocol.errors import quoted, short
+
+if TYPE_CHECKING:
+    from cyclopts.argument import ArgumentCollection
+
+_ANGLES = re.compile(r"-[\d.][^=/]*,.*")
+_WHOLE = re.compile(r"[+-]?\d+")
+_KINDS: dict[object, str] = {int: "a whole number", float: "a number", bool: "true or false"}
+
+
+def readable(arguments: Iterable[str]) -> list[str]:
+    """Arguments in which a list of angles that begins with a minus is no option: a blank goes before it."""
+    return [f" {argument}" if _ANGLES.fullmatch(argument) else argument for argument in arguments]
+
+
+def lower(name: str | None) -> str | None:
+    """A name that a person may type in any case."""
+    return None if name is None else name.lower()
+
+
+def check_whole(_app: Any, _commands: Any, arguments: "ArgumentCollection") -> None:
+    """Refuse fractions where a whole number is meant: the parser would round them.
+
+    Raises:
+        CoercionError: There is one.
+    """
+    for argument in arguments:
+        if argument.hint is not int and int not in get_args(argument.hint):
+            continue
+        for token in argument.tokens:
+            if not _WHOLE.fullmatch(token.value):
+                raise CoercionError(token=token, argument=argument, target_type=int)
+
+
+def finite(_: Any, value: Any) -> None:
+    """Refuse NaN and infinity, which no option means.
+
+    Raises:
+        ValueError: The value is one of them.
+    """
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"is {value}: must be a finite number")
+
+
+def sentence(error: CycloptsError, commands: Sequence[str]) -> str:
+    """What is wrong, and what to do.
+
+    Args:
+        error: What the parser found.
+        commands: Names of all commands.
+    """
+    command = " ".join(["tvist", *(error.command_chain or ())])
+    seek = f"{command} --help lists what there is"
+    match error:
+        case UnknownCommandError():
+            name = (error.unused_tokens or [""])[0]
+            said = f"there is no command {quoted(name)}: {_near(name, commands)}tvist --help lists them"
+        case UnknownOptionError():
+            name = error.token.keyword or error.token.value
+            known = [known for argument in error.argument_collection for known in argument.names]
+            near = _near(name, [known for known in known if known.startswith("--")])
+            said = f"{short(name)} is no option of {command}: {near}{seek}"
+        case CoercionError():
+            given = "" if error.token is None else f" is {quoted(error.token.value)}"
+            said = f"{_name(error)}{given}: must be {_wanted(error.target_type)}"
+        case RepeatArgumentError():
+            said = f"{_name(error)} is given twice: give it once"
+        case ValidationError():
+            said = f"{_name(error)} {error.exception_message}"
+        case MissingArgumentError() if error.keyword or not _positional(error):
+            said = f"{error.keyword or _name(error)} needs a value behind it: {seek}"
+        case MissingArgumentError():
+            said = f"{_name(error)} is missing: {seek}"
+        case UnusedCliTokensError():
+            extra = " ".join(error.unused_tokens or ())
+            said = f"{command} does not know what to do with {quoted(extra)}: {seek}"
+        case _:
+            said = f"{' '.join(str(error).split())}: {seek}"
+    return said
+
+
+def _near(name: str, known: Sequence[str]) -> str:
+    found = get_close_matches(name, known, n=1)
+    return f"did you mean {found[0]}? " if found else ""
+
+
+def _positional(error: CycloptsError) -> bool:
+    return error.argument is not None and error.argument.index is not None
+
+
+def _name(error: CycloptsError) -> str:
+    token = getattr(error, "token", None)
+    if token is not None and token.keyword:
+        return str(token.keyword)
+    if error.argument is None:
+        return "a value"
+    name = str(error.argument.name)
+    return name.removeprefix("--") if _positional(error) else name
+
+
+def _wanted(kind: object) -> str:
+    if get_origin(kind) is Literal:
+        return f"one of {', '.join(map(str, get_args(kind)))}"
+    return _KINDS.get(kind, "something else")
