@@ -3,6 +3,8 @@
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
+from msgspec.structs import replace
+
 from tvist_client.robot import Robot
 from tvist_client.transports.loopback import LoopbackTransport
 from tvist_server.config import ServeConfig
@@ -14,13 +16,18 @@ def free_setup(config: ServeConfig | None = None, **changes: object) -> Setup:
     """The default robot with a free clock and its truth told, or another one.
 
     Args:
-        config: How it would be served.
+        config: How it would be served, clock and truth included.
         changes: Fields of `ServeConfig` to change.
+
+    Raises:
+        ConfigError: A change names no field, or has no value for it.
     """
     from tvist_server.config import from_mapping
 
-    base = config or from_mapping({"clock": "free", "truth": True, **changes}, "setup")
-    return base.setup()
+    if config is None:
+        return from_mapping({"clock": "free", "truth": True, **changes}, "setup").setup()
+    checked = from_mapping(changes, "setup")
+    return replace(config, **{name: getattr(checked, name) for name in changes}).setup()
 
 
 @asynccontextmanager

@@ -73,7 +73,7 @@ def end_of(host, sink):
 )
 def test_the_end_of_a_silent_stream_names_the_last_refusal(streaming, fault, said):
     host, sink = streaming
-    offered(host, token=host.controller.session.lease.token, **{"sequence": 1})
+    offered(host, token=host.controller.session.lease.token, sequence=1)
     offered(host, **({"token": host.controller.session.lease.token} | fault))
     assert end_of(host, sink) == f"no set-point for 0.25 s; the last one was refused: {said}"
     assert host.controller.counters.setpoints_received == 2

@@ -463,11 +463,15 @@ class TestOutputs:
         assert command.standard_analog_output_mask == 0b10
         assert b"standard_analog_output_0" in one.texts()[0]
 
-    def test_a_force_sensors_values_are_kept(self, one, robot):
+    def test_a_force_sensors_values_are_said_to_count_for_nothing_once(self, one):
+        """UR counts them once a program has called ft_rtde_input_enable; no program here can."""
         names = ("external_force_torque",)
-        one.with_inputs(names)
-        assert one.put(1, names, (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)) == []
-        assert robot.inputs.external_force_torque == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+        one.started().with_inputs(names)
+        for force in (1.0, 2.0):
+            assert one.put(1, names, (force,) * 6) == []
+        (said,) = one.texts()
+        assert b"external_force_torque" in said
+        assert b"ft_rtde_input_enable" in said
 
 
 CONVERSATION = [

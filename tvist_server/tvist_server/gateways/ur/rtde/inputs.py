@@ -22,7 +22,10 @@ NAMED: dict[str, tuple[Wire, str]] = {
     "standard_analog_output_type": (Wire.UINT8, "A bit each: 0 is current (4–20 mA), 1 voltage (0–10 V)."),
     "standard_analog_output_0": (Wire.DOUBLE, "Share of its range, 0 to 1."),
     "standard_analog_output_1": (Wire.DOUBLE, "Share of its range, 0 to 1."),
-    "external_force_torque": (Wire.VECTOR6D, "A force sensor's values; kept, and nothing uses them yet."),
+    "external_force_torque": (
+        Wire.VECTOR6D,
+        "Left aside, as UR does without ft_rtde_input_enable.",
+    ),
 }
 """All but the registers, with what they are for."""
 

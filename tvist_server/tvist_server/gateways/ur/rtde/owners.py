@@ -10,8 +10,6 @@ class InputOwners:
         self._owners: dict[str, object] = {}
         self.ledger = Ledger()
         """What was written, whoever did."""
-        self.external_force_torque: tuple[float, ...] | None = None
-        """Force sensor's values that a client gave last [N, N m]; nothing uses them yet."""
 
     def is_free(self, name: str, connection: object) -> bool:
         """Whether nobody else owns the variable."""

@@ -38,6 +38,7 @@ class InputWriter:
         self._complain = complain
         self._ledger = robot.inputs.ledger
         self._held: dict[str, Value] = {}
+        self._told_of_force = False
 
     def write(self, values: dict[str, Value]) -> None:
         """Take what one package says."""
@@ -52,9 +53,11 @@ class InputWriter:
             self._set_registers(registers)
         if len(registers) == len(values):
             return
-        force = values.get("external_force_torque")
-        if isinstance(force, tuple):
-            self._robot.inputs.external_force_torque = force
+        if "external_force_torque" in values and not self._told_of_force:
+            self._told_of_force = True
+            self._complain(
+                "external_force_torque counts for nothing: it takes ft_rtde_input_enable, which this robot has not"
+            )
         if "speed_slider_mask" in values or "speed_slider_fraction" in values:
             self._set_speed()
         if any("_output" in name for name in values):

@@ -1,0 +1,24 @@
+"""A robot in process is set up as it was asked for: nothing that is given is left out."""
+
+import pytest
+
+from tvist_lab.in_process import free_setup
+from tvist_server.config import ConfigError, ServeConfig
+
+
+def test_changes_are_made_to_the_default_and_to_a_configuration_alike():
+    for config in (None, ServeConfig(seed=1, shaper="ei"), ServeConfig()):
+        found = free_setup(config, seed=7, shaper="zvd", start="Q2")
+        assert (found.seed, found.shaper) == (7, "zvd")
+        assert found.q == found.description.poses["Q2"]
+
+
+def test_what_is_not_changed_stays_the_configurations_own():
+    found = free_setup(ServeConfig(shaper="ei", clock="lockstep"), seed=7)
+    assert (found.shaper, found.clock, found.truth) == ("ei", "lockstep", False)
+
+
+@pytest.mark.parametrize("config", [None, ServeConfig()])
+def test_a_change_of_nothing_there_is_refused(config):
+    with pytest.raises(ConfigError, match="'shapr': did you mean 'shaper'"):
+        free_setup(config, shapr="zv")
