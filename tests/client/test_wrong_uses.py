@@ -1,0 +1,226 @@
+"""What a programmer gets wrong: an error of ours with a sentence that names argument, value and what is allowed."""
+
+import math
+import re
+import traceback
+
+import pytest
+
+from tvist_client import (
+    ArgumentError,
+    ClientError,
+    MisuseError,
+    NotConnectedError,
+    ProtocolError,
+    RefusedError,
+    Robot,
+    StreamStoppedError,
+    TvistError,
+    make_payload,
+)
+from tvist_client.blocking import Robot as BlockingRobot
+from tvist_client.transports.loopback import LoopbackTransport
+from tvist_lab.in_process import free_setup
+from tvist_protocol.keys import check_robot_name
+from tvist_server.gateways.loopback import LoopbackHost
+
+Q1 = (0.0, -3.1, 0.0, -1.57, 0.0, 0.0)
+MSGSPEC = re.compile(r"Expected `|Object (missing|contains)|Invalid enum|at `\$")
+
+
+@pytest.fixture(autouse=True)
+def _no_blocking_calls_on_the_loop():
+    """A real robot in process computes on the event loop, and looks there which calibrations come with the package."""
+
+
+@pytest.fixture
+def host():
+    return LoopbackHost(free_setup())
+
+
+@pytest.fixture
+async def robot(host):
+    async with Robot.over(LoopbackTransport(host)) as robot:
+        yield robot
+
+
+COMMANDS = {
+    "text for angles": (lambda arm: arm.move_j("Q1"), "q is 'Q1': must be a list of numbers"),
+    "None for angles": (lambda arm: arm.move_j(None), "q is None: must be a list"),
+    "a number for angles": (lambda arm: arm.move_j(1.0), "q is 1.0: must be a list"),
+    "text for an angle": (lambda arm: arm.move_j(["0", *Q1[1:]]), r"q\[0\] is '0': must be a number"),
+    "None for an angle": (lambda arm: arm.move_j([None] * 6), r"q\[0\] is None"),
+    "five angles": (lambda arm: arm.move_j(Q1[:5]), "q has 5 angles; the arm has 6"),
+    "NaN": (lambda arm: arm.move_j([math.nan] * 6), r"q\[0\] is NaN"),
+    "infinity": (lambda arm: arm.move_j([math.inf] * 6), r"q\[0\] is inf"),
+    "an angle out of range": (lambda arm: arm.move_j([9.0] * 6), r"q\[0\] is 9 rad; .* ±6.28"),
+    "text for a limit": (lambda arm: arm.move_j(Q1, velocity="fast"), "velocity is 'fast': must be a number"),
+    "a negative limit": (lambda arm: arm.move_j(Q1, velocity=-1), "velocity is -1.0: must be more than 0"),
+    "a limit above the arm's": (lambda arm: arm.move_j(Q1, velocity=9), "velocity is 9 rad/s; .* 3.14"),
+    "a deceleration that is none": (lambda arm: arm.stop("hard"), "deceleration is 'hard'"),
+    "a speed above 1": (lambda arm: arm.set_speed(2), "fraction is 2.0: must be at most 1"),
+    "NaN for a speed": (lambda arm: arm.set_speed(math.nan), "fraction is NaN"),
+    "an unknown shaper": (lambda arm: arm.set_shaper("zzz"), "'zzz'.*zvd"),
+    "a number for a shaper": (lambda arm: arm.set_shaper(3), "name must be a string"),
+    "half a mode": (lambda arm: arm.set_shaper("zv", 1.5), "modes is 1.5: must be a whole number"),
+    "an unknown estimator": (lambda arm: arm.set_estimator("oracle"), "'oracle'"),
+    "text for a frequency": (lambda arm: arm.set_estimator("fixed", f_d="x", zeta=0.1), "f_d is 'x'"),
+    "a short tool offset": (lambda arm: arm.set_tcp([0, 0, 0]), "offset has 3 numbers: must have 6, x y z"),
+    "a short centre of mass": (lambda arm: arm.set_payload(1, [0, 0], [0] * 6), "com has 2 numbers: must have 3"),
+    "too heavy": (lambda arm: arm.set_payload(50, [0] * 3, [1, 0, 0, 1, 0, 1]), "mass is 50 kg; .* 5"),
+    "a negative output": (lambda arm: arm.set_digital_output(-1, on=True), "number is -1: must be from 0 to 17"),
+    "an output too many": (lambda arm: arm.set_digital_output(18, on=True), "number is 18: must be from 0 to 17"),
+    "an analogue output too many": (lambda arm: arm.set_analog_output(2, 0.5), "number is 2: must be from 0 to 1"),
+    "an unknown bank": (lambda arm: arm.set_registers("bits", [1]), "bank is 'bits': must be one of"),
+    "no list of registers": (lambda arm: arm.set_registers("input_int", 1), "values is 1: must be a list"),
+    "an unknown mode": (lambda arm: arm.reset(mode="DANCING"), "mode is 'DANCING': must be one of 'RUNNING'"),
+    "a negative seed": (lambda arm: arm.reset(seed=-1), "seed is -1: must be at least 0"),
+    "no tick": (lambda arm: arm.robot.advance(0), "ticks is 0: must be at least 1"),
+    "half a tick": (lambda arm: arm.robot.advance(0.5), "ticks is 0.5: must be a whole number"),
+    "too many ticks": (lambda arm: arm.step(1001), "ticks is 1001: must be from 1 to 1000"),
+    "an unknown fault": (lambda arm: arm.inject("gremlins"), "'gremlins'"),
+    "nobody's name": (lambda arm: arm.hand_over(""), "client is ''"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", COMMANDS)
+async def test_a_wrong_command_is_a_sentence_and_the_arm_stays_under_control(robot, case):
+    wrong, said = COMMANDS[case]
+    async with robot.control("me") as arm:
+        with pytest.raises(TvistError, match=said) as raised:
+            await wrong(arm)
+        assert not MSGSPEC.search(str(raised.value))
+        assert isinstance(raised.value, RefusedError | ArgumentError)
+        await arm.keep_alive()
+
+
+SETPOINTS = {
+    "five angles": (Q1[:5], r"q has 5 angles; this arm has 6 joints", "q", 6),
+    "NaN": ((math.nan, *Q1[1:]), r"q\[0\] is nan: an angle is a finite number", "q[0]", None),
+    "infinity": ((*Q1[:5], -math.inf), r"q\[5\] is -inf", "q[5]", None),
+    "out of range": ((0, 7, *Q1[2:]), r"q\[1\] is 7 rad; joint shoulder goes from -6.2", "q[1]", 2 * math.pi),
+    "text": ("Q1", r"q is 'Q1': must be a list", "q", None),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SETPOINTS)
+async def test_a_wrong_set_point_is_refused_before_it_is_sent_and_the_next_one_is_taken(robot, case):
+    q, said, where, limit = SETPOINTS[case]
+    async with robot.control("me") as arm, arm.servo() as servo:
+        with pytest.raises(ArgumentError, match=said) as raised:
+            servo.set(q)
+        assert raised.value.where == where
+        assert raised.value.limit == (None if limit is None else pytest.approx(limit))
+        with pytest.raises(ArgumentError, match=r"qs\[1\]"):
+            await servo.step_through([Q1, q])
+        assert servo.sequence == 0
+        assert servo.set((await robot.state()).target_q) == 0
+
+
+async def test_a_stream_that_was_left_takes_nothing_more(robot):
+    async with robot.control("me") as arm:
+        async with arm.servo() as servo:
+            pass
+        with pytest.raises((MisuseError, StreamStoppedError), match="ended"):
+            servo.set(Q1)
+
+
+async def test_without_control_and_with_another_s_there_is_none(robot):
+    with pytest.raises(MisuseError, match=r"robot\.control"):
+        await robot.advance(1)
+    async with robot.control("me") as arm:
+        with pytest.raises(RefusedError, match="'me'"):
+            async with robot.control("you"):
+                pass
+    with pytest.raises(RefusedError, match=r"stale_token|no_control"):
+        await arm.move_j(Q1)
+
+
+@pytest.mark.parametrize("name", ["", "a/b", "x" * 65, "ä", None, 3])
+async def test_a_client_s_name_that_is_none_says_what_one_is(robot, name):
+    with pytest.raises(ProtocolError, match="printable ASCII"):
+        async with robot.control(name):
+            pass
+
+
+async def test_a_closed_robot_answers_nothing_and_keeps_nobody_waiting(host):
+    async with Robot.over(LoopbackTransport(host)) as robot:
+        await robot.state()
+        stream = robot.states()
+    for call in (robot.state, robot.io, robot.info, robot.stop):
+        with pytest.raises(NotConnectedError, match="closed"):
+            await call()
+    with pytest.raises(NotConnectedError, match="closed"):
+        robot.states()
+    assert [state async for state in stream] == []
+
+
+@pytest.mark.parametrize(
+    "endpoint", ["", "localhost", "127.0.0.1:7447", "tcp/x:0", "tcp/x:99999", None, 7447]
+)
+async def test_what_is_no_endpoint_is_told_the_form_of_one(endpoint):
+    with pytest.raises(NotConnectedError, match="tcp/<host>:<port>"):
+        await Robot.connect(endpoint)
+
+
+@pytest.mark.parametrize("name", ["UR5e", "", "a b", "ur5e/x", None])
+def test_what_is_no_robot_s_name_is_told_what_one_is(name):
+    with pytest.raises(ProtocolError, match="a-z 0-9"):
+        check_robot_name(name)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("5", (0,) * 3, (0,) * 6), "mass is '5'"),
+        ((5, (0,) * 2, (0,) * 6), "com has 2"),
+        ((5, (0,) * 3, (0,) * 3), "inertia has 3 numbers: must have 6, xx xy xz yy yz zz"),
+    ],
+)
+def test_a_payload_that_is_none_says_so(arguments, said):
+    with pytest.raises(ArgumentError, match=said):
+        make_payload(*arguments)
+
+
+async def test_a_motion_can_be_awaited(robot):
+    async with robot.control("me") as arm:
+        motion = await arm.move_j((0.1, *Q1[1:]), wait=False)
+        assert not motion.ended
+        assert await motion is motion
+        assert motion.done is not None
+
+
+class TestBlocking:
+    @pytest.fixture
+    def robot(self, host):
+        with BlockingRobot.over(LoopbackTransport(host)) as robot:
+            yield robot
+
+    def test_an_error_shows_the_caller_s_line_and_not_the_loop(self, robot):
+        with robot.control("me") as arm:
+            with pytest.raises(RefusedError) as raised:
+                arm.move_j([9.0] * 6)
+            frames = traceback.extract_tb(raised.value.__traceback__)
+            assert frames[0].line == "arm.move_j([9.0] * 6)"
+            assert [frame.name for frame in frames[1:]] == ["move_j", "call"]
+            assert (raised.value.__cause__, raised.value.__suppress_context__) == (None, True)
+
+    def test_a_callback_that_would_wait_for_itself_is_told_so(self, robot):
+        raised = []
+
+        def on_state(_):
+            try:
+                robot.state()
+            except ClientError as error:
+                raised.append(error)
+
+        robot.on_state(on_state)
+        with robot.control("me"):
+            robot.advance(1)
+        assert isinstance(raised[0], MisuseError)
+        assert "callback" in str(raised[0])
+
+    def test_a_closed_robot_says_so(self, robot):
+        robot.close()
+        with pytest.raises(NotConnectedError, match="closed"):
+            robot.state()
