@@ -38,6 +38,6 @@ def _sentence(error: Exception) -> str:
     """A refusal keeps its code, which programs look for; a fault found here has nobody to tell it to."""
     if isinstance(error, ProtocolError):
         return error.why
-    if type(error).__module__ == "builtins" and isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {error.strerror}"
+    if type(error).__module__ == "builtins" and isinstance(error, OSError) and error.strerror:
+        return error.strerror if error.filename is None else f"{error.filename}: {error.strerror}"
     return str(error)
