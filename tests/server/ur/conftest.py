@@ -1,5 +1,6 @@
 """What the tests of UR's doors share: a control that records, and snapshots of a real controller."""
 
+import contextlib
 from collections.abc import Callable
 from types import SimpleNamespace
 
@@ -12,8 +13,11 @@ from tvist_protocol.io import Io
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.values import Payload
 from tvist_server.controller import Controller
+from tvist_server.gateways.ur.doors import UrDoors
 from tvist_server.instruments.snapshot import Instruments
 from tvist_server.setup import Setup, paper_payload
+
+from .desks import EVERYWHERE, Desk, until
 
 # On a busy machine any example can take long.
 settings.register_profile("busy", deadline=None)
@@ -160,3 +164,18 @@ def robot(snapshots) -> SimpleNamespace:
         tell=told.append,
         told=told,
     )
+
+
+@pytest.fixture
+async def desk():
+    desk = Desk()
+    desk.doors = UrDoors(desk, UR5E, "ur5e", "127.0.0.1", EVERYWHERE)
+    await desk.doors.open()
+    yield desk
+    for writer in desk.writers:
+        writer.close()
+        with contextlib.suppress(ConnectionError):
+            await writer.wait_closed()
+    await desk.doors.shut()
+    await until(lambda: not desk.doors._connections)
+    desk.doors.close()

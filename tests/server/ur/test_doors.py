@@ -8,98 +8,15 @@ import struct
 import weakref
 
 import pytest
-from tests.server.robots import UR5E, Robot
+from tests.server.robots import UR5E
 
 from tvist_protocol import commands as c
-from tvist_protocol.codec import decode_command, encode
+from tvist_protocol.codec import encode
 from tvist_protocol.commands import TakeControl
 from tvist_server.gateways.base import GatewayError
-from tvist_server.gateways.ur import doors as module
 from tvist_server.gateways.ur.doors import UrDoors
-from tvist_server.host import Host
-from tvist_server.ur_ports import UrPorts
 
-EVERYWHERE = dict.fromkeys(UrPorts().open(), 0)
-"""A port that is free, for each."""
-PATIENCE = 60.0
-"""After how long something is taken to hang [s]."""
-
-
-class Desk:
-    """A controller in the loop's own thread; `tick` lets time pass."""
-
-    def __init__(self):
-        self.controller = Robot().controller
-        self.controller.session.release()
-        self.host = Host(self.controller, self)
-        self.doors = None
-        self.writers = []
-
-    def request(self, data, reply):
-        self.last = decode_command(data)
-        reply(self.host.request(data))
-
-    def client_seen(self, name, session=""):
-        """Nobody asks."""
-
-    def client_gone(self, name, session=""):
-        self.host.client_gone(name, session)
-
-    def holder(self):
-        lease = self.controller.session.lease
-        return None if lease is None else lease.client
-
-    def state(self, state):
-        self.doors.publish("state", state, b"")
-
-    def event(self, event):
-        self.doors.publish("event", event, b"")
-
-    def io(self, io):
-        self.doors.publish("io", io, b"")
-
-    def journal(self, entry): ...
-
-    async def tick(self, count=1):
-        for _ in range(count):
-            self.host.tick()
-            await asyncio.sleep(0)
-
-
-@pytest.fixture
-async def desk():
-    desk = Desk()
-    desk.doors = UrDoors(desk, UR5E, "ur5e", "127.0.0.1", EVERYWHERE)
-    await desk.doors.open()
-    yield desk
-    for writer in desk.writers:
-        writer.close()
-        with contextlib.suppress(ConnectionError):
-            await writer.wait_closed()
-    await desk.doors.shut()
-    await until(lambda: not desk.doors._connections)
-    desk.doors.close()
-
-
-async def connect(desk, door):
-    reader, writer = await asyncio.open_connection("127.0.0.1", desk.doors.ports[door])
-    desk.writers.append(writer)
-    return reader, writer
-
-
-async def until(condition):
-    """Give the loop its turns until something is so."""
-    async with asyncio.timeout(PATIENCE):
-        while not condition():  # noqa: ASYNC110  what changes belongs to the loop
-            await asyncio.sleep(0)
-
-
-async def lines(reader, writer, *sent):
-    answers = []
-    for line in sent:
-        writer.write(line.encode() + b"\n")
-        answers.append((await reader.readline()).decode().strip())
-    return answers
+from .desks import PATIENCE, Desk, connect, lines, until
 
 
 async def test_every_door_speaks_its_language(desk):
@@ -188,21 +105,6 @@ async def test_a_fault_of_ours_ends_one_connection_and_no_other(desk, monkeypatc
             got.append(error.partial)
     assert {len(data) for data in got} == {0, 3 * 1220}
     assert "failed" in caplog.text
-
-
-@pytest.fixture
-def few(monkeypatch):
-    monkeypatch.setattr(module, "MOST_CONNECTIONS", 2)
-
-
-async def test_more_than_so_many_are_turned_away(few, desk):
-    await desk.tick()
-    for _ in range(2):
-        reader, _ = await connect(desk, "dashboard")
-        await reader.readline()
-    reader, _ = await connect(desk, "dashboard")
-    with pytest.raises((ConnectionError, asyncio.IncompleteReadError)):
-        await reader.readexactly(1)
 
 
 async def test_a_port_in_use_is_said_with_what_to_do(desk):

@@ -18,6 +18,9 @@ Then = Callable[[Reply], None]
 class Control(Protocol):
     """The way of one connection to the controller."""
 
+    peer: str
+    """Who the client is and which door it uses, for a person."""
+
     def change(self, command: Callable[[str], Command], then: Then) -> None:
         """Send a command that needs control, and take control first where nobody has it.
 
@@ -48,6 +51,14 @@ class Session(ABC):
 
     over = False
     """Whether the client has said that it goes: close the connection."""
+    client_begins = False
+    """Whether the interface has nothing for a client that asks for nothing. Such a client has to say something soon
+    after it came, and may have to give up its place later."""
+
+    @property
+    def served(self) -> bool:
+        """Whether the client is being sent what it asked for: it may well be silent meanwhile."""
+        return False
 
     def opened(self) -> None:  # noqa: B027  not every one has to
         """The client is there: send what it is greeted with."""

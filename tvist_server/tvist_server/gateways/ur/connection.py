@@ -1,6 +1,7 @@
 """A socket of a door, and the session behind it."""
 
 import asyncio
+import ipaddress
 import logging
 import socket
 from collections.abc import Callable
@@ -9,6 +10,8 @@ from typing import cast
 from tvist_protocol.stream import Event
 from tvist_server.gateways.ur.base import Send, Session
 from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
+from tvist_server.gateways.ur.notices import Notices
+from tvist_server.gateways.ur.places import Places
 from tvist_server.instruments.snapshot import Snapshot
 
 log = logging.getLogger(__name__)
@@ -26,6 +29,9 @@ ANSWERS = MOST_UNREAD // 2
 MOST_UNREAD_LOCKSTEP = 64_000_000
 """The same in lockstep, where samples wait, too: a minute of them."""
 
+FIRST_WORD = 30.0
+"""Time in which a client has to say something where it has to begin [s]."""
+
 MakeSession = Callable[[ConnectionControl, Send], Session]
 """Makes a door's session: the way to the controller, and the way back."""
 
@@ -36,8 +42,8 @@ class Connection(asyncio.BufferedProtocol):
     Args:
         make: Its session.
         lease: Control for a host.
-        members: All connections of the robot; this one is in it as long as it lives.
-        most: How many there may be.
+        places: Of the robot; the connection takes one as long as it lives.
+        notices: Tells the server's console what was done with whom.
         lossless: Whether samples wait for a client that is slow: where a client lets time pass.
     """
 
@@ -45,39 +51,50 @@ class Connection(asyncio.BufferedProtocol):
         self,
         make: MakeSession,
         lease: Callable[[str], HostLease],
-        members: "set[Connection]",
-        most: int,
+        places: "Places[Connection]",
+        notices: Notices,
         *,
         lossless: bool,
     ) -> None:
         self._make = make
         self._lease = lease
-        self._members = members
-        self._most = most
+        self._places = places
+        self._notices = notices
         self._lossless = lossless
         self._most_unread = MOST_UNREAD_LOCKSTEP if lossless else MOST_UNREAD
         self._transport: asyncio.Transport | None = None
         self._piece = bytearray(PIECE)
         self._behind = False
         """Whether the client leaves its answers unread."""
+        self._first_word: asyncio.TimerHandle | None = None
+        """What ends the connection of a client that says nothing."""
         self.session: Session | None = None
+        self.peer = "a client"
+        """Who it is and which door it uses, for a person."""
+        self.heard = 0.0
+        """When it last sent something, or came [s of the loop's clock]."""
         self.dropped = 0
         """Samples that a slow client did not get."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """A client came."""
         stream = cast("asyncio.Transport", transport)
-        if len(self._members) >= self._most:
-            log.warning("a client of a UR door was turned away: there are %d connections", self._most)
+        (host, port), (own, door) = (stream.get_extra_info(end)[:2] for end in ("peername", "sockname"))
+        self.peer = f"the client {host}:{port} of port {door}"
+        if not self._places.make_room(self.peer, local=host == own or _is_loopback(host)):
             stream.abort()
             return
         self._transport = stream
         stream.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         if not self._lossless:
             stream.set_write_buffer_limits(ANSWERS)
-        self._control = ConnectionControl(self._lease(stream.get_extra_info("peername")[0]), self._hear)
+        self._control = ConnectionControl(self._lease(host), self._hear, self.peer)
         self.session = self._make(self._control, self.send)
-        self._members.add(self)
+        self._places.taken.add(self)
+        loop = asyncio.get_running_loop()
+        self.heard = loop.time()
+        if self.session.client_begins:
+            self._first_word = loop.call_later(FIRST_WORD, self._said_nothing)
         self._guarded(self.session.opened)
 
     def get_buffer(self, sizehint: int) -> bytearray:  # noqa: ARG002  it is always the same
@@ -87,6 +104,10 @@ class Connection(asyncio.BufferedProtocol):
     def buffer_updated(self, nbytes: int) -> None:
         """The client sent something."""
         session = self.session
+        self.heard = asyncio.get_running_loop().time()
+        if self._first_word is not None:
+            self._first_word.cancel()
+            self._first_word = None
         if session is not None:
             data = bytes(self._piece[:nbytes])
             self._guarded(lambda: session.receive(data))
@@ -123,7 +144,9 @@ class Connection(asyncio.BufferedProtocol):
         """The client went, or was cut off."""
         session, self.session = self.session, None
         self._transport = None
-        self._members.discard(self)
+        self._places.taken.discard(self)
+        if self._first_word is not None:
+            self._first_word.cancel()
         if self.dropped:
             log.warning("a client of a UR door read too slowly: %d samples were dropped", self.dropped)
         if session is not None:
@@ -176,6 +199,22 @@ class Connection(asyncio.BufferedProtocol):
         if session is not None:
             self._guarded(lambda: session.event(event))
 
+    @property
+    def dispensable(self) -> bool:
+        """Whether it may have to go for a newcomer."""
+        session = self.session
+        return session is not None and session.client_begins and not session.served
+
+    def cut_off(self) -> None:
+        """End it at once, whatever still waits to be read."""
+        if self._transport is not None:
+            self._transport.abort()
+
+    def _said_nothing(self) -> None:
+        self._first_word = None
+        self._notices.tell(f"{self.peer} was closed: it said nothing for {FIRST_WORD:.0f} s")
+        self.cut_off()
+
     def close(self) -> None:
         """End it; what waits for a client that reads is still sent."""
         if self._transport is not None:
@@ -189,3 +228,10 @@ class Connection(asyncio.BufferedProtocol):
             log.exception("a UR door failed, its client is cut off")
             if self._transport is not None:
                 self._transport.abort()
+
+
+def _is_loopback(host: str) -> bool:
+    address = ipaddress.ip_address(host)
+    if isinstance(address, ipaddress.IPv6Address) and address.ipv4_mapped is not None:
+        address = address.ipv4_mapped
+    return address.is_loopback

@@ -20,6 +20,8 @@ from tvist_server.gateways.ur.base import Send, Session
 from tvist_server.gateways.ur.connection import Connection
 from tvist_server.gateways.ur.dashboard.session import DashboardSession
 from tvist_server.gateways.ur.lease import ALIVE, ConnectionControl, HostLease
+from tvist_server.gateways.ur.notices import Notices
+from tvist_server.gateways.ur.places import Places
 from tvist_server.gateways.ur.primary.session import PrimarySession
 from tvist_server.gateways.ur.realtime import RealtimeSession
 from tvist_server.gateways.ur.robot import UrRobot
@@ -29,8 +31,6 @@ from tvist_server.ur_ports import Door
 
 log = logging.getLogger(__name__)
 
-MOST_CONNECTIONS = 256
-"""At all doors of a robot together."""
 SEND_BUFFER = 32_768
 """What the system holds for a client [bytes]: a tenth of a second of samples; more would only be older."""
 PROBES = (10, 5, 3)
@@ -77,7 +77,9 @@ class UrDoors(Gateway):
         self._io: Io | None = None
         self._early = deque[State](maxlen=FIRST)
         """Those before the doors open: temperatures and energies begin with the first tick."""
+        self._coming_and_going = Notices(lambda line: log.warning("robot %s: %s", name, line))
         self._connections: set[Connection] = set()
+        """As their `Places` know them, while the doors are open."""
         self._leases = WeakValueDictionary[str, HostLease]()
         """By host, as long as one of its connections lives."""
         self._lockstep = lockstep
@@ -110,6 +112,8 @@ class UrDoors(Gateway):
     async def open(self) -> None:
         """Let clients in; they are served by the running loop."""
         self._loop = asyncio.get_running_loop()
+        places = Places[Connection](self._loop.time, self._coming_and_going.tell)
+        self._connections = places.taken
         while self._early:
             self._see(self._early.popleft())
         for door, bound in self._sockets.items():
@@ -119,8 +123,8 @@ class UrDoors(Gateway):
                         Connection,
                         partial(_session, door, self.robot),
                         self._lease,
-                        self._connections,
-                        MOST_CONNECTIONS,
+                        places,
+                        self._coming_and_going,
                         lossless=self._lockstep,
                     ),
                     sock=bound,
@@ -163,6 +167,7 @@ class UrDoors(Gateway):
             server.close()
         for connection in tuple(self._connections):
             connection.close()
+        self._coming_and_going.flush()
         await asyncio.sleep(0)
 
     def close(self) -> None:

@@ -110,9 +110,16 @@ class ConnectionControl(Control):
     Args:
         lease: Of its host.
         hear: Called with each answer, as a call to make.
+        peer: Who the client is, for a person; its host where nothing else is said.
     """
 
-    def __init__(self, lease: HostLease, hear: Callable[[Callable[[], None]], None] | None = None) -> None:
+    def __init__(
+        self,
+        lease: HostLease,
+        hear: Callable[[Callable[[], None]], None] | None = None,
+        peer: str | None = None,
+    ) -> None:
+        self.peer = peer or lease.client
         self._lease = lease
         self._hear = hear or _at_once
         self.unanswered = 0

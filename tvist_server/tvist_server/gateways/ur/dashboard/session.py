@@ -30,6 +30,8 @@ class DashboardSession(Session):
         send: To the client.
     """
 
+    client_begins = True
+
     def __init__(self, robot: UrRobot, control: Control, send: Send) -> None:
         self._robot = robot
         self._control = control

@@ -41,6 +41,8 @@ class RtdeSession(Session):
         send: Sends an answer.
     """
 
+    client_begins = True
+
     def __init__(self, robot: UrRobot, control: Control, send: Send) -> None:
         self._robot = robot
         self._control = control
@@ -66,6 +68,11 @@ class RtdeSession(Session):
             Kind.START: self._start,
             Kind.PAUSE: self._pause,
         }
+
+    @property
+    def served(self) -> bool:
+        """Whether outputs were started, and not paused since."""
+        return self._started
 
     def receive(self, data: bytes) -> None:
         """Take what arrived, cut anywhere."""

@@ -1,0 +1,76 @@
+"""A controller behind its doors, and clients at them, all in the test's own loop."""
+
+import asyncio
+
+from tests.server.robots import Robot
+
+from tvist_protocol.codec import decode_command
+from tvist_server.host import Host
+from tvist_server.ur_ports import UrPorts
+
+EVERYWHERE = dict.fromkeys(UrPorts().open(), 0)
+"""A port that is free, for each."""
+PATIENCE = 60.0
+"""After how long something is taken to hang [s]."""
+
+
+class Desk:
+    """A controller in the loop's own thread; `tick` lets time pass."""
+
+    def __init__(self):
+        self.controller = Robot().controller
+        self.controller.session.release()
+        self.host = Host(self.controller, self)
+        self.doors = None
+        self.writers = []
+
+    def request(self, data, reply):
+        self.last = decode_command(data)
+        reply(self.host.request(data))
+
+    def client_seen(self, name, session=""):
+        """Nobody asks."""
+
+    def client_gone(self, name, session=""):
+        self.host.client_gone(name, session)
+
+    def holder(self):
+        lease = self.controller.session.lease
+        return None if lease is None else lease.client
+
+    def state(self, state):
+        self.doors.publish("state", state, b"")
+
+    def event(self, event):
+        self.doors.publish("event", event, b"")
+
+    def io(self, io):
+        self.doors.publish("io", io, b"")
+
+    def journal(self, entry): ...
+
+    async def tick(self, count=1):
+        for _ in range(count):
+            self.host.tick()
+            await asyncio.sleep(0)
+
+
+async def connect(desk, door):
+    reader, writer = await asyncio.open_connection("127.0.0.1", desk.doors.ports[door])
+    desk.writers.append(writer)
+    return reader, writer
+
+
+async def until(condition):
+    """Give the loop its turns until something is so."""
+    async with asyncio.timeout(PATIENCE):
+        while not condition():  # noqa: ASYNC110  what changes belongs to the loop
+            await asyncio.sleep(0)
+
+
+async def lines(reader, writer, *sent):
+    answers = []
+    for line in sent:
+        writer.write(line.encode() + b"\n")
+        answers.append((await reader.readline()).decode().strip())
+    return answers

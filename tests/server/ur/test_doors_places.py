@@ -1,0 +1,148 @@
+"""Who gets a place at the doors, over real sockets: those who say nothing keep nobody out."""
+
+import asyncio
+import struct
+
+import pytest
+
+from tvist_server.gateways.ur.connection import FIRST_WORD
+from tvist_server.gateways.ur.places import MOST
+
+from .desks import PATIENCE, connect, lines, until
+
+VERSION_2 = struct.pack(">HBH", 5, ord("V"), 2)
+START, PAUSE = (struct.pack(">HB", 3, ord(letter)) for letter in "SP")
+
+
+@pytest.fixture
+async def later(monkeypatch):
+    """Lets the loop's clock jump by so many seconds."""
+    loop = asyncio.get_running_loop()
+    real, jumped = loop.time, [0.0]
+    monkeypatch.setattr(loop, "time", lambda: real() + sum(jumped))
+    return jumped.append
+
+
+async def is_cut_off(reader):
+    """Whether there is an end to what a client reads; of a connection that stays there is none."""
+    try:
+        async with asyncio.timeout(PATIENCE):
+            await reader.read()
+    except ConnectionError:
+        pass
+    return True
+
+
+async def package(reader):
+    """Kind of the next package of RTDE."""
+    head = await asyncio.wait_for(reader.readexactly(3), PATIENCE)
+    await reader.readexactly(struct.unpack(">H", head[:2])[0] - 3)
+    return head[2:]
+
+
+async def rtde(desk):
+    """A client of RTDE that is being served."""
+    reader, writer = await connect(desk, "rtde")
+    recipe = struct.pack(">HBd", 11 + len("timestamp"), ord("O"), 500.0) + b"timestamp"
+    writer.write(VERSION_2 + recipe + START)
+    assert [await package(reader) for _ in range(3)] == [b"V", b"O", b"S"]
+    return reader, writer
+
+
+async def dashboard(desk):
+    """A client of the dashboard that has said something."""
+    reader, writer = await connect(desk, "dashboard")
+    assert (await reader.readline()).startswith(b"Connected")
+    assert await lines(reader, writer, "robotmode") == ["Robotmode: RUNNING"]
+    return reader, writer
+
+
+async def readers(desk, count, door="realtime"):
+    """So many clients that only read."""
+    before = len(desk.doors._connections)
+    found = [(await connect(desk, door))[0] for _ in range(count)]
+    await until(lambda: len(desk.doors._connections) == before + count)
+    return found
+
+
+async def silent(desk, count=MOST, door="dashboard"):
+    """So many clients that say nothing; they have come in, and some have had to go again."""
+    found = [(await connect(desk, door))[0] for _ in range(count)]
+    await until(lambda: all(connection.session for connection in desk.doors._connections))
+    return found
+
+
+@pytest.mark.parametrize("door", ["dashboard", "rtde"])
+async def test_clients_that_say_nothing_lock_nobody_out(door, desk):
+    await desk.tick()
+    await silent(desk, door=door)
+    await dashboard(desk)
+    await rtde(desk)
+    reader, _ = await connect(desk, "primary")
+    assert len(await asyncio.wait_for(reader.readexactly(5), PATIENCE)) == 5
+
+
+async def test_who_says_nothing_for_half_a_minute_is_closed_and_who_reads_or_has_spoken_stays(
+    later, desk, caplog
+):
+    await desk.tick()
+    (reading,) = await readers(desk, 1)
+    spoken, writer = await dashboard(desk)
+    served, _ = await rtde(desk)
+    silent_ones = [(await connect(desk, door))[0] for door in ("dashboard", "rtde")]
+    await until(lambda: len(desk.doors._connections) == 5)
+    later(FIRST_WORD - 1.0)
+    await asyncio.sleep(0)
+    assert len(desk.doors._connections) == 5
+    later(1.0)
+    for reader in silent_ones:
+        assert await is_cut_off(reader)
+    later(86_400.0)
+    await desk.tick()
+    assert len(await reading.readexactly(1220)) == 1220
+    assert await package(served) == b"U"
+    assert await lines(spoken, writer, "robotmode") == ["Robotmode: RUNNING"]
+    assert "was closed: it said nothing for 30 s" in caplog.text
+
+
+async def test_for_a_newcomer_the_one_that_has_been_silent_for_longest_goes(later, desk, caplog):
+    await desk.tick()
+    old, _ = await dashboard(desk)
+    served, _ = await rtde(desk)
+    later(60.0)
+    recent, writer = await dashboard(desk)
+    later(10.0)
+    await readers(desk, 228)
+    await connect(desk, "realtime")  # of 256 places 231 are taken
+    assert await is_cut_off(old)
+    assert "silent for 70 s, was closed to make room for the client 127.0.0.1" in caplog.text
+    await desk.tick()
+    assert await package(served) == b"U"
+    assert await lines(recent, writer, "robotmode") == ["Robotmode: RUNNING"]
+
+
+async def test_where_room_is_left_nobody_has_to_go(later, desk):
+    await desk.tick()
+    await dashboard(desk)
+    later(86_400.0)
+    await readers(desk, 230)
+    assert len(desk.doors._connections) == 231
+
+
+async def test_who_is_being_served_goes_for_nobody_and_the_last_newcomer_is_turned_away(later, desk, caplog):
+    await desk.tick()
+    served, writer = await rtde(desk)
+    later(86_400.0)
+    others = await readers(desk, MOST - 1)
+    assert await is_cut_off((await connect(desk, "primary"))[0])
+    assert "was turned away: 256 of 256 places are taken" in caplog.text
+    await desk.tick()
+    assert await package(served) == b"U"
+    writer.write(PAUSE)
+    assert await package(served) == b"P"
+    reader, _ = await connect(desk, "primary")
+    assert len(await reader.readexactly(5)) == 5
+    assert await is_cut_off(served)  # paused, it is like any other that says nothing
+    await desk.tick()
+    for other in others:
+        assert len(await other.readexactly(1220)) == 1220
