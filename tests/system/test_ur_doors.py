@@ -1,9 +1,11 @@
 """UR's interfaces of served robots, over real sockets and processes."""
 
 import os
+import re
 import socket
 import subprocess
 import sys
+import time
 
 import pytest
 from tests.conformance.served import PATIENCE, Served
@@ -73,3 +75,22 @@ def test_what_is_wrong_is_said_in_a_sentence(options, code, named):
     assert ended.returncode == code, ended.stderr
     assert named in ended.stderr
     assert "Traceback" not in ended.stderr
+
+
+def test_the_console_says_what_became_of_a_program_and_a_flood_of_them_does_not_flood_it():
+    with Served("--ur", "--ur-address", address(17)) as served:
+        with socket.create_connection((address(17), 30002), PATIENCE) as stream:
+            host, port = stream.getsockname()
+            stream.sendall(b"def there():\n  movej([0,0,0,0,0,0])\nend\n")
+            served.wait_until_said(
+                f'the script "there" of the client {host}:{port} of port 30002 was not run'
+            )
+            stream.sendall(b"textmsg(1)\n" * 10_000)
+            began = time.monotonic()
+            served.wait_until_said("lines before this one were left out")
+        assert served.end() == 0
+        took = time.monotonic() - began
+        lines = [line for line in served.lines if "the script" in line]
+        assert len(lines) <= 3 + took
+        left_out = [int(count) for line in lines for count in re.findall(r"\((\d+) lines before", line)]
+        assert len(lines) + sum(left_out) == 10_001

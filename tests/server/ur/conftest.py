@@ -34,6 +34,8 @@ class FakeControl:
     `wait()` keeps the answers back until `answer()`.
     """
 
+    peer = "the client 10.0.0.2:50000 of port 30001"
+
     def __init__(self):
         self.commands = []
         self.reply = Done()
@@ -155,7 +157,7 @@ def snapshot(snapshots):
 @pytest.fixture
 def robot(snapshots) -> SimpleNamespace:
     """What all doors of a robot share, as far as no door is tested."""
-    told = []
+    told, reported = [], []
     return SimpleNamespace(
         description=UR5E,
         name="ur5e",
@@ -163,6 +165,8 @@ def robot(snapshots) -> SimpleNamespace:
         latest=snapshots[-1],
         tell=told.append,
         told=told,
+        report=reported.append,
+        reported=reported,
     )
 
 

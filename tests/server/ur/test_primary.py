@@ -438,6 +438,40 @@ def test_a_program_is_declined_to_everybody_and_plainly(robot, control, sent, te
     assert not control.commands
 
 
+REPORTS = {
+    b"power on\n": 'the script "power on" of {} was run',
+    b"stop program\n": 'the script "stop program" of {} was run',
+    b"set real\n": 'the script "set real" of {} changes nothing: the arm is simulated',
+    PROGRAM.encode(): 'the script "rtde" of {} was not run: URScript programs are not simulated',
+    b"# what it does\n\n  movej(p, a=1) # go\n": (
+        'the script "movej(p, a=1) # go" of {} was not run: URScript programs are not simulated'
+    ),
+    b"x\x1b[2J\x07\xff\n": 'the script "x?[2J?\ufffd" of {} was not run: URScript programs are not simulated',
+    b"y" * 100 + b"\n": f'the script "{"y" * 59}…" of {{}} was not run: URScript programs are not simulated',
+    b"# \n" * 400_000: 'the script "#" of {} was refused: it has more than 1048576 bytes',
+    b"def f():\n  halt\n": 'the script "f" of {} was not run: the connection ended before its last line feed',
+    b"halt": 'the script "halt" of {} was not run: the connection ended before its last line feed',
+}
+"""What was sent until the connection ended, and the only line that the console is told."""
+
+
+@pytest.mark.parametrize("text", REPORTS)
+def test_what_became_of_a_script_is_one_line_on_the_console(robot, control, sent, text):
+    door = session(robot, control, sent.append)
+    door.receive(text)
+    door.closed()
+    assert robot.reported == [REPORTS[text].format(control.peer)]
+
+
+def test_a_refusal_is_told_on_the_console_with_its_reason(robot, control, sent):
+    control.refuse("no_control")
+    session(robot, control, sent.append).receive(b"power off\n")
+    (line,) = robot.reported
+    assert line.endswith("was refused: another client has control: 'a'")
+    session(robot, control, sent.append, read_only=True).receive(b"power off\n")
+    assert robot.reported[1].endswith("was refused: this port is read-only")
+
+
 def test_who_does_not_have_control_is_told_that_the_interface_is_read_only(robot, control, sent):
     control.refuse("no_control")
     session(robot, control, sent.append).receive(b"power on\n")
@@ -479,8 +513,10 @@ def test_the_read_only_ports_answer_commands_with_210_and_do_nothing(robot, cont
 
 @given(data=st.binary(max_size=300))
 def test_no_bytes_break_a_session(data):
-    robot = host(SimpleNamespace(description=UR5E, latest=None, tell=message))
+    reported = []
+    robot = host(SimpleNamespace(description=UR5E, latest=None, tell=message, report=reported.append))
     control = SimpleNamespace(
+        peer="x",
         held_by_other=True,
         ask=lambda _, then: then(Refused(code="malformed", where="", why="")),
         change=lambda _, then: then(Refused(code="no_control", where="", why="")),
@@ -490,3 +526,4 @@ def test_no_bytes_break_a_session(data):
     door.receive(data)
     door.receive(b"\npower on\nstop program\n")
     door.closed()
+    assert all(line.isprintable() and len(line) < 300 for line in reported)

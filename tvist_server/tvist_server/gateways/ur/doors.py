@@ -72,12 +72,14 @@ class UrDoors(Gateway):
         self.setpoints_refused = 0
         self.address = address
         self._desk = desk
-        self.robot = UrRobot(description, name, self._tell)
+        self._scripts, self._coming_and_going = (
+            Notices(lambda line: log.warning("robot %s: %s", name, line)) for _ in range(2)
+        )
+        self.robot = UrRobot(description, name, self._tell, self._scripts.tell)
         self._instruments = Instruments(description)
         self._io: Io | None = None
         self._early = deque[State](maxlen=FIRST)
         """Those before the doors open: temperatures and energies begin with the first tick."""
-        self._coming_and_going = Notices(lambda line: log.warning("robot %s: %s", name, line))
         self._connections: set[Connection] = set()
         """As their `Places` know them, while the doors are open."""
         self._leases = WeakValueDictionary[str, HostLease]()
@@ -167,6 +169,7 @@ class UrDoors(Gateway):
             server.close()
         for connection in tuple(self._connections):
             connection.close()
+        self._scripts.flush()
         self._coming_and_going.flush()
         await asyncio.sleep(0)
 

@@ -99,6 +99,12 @@ class RealtimeSession(Session):
             for unit in self._intake.feed(data):
                 self._orders.carry_out(unit)
 
+    def closed(self) -> None:
+        """Say what the client leaves unfinished."""
+        unfinished = self._intake.unfinished
+        if self._orders is not None and unfinished is not None:
+            self._orders.leave(unfinished)
+
     def sample(self, snapshot: Snapshot) -> bytes:
         """The package of the tick."""
         return package(snapshot)

@@ -19,9 +19,16 @@ class UrRobot:
         description: The robot.
         name: On the network.
         tell: Sends a robot message to all clients that get them.
+        report: Takes a sentence for the server's console.
     """
 
-    def __init__(self, description: RobotDescription, name: str, tell: Callable[[bytes], None]) -> None:
+    def __init__(
+        self,
+        description: RobotDescription,
+        name: str,
+        tell: Callable[[bytes], None],
+        report: Callable[[str], None],
+    ) -> None:
         self.description = description
         self.name = name
         self.serial = f"2024550{crc32(name.encode()) % 10_000:04d}"
@@ -33,7 +40,12 @@ class UrRobot:
         self.inputs = InputOwners()
         self.programs = Programs(self)
         self._tell = tell
+        self._report = report
 
     def tell(self, message: bytes) -> None:
         """Send a robot message to all clients that get them."""
         self._tell(message)
+
+    def report(self, sentence: str) -> None:
+        """Tell the person at the server's console."""
+        self._report(sentence)

@@ -21,6 +21,8 @@ READ_ONLY: Final = (
 class Orders:
     """Carries out units of script text: a handful of commands that are no URScript; the others are declined.
 
+    Whatever becomes of a unit is reported to the server's console, too: few clients show what they are answered.
+
     Args:
         robot: Whom they are for.
         control: The way to its controller.
@@ -36,12 +38,14 @@ class Orders:
         """Do what a unit says."""
         if unit.too_long:
             self._except(unit, TOO_LONG)
+            self._report(unit, f"was refused: it has more than {LONGEST} bytes")
             return
         words = unit.words if len(unit.text) < 1000 else ""
         robot, control = self._robot, self._control
 
         def outcome(refused: Refused | None) -> None:
             self._refused(words, refused)
+            self._report(unit, "was run" if refused is None else f"was refused: {refused.why}")
 
         match words:
             case "power on":
@@ -53,14 +57,25 @@ class Orders:
             case "set unlock protective stop":
                 power.unlock(robot, control, outcome)
             case "stop program":
-                robot.programs.stop(control, lambda done: None)  # noqa: ARG005  nobody is told on this interface
+                robot.programs.stop(
+                    control, lambda done: self._report(unit, "was run" if done else "was refused")
+                )
             case "set sim" | "set real":
-                pass  # the arm is simulated, whatever is set
+                self._report(unit, "changes nothing: the arm is simulated")
             case _:
                 self._except(unit, NOT_RUN)
+                self._report(unit, "was not run: URScript programs are not simulated")
 
-    def read_only(self) -> None:
+    def leave(self, unit: Unit) -> None:
+        """The client has gone before a unit was complete."""
+        self._report(unit, "was not run: the connection ended before its last line feed")
+
+    def decline(self, unit: Unit) -> None:
         """Say that nothing is taken here."""
+        self._read_only()
+        self._report(unit, "was refused: this port is read-only")
+
+    def _read_only(self) -> None:
         stamp = messages.stamp(self._robot.latest)
         self._answer(messages.error_code(stamp, messages.READ_ONLY, 0, Level.VIOLATION, READ_ONLY))
 
@@ -72,7 +87,10 @@ class Orders:
         if refused is None:
             return
         if refused.code in {"no_control", "stale_token"}:
-            self.read_only()
+            self._read_only()
         else:
             stamp = messages.stamp(self._robot.latest)
             self._answer(messages.text(stamp, f"{words} was refused: {refused.why}"))
+
+    def _report(self, unit: Unit, what: str) -> None:
+        self._robot.report(f'the script "{unit.title}" of {self._control.peer} {what}')

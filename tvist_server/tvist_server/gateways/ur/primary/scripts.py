@@ -12,6 +12,8 @@ LONGEST: Final = 1 << 20
 """Bytes of a unit: twenty times the longest program that a known client sends."""
 GLIMPSE: Final = 200
 """Characters that are kept of one that is longer."""
+TITLE: Final = 60
+"""Characters of a title at most."""
 
 _OPENS = re.compile(r"(?:def|sec|thread|if|while|for|switch)\b.*:")
 _CLOSES = re.compile(r"\bend$")
@@ -40,8 +42,22 @@ class Unit:
     @property
     def name(self) -> str | None:
         """Of the program that it defines; None for others."""
-        head = _HEAD.match(self.text.split("\n")[self.line - 1].strip())
+        head = _HEAD.match(self._first)
         return None if head is None else head[1]
+
+    @property
+    def title(self) -> str:
+        """What a person knows it by: the name of the program that it defines, else its first line of code, cut."""
+        title = self.name or self._first
+        if len(title) > TITLE:
+            title = f"{title[: TITLE - 1]}…"
+        return "".join([letter if letter.isprintable() else "?" for letter in title])
+
+    @property
+    def _first(self) -> str:
+        """Its first line of code; of one that is too long, what is kept may end before it."""
+        lines = self.text.split("\n")
+        return lines[min(self.line, len(lines)) - 1].strip()
 
 
 class Intake:
@@ -63,6 +79,15 @@ class Intake:
     def held(self) -> int:
         """Bytes that are kept for a unit that is not complete."""
         return len(self._unit) + len(self._rest)
+
+    @property
+    def unfinished(self) -> Unit | None:
+        """The beginning of the unit that is not complete; None where there is none, or comments alone."""
+        if self._skipping:  # it was handed out when it became too long
+            return None
+        line, column = self._start or (self._unit.count(b"\n") + 1, 1)
+        begun = self._start is not None or _code(self._rest.decode(errors="replace"))
+        return Unit((self._unit + self._rest).decode(errors="replace"), line, column) if begun else None
 
     def feed(self, data: bytes) -> list[Unit]:
         """Take a piece; the units that it completes."""

@@ -48,7 +48,7 @@ class PrimarySession(Session):
         """Take a piece of a script."""
         for unit in self._intake.feed(data):
             if self._read_only:
-                self._orders.read_only()
+                self._orders.decline(unit)
             else:
                 self._orders.carry_out(unit)
 
@@ -71,6 +71,12 @@ class PrimarySession(Session):
             return state
         self._send(state)  # a client waits for it: it is not to be dropped
         return b""
+
+    def closed(self) -> None:
+        """Say what the client leaves unfinished."""
+        unfinished = self._intake.unfinished
+        if unfinished is not None:
+            self._orders.leave(unfinished)
 
     def event(self, event: Event) -> None:
         """Tell of a protective stop as the error it is, of other safety stops and warnings as a line of the log."""
