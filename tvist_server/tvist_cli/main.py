@@ -4,6 +4,8 @@ import os
 import signal
 import sys
 
+from tvist_server.ending import ending_signals
+
 COMMANDS = {
     "serve": "Run a robot on the network.",
     "demo": "See it work: the paper's motions in real time, with figures.",
@@ -39,7 +41,9 @@ def _run() -> None:
     if sys.argv[1:2] == ["serve"]:
         # Nothing is served yet, so whoever ends it gets what was asked for. As the first process of a container
         # it has no default to end by.
-        signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
+        for number in ending_signals():
+            if number != signal.SIGINT:
+                signal.signal(number, lambda *_: os._exit(0))
     # Matrices here are small: threads for them only get in each other's, and in the ticks', way.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from importlib.metadata import version

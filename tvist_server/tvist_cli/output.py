@@ -1,5 +1,6 @@
 """What commands print: tables and progress for people on stderr and stdout, one JSON object for machines."""
 
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -22,7 +23,11 @@ err = Console(stderr=True, highlight=False, width=None if sys.stderr.isatty() el
 
 def say(message: str) -> None:
     """A message for a person, in one line however long: it may stand in a log, or hold a path to be copied."""
-    err.print(message, soft_wrap=True, markup=False)
+    try:
+        err.print(message, soft_wrap=True, markup=False)
+    except OSError:
+        # The terminal is gone, with whoever would have read it; what was not written would fail again at the end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
 
 
 def print_json(value: Any) -> None:

@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import gc
-import signal
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -13,6 +12,7 @@ from tvist_plant.plant import PERIOD
 from tvist_server.clock import Clock, Lockstep, Realtime
 from tvist_server.config import ConfigError, ServeConfig
 from tvist_server.courier import Courier
+from tvist_server.ending import Ending
 from tvist_server.fleet import recording_of
 from tvist_server.gateways.console import Console, ConsoleGateway
 from tvist_server.gateways.exposure import ExposureError, guarded, guarded_doors
@@ -120,13 +120,15 @@ class Server:
         with contextlib.suppress(Exception):
             self._network.close()
 
-    async def run(self, ready: Callable[[], None]) -> None:
-        """Serve until SIGINT or SIGTERM, or until a controller fails; then `failure` says why.
+    async def run(self, ready: Callable[[], None], ending: Ending) -> None:
+        """Serve until a signal comes, or until a controller fails; then `failure` says why.
 
         Args:
             ready: Called once the robots tick and answer.
+            ending: The signals.
         """
-        ended = _on_signals(asyncio.get_running_loop())
+        ended, loop = asyncio.Event(), asyncio.get_running_loop()
+        ending.hear(lambda: loop.call_soon_threadsafe(ended.set))
         self.start()
         try:
             for doors in self._doors:
@@ -159,23 +161,6 @@ class Server:
             gateways = [self._gateways[number], *self._doors[number : number + 1]]
             robot.tell_telemetry(gateways, clock.punctuality(robot.driven))
         self._console.update()
-
-
-def _on_signals(loop: asyncio.AbstractEventLoop) -> asyncio.Event:
-    """An event that SIGINT and SIGTERM set.
-
-    The handlers are not the loop's own, which it would take away at its end: a second signal, while the process
-    ends, then does no harm either.
-    """
-    ended = asyncio.Event()
-
-    def on_signal(*_: object) -> None:
-        with contextlib.suppress(RuntimeError):  # the loop is closed: it has ended already
-            loop.call_soon_threadsafe(ended.set)
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, on_signal)
-    return ended
 
 
 def _robot(setup: Setup, config: ServeConfig, *, several: bool) -> ServedRobot:

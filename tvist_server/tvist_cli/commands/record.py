@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import signal
 from pathlib import Path
 
 from tvist_cli.failure import Failure, interrupted, told
@@ -33,21 +32,15 @@ def record(
     if seconds is not None and seconds <= 0.0:
         raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
     from tvist_client.robot import Robot
+    from tvist_server.ending import Ending
     from tvist_server.recording import Recorder, RecordingError
 
-    cut = False
+    ending = Ending()
 
     async def run() -> tuple[int, int]:
         ticks: list[int] = []
-        ended = asyncio.Event()
-
-        def interrupt() -> None:
-            nonlocal cut
-            cut = True
-            ended.set()
-
-        asyncio.get_running_loop().add_signal_handler(signal.SIGINT, interrupt)
-        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
+        ended, loop = asyncio.Event(), asyncio.get_running_loop()
+        ending.hear(lambda: loop.call_soon_threadsafe(ended.set))
         async with await Robot.connect(endpoint, name, security=security) as robot:
             with Recorder(file, await robot.info(), {}) as recorder:
                 robot.on_state(recorder.state)
@@ -66,11 +59,12 @@ def record(
 
     with told(RecordingError):
         states, lost = asyncio.run(run())
+    ending.close()
     if json:
         print_json({"file": str(file), "states": states, "lost": lost})
     else:
         say(f"{states} states recorded, {lost} lost")
-    if cut:
+    if ending.interrupted:
         said = f"{states * 0.002:.1f} s recorded into {file}"
         if seconds is not None:  # without it, Control+C is how a recording ends
             raise interrupted(said)

@@ -2,8 +2,6 @@
 
 import asyncio
 import os
-import signal
-import sys
 import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -43,7 +41,7 @@ def serve(
     ur_port: list[str] | None = None,
     config: str | None = None,
 ) -> None:
-    """Run a robot on the network, or several, until Control+C.
+    """Run a robot on the network, or several, until Control+C, SIGTERM, SIGQUIT or the end of the terminal.
 
     Args:
         name: Name on the network [ur5e].
@@ -88,6 +86,7 @@ def serve(
     if not is_compiled():
         say("compiling the arm's equations, once: this takes some seconds")
     from tvist_server.config import ConfigError, from_mapping, read_toml
+    from tvist_server.ending import Ending
     from tvist_server.gateways.base import GatewayError
     from tvist_server.recording import RecordingError
     from tvist_server.server import Server
@@ -96,9 +95,9 @@ def serve(
         content = {} if config is None else read_toml(config)
         content |= {key: value for key, value in given.items() if value is not None}
         checked = from_mapping(content, "configuration" if config is None else f"configuration {config}")
-        with told(GatewayError, RecordingError):
-            # From here on there is something to clean up, which an exception sees to.
-            signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+        ending = Ending()
+        # Now there is something to clean up, which an exception sees to.
+        with told(GatewayError, RecordingError), ending.at_once():
             server = Server(checked)
 
     def ready() -> None:
@@ -114,7 +113,8 @@ def serve(
     whom = "this robot" if len(server.robots) == 1 else "these robots"
     for endpoint in checked.listen if checked.insecure else ():
         say(f"anybody who reaches {endpoint} can move {whom}")
-    asyncio.run(server.run(ready))
+    asyncio.run(server.run(ready, ending))
+    ending.close()
     if server.failure is not None:
         raise Failure(server.failure)
     recorders = [robot.recorder for robot in server.robots if robot.recorder is not None]
