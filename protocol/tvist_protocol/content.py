@@ -1,7 +1,6 @@
 """What a file or a map holds, checked: a fault is said in words, with key, value and what is allowed."""
 
 import json
-import tomllib
 from typing import Any, NoReturn, TypeVar
 
 import msgspec
@@ -37,22 +36,6 @@ def parse_json(data: bytes) -> Any:
     except json.JSONDecodeError as error:
         why = f"it is no JSON: line {error.lineno}, column {error.colno}: {error.msg}"
         raise ProtocolError("malformed", "", why) from error
-    except RecursionError as error:
-        raise ProtocolError("malformed", "", "it is nested too deeply") from error
-
-
-def parse_toml(data: bytes) -> dict[str, Any]:
-    """What TOML text holds.
-
-    Raises:
-        ProtocolError: It is none; line and column stand in the sentence.
-    """
-    try:
-        return tomllib.loads(data.decode())
-    except UnicodeDecodeError as error:
-        raise _no_text(error) from error
-    except tomllib.TOMLDecodeError as error:
-        raise ProtocolError("malformed", "", f"it is no TOML: {error}") from error
     except RecursionError as error:
         raise ProtocolError("malformed", "", "it is nested too deeply") from error
 

@@ -12,6 +12,8 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from tvist_plant._words import in_words
+from tvist_plant.units import check_limits
+from tvist_plant.user_file import read_toml, toml
 
 Number = Annotated[float, Meta(ge=-1e7, le=1e7)]
 Positive = Annotated[float, Meta(gt=0, le=1e7)]
@@ -246,29 +248,26 @@ def load(robot: str | Path) -> RobotDescription:
 
     Raises:
         DescriptionError: There is no such robot, or the file is wrong; the message names the key.
+        UserFileError: It is no file with a text of that size, is nested too deeply, or has its limits in degrees.
     """
     shipped = resources.files("tvist_plant") / "robots" / f"{robot}.toml"
     try:
         if isinstance(robot, str) and robot in robots():
-            text = shipped.read_text(encoding="utf-8")
+            content = toml(shipped.read_text(encoding="utf-8"))
         else:
-            text = Path(robot).read_text(encoding="utf-8")
-        content = tomllib.loads(text)
+            content = read_toml(robot, "robot file")
         description = msgspec.convert(content, RobotDescription)
     except OSError as error:
         known = ", ".join(robots())
         raise DescriptionError(
             f"robot {str(robot)!r}: neither one of {known} nor a readable file ({error.strerror})"
         ) from error
-    except UnicodeDecodeError as error:
-        raise DescriptionError(
-            f"robot file {robot}: it is no text: byte {error.start} is not UTF-8"
-        ) from error
     except tomllib.TOMLDecodeError as error:
         raise DescriptionError(f"robot file {robot}: it is no TOML: {error}") from error
     except msgspec.ValidationError as error:
         raise DescriptionError(f"robot file {robot}: {in_words(error, content)}") from error
     _check(description, robot)
+    check_limits(description.limits.position, description.limits.velocity, f"robot file {robot}")
     _check_bodies(description, robot)
     return description
 

@@ -19,6 +19,22 @@ def free_endpoint():
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
+def refused_to_start(*options, endpoint=None):
+    """What `tvist serve` says when it does not begin, and its exit code."""
+    with_port = ("--listen", endpoint or free_endpoint())
+    ended = subprocess.run(
+        [sys.executable, "-m", "tvist_cli", "serve", *with_port, *map(str, options)],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert ended.stdout == ""
+    assert ended.stderr.count("\n") == 1, ended.stderr
+    assert ended.stderr.startswith("tvist: ")
+    return ended.returncode, ended.stderr
+
+
 class Served:
     """A robot in a process of its own; several where there is no name but the option --robots."""
 

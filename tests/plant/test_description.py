@@ -1,5 +1,7 @@
 """A robot file is read, checked and refused in one sentence that names file and key."""
 
+import math
+import re
 from importlib import resources
 
 import msgspec
@@ -15,6 +17,8 @@ from tvist_plant.description import (
     robots,
 )
 from tvist_plant.plant import Plant
+from tvist_plant.units import check_limits
+from tvist_plant.user_file import UserFileError
 
 from .arms import chain, hold
 
@@ -88,12 +92,34 @@ def test_an_unknown_robot_is_answered_with_the_known_ones():
 
 
 def test_what_cannot_be_read_is_named(tmp_path):
-    with pytest.raises(DescriptionError, match="nor a readable file"):
+    with pytest.raises(UserFileError, match="is a directory"):
         load(tmp_path)
     file = tmp_path / "binary.toml"
     file.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(DescriptionError, match=r"binary\.toml"):
+    with pytest.raises(UserFileError, match=r"binary\.toml"):
         load(file)
+
+
+@pytest.mark.parametrize(
+    ("key", "degrees", "said"),
+    [
+        ("position", 360, r"limits\.position\[1\] is 360 rad, .* 62\.8 rad .*degrees.* 6\.28319 rad"),
+        ("position", 120, r"limits\.position\[1\] is 120 rad, .* 2\.0944 rad"),
+        ("velocity", 180, r"limits\.velocity\[1\] is 180 rad/s, .* 50\.3 rad/s .*degrees.* 3\.14159 rad/s"),
+    ],
+)
+def test_limits_in_degrees_are_refused_with_what_they_are_in_radians(tmp_path, key, degrees, said):
+    file = tmp_path / "degrees.toml"
+    text, count = re.subn(rf"(\n{key} +=) \[([^,]+), [^,]+,", rf"\1 [\2, {degrees}.0,", TEXT)
+    assert count == 1
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(UserFileError, match=said) as refused:
+        load(file)
+    assert "degrees.toml" in str(refused.value)
+
+
+def test_ten_turns_either_way_and_eight_a_second_are_limits_in_radians():
+    check_limits([20.0 * math.pi], [16.0 * math.pi], "here")
 
 
 def test_a_body_of_points_is_real_and_one_with_a_too_large_moment_is_not():

@@ -6,6 +6,7 @@ from importlib import resources
 
 import pytest
 
+from tvist_plant.user_file import UserFileError
 from tvist_protocol.calibration import calibration_to_json
 from tvist_server.config import ConfigError, ServeConfig, from_mapping, read_toml
 from tvist_server.setup import Setup, paper_payload
@@ -146,12 +147,15 @@ def test_a_broken_calibration_file_is_named(tmp_path, content):
 
 def test_a_file_that_cannot_be_read_or_is_no_toml(tmp_path):
     assert "nowhere.toml" in sentence(read_toml, "nowhere.toml")
-    assert str(tmp_path) in sentence(read_toml, str(tmp_path))
     broken = tmp_path / "broken.toml"
     broken.write_text("name = ")
     assert "broken.toml" in sentence(read_toml, str(broken))
-    broken.write_bytes(b"\xff\xfe")
-    assert "broken.toml" in sentence(read_toml, str(broken))
+
+
+@pytest.mark.parametrize("key", ["robot", "state", "calibration"])
+def test_a_file_that_is_none_is_not_taken_for_a_wrong_value(key, tmp_path):
+    with pytest.raises(UserFileError, match=f"{key}.*{tmp_path}: is a directory"):
+        config(**{key: str(tmp_path)}).setup()
 
 
 def test_a_file_is_read(tmp_path):

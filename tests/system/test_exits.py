@@ -10,29 +10,13 @@ import threading
 import msgpack
 import pytest
 import zenoh
-from tests.conformance.served import PATIENCE, Served, free_endpoint
+from tests.conformance.served import PATIENCE, Served, free_endpoint, refused_to_start
 from tests.conformance.wire import Wire
 
 from tvist_lab.mcap_file import read
 from tvist_lab.replay import replay_file
 
 FAR = [1.5, -3.0, 0.2, -1.5, 0.1, 0.3]
-
-
-def refused_to_start(*options, endpoint=None):
-    """What `tvist serve` says when it does not begin, and its exit code."""
-    with_port = ("--listen", endpoint or free_endpoint())
-    ended = subprocess.run(
-        [sys.executable, "-m", "tvist_cli", "serve", *with_port, *map(str, options)],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
-    assert ended.stdout == ""
-    assert ended.stderr.count("\n") == 1, ended.stderr
-    assert ended.stderr.startswith("tvist: ")
-    return ended.returncode, ended.stderr
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])

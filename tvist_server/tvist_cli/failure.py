@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from tvist_client.errors import ClientError
+from tvist_plant.user_file import UserFileError
 from tvist_protocol.errors import ProtocolError, TvistError
 
 
@@ -26,10 +27,15 @@ def interrupted(what: str) -> Failure:
 
 @contextmanager
 def told(*errors: type[Exception], code: int = 1) -> Iterator[None]:
-    """Errors of these kinds, and those of client and protocol, become a failure with their sentence."""
+    """Errors of these kinds, and those of client and protocol, become a failure with their sentence.
+
+    A file that is there and is not what is asked for is a failure, exit code 1, whatever the others are.
+    """
     kinds: tuple[type[Exception], ...] = (*errors, ClientError, TvistError)
     try:
         yield
+    except UserFileError as error:
+        raise Failure(str(error)) from error
     except kinds as error:
         raise Failure(_sentence(error), code=code) from error
 

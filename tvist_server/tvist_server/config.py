@@ -3,14 +3,15 @@
 import dataclasses
 import ipaddress
 import tempfile
-from pathlib import Path
+import tomllib
 from typing import Annotated
 
 from msgspec import Meta, Struct
 from msgspec.structs import replace
 
+from tvist_plant import user_file
 from tvist_plant.description import RobotDescription, load
-from tvist_protocol.content import checked, parse_toml
+from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Clock
 from tvist_protocol.values import RobotName, Seed
@@ -88,6 +89,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
         Raises:
             ConfigError: As `setup`.
+            UserFileError: As `setup`.
         """
         if self.robots is None:
             return [self.setup()]
@@ -144,6 +146,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
         Raises:
             ConfigError: A value does not fit the others, or names something that is not there.
+            UserFileError: It names a file that is not what is asked for.
         """
         try:
             description = load(self.robot)
@@ -165,6 +168,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             if self.quiet:
                 setup = dataclasses.replace(setup, description=setup.description.quiet())
             setup.check()
+        except user_file.UserFileError:
+            raise
         except ValueError as error:
             raise ConfigError(str(error)) from error
         if not self.overload:
@@ -214,10 +219,11 @@ def read_toml(path: str) -> dict[str, object]:
 
     Raises:
         ConfigError: It cannot be read, or is no TOML.
+        UserFileError: It is no file with a text of that size, or is nested too deeply.
     """
     try:
-        return parse_toml(Path(path).read_bytes())
+        return user_file.read_toml(path, "configuration")
     except OSError as error:
         raise ConfigError(f"configuration {path}: {error.strerror}") from error
-    except ProtocolError as error:
-        raise ConfigError(f"configuration {path}: {error.why}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"configuration {path}: it is no TOML: {error}") from error

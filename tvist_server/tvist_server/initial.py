@@ -1,12 +1,14 @@
 """The state a robot starts in, from a file: the fields of `simulation.reset`."""
 
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from msgspec import Struct
 
-from tvist_protocol.content import checked, parse_json, parse_toml
+from tvist_plant.user_file import read_bytes, read_toml
+from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import Joints, Name, Payload, ResetMode, Seed
 from tvist_server.setup import Setup
@@ -47,11 +49,15 @@ def read_state(path: str) -> InitialState:
 
     Raises:
         InitialStateError: It cannot be read, or a field is unknown or out of range.
+        UserFileError: It is no file with a text of that size, or is nested too deeply.
     """
-    parse = parse_json if Path(path).suffix == ".json" else parse_toml
     try:
-        return checked(parse(Path(path).read_bytes()), InitialState)
+        is_json = Path(path).suffix == ".json"
+        content = parse_json(read_bytes(path, "state")) if is_json else read_toml(path, "state")
+        return checked(content, InitialState)
     except OSError as error:
         raise InitialStateError(f"state {path}: {error.strerror}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InitialStateError(f"state {path}: it is no TOML: {error}") from error
     except ProtocolError as error:
         raise InitialStateError(f"state {path}: {error.why}") from error

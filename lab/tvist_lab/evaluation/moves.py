@@ -13,6 +13,7 @@ from msgspec import Meta, Struct
 from tvist_lab.recordings import Floats
 from tvist_lab.workspace import WORKSPACE, Region
 from tvist_plant.description import RobotDescription
+from tvist_plant.user_file import read_bytes
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import Angle, Mass
@@ -68,9 +69,10 @@ def read_moves(path: Path, description: RobotDescription, masses: Callable[[], f
 
     Raises:
         MovesError: It cannot be read, or a move is beyond a limit or goes nowhere.
+        UserFileError: It is no file of that size, or is nested too deeply.
     """
     try:
-        entries = checked(parse_json(path.read_bytes()), Entries)
+        entries = checked(parse_json(read_bytes(path, "moves")), Entries)
     except OSError as error:
         raise MovesError(f"moves {path}: {error.strerror}") from error
     except ProtocolError as error:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import msgspec
 
+from tvist_plant.user_file import parsed, read_bytes
 from tvist_protocol.calibration import Calibration, CalibrationError, calibration_from_json
 from tvist_protocol.values import Payload
 from tvist_shaping.errors import EstimatorError
@@ -27,13 +28,14 @@ def load(calibration: str | Path) -> Calibration:
 
     Raises:
         CalibrationError: There is none, or it is wrong; the message names file and key.
+        UserFileError: It is no file with a text of that size, or is nested too deeply.
     """
     try:
         if isinstance(calibration, str) and calibration in available():
             content = (resources.files(__name__) / f"{calibration}.json").read_bytes()
         else:
-            content = Path(calibration).read_bytes()
-        return calibration_from_json(content)
+            content = read_bytes(calibration, "calibration")
+        return parsed(calibration, "calibration", lambda: calibration_from_json(content))
     except OSError as error:
         known = ", ".join(available())
         raise CalibrationError(

@@ -13,17 +13,20 @@ Both sides show a certificate (mutual TLS); the common name of the client's deci
 import contextlib
 import ipaddress
 import ssl
+import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from tvist_plant.user_file import read_bytes, read_toml
 from tvist_protocol.codec import MAX_BYTES
-from tvist_protocol.content import checked, parse_toml
+from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
 from tvist_server.gateways.access import Role, access_control, open_access
 from tvist_server.gateways.endpoints import is_local, options, protocol
 
 AUTHORITY, CERTIFICATE, KEY, CLIENTS = "authority.pem", "robot.pem", "robot.key", "clients.toml"
+_LINE = 'a line is "NAME" = "operator" or "NAME" = "viewer"'
 
 HANDSHAKE_MS = 60_000
 """How long a TLS handshake may take [ms]. Zenoh accepts nobody for 100 ms after each that fails (its issue 2685),
@@ -95,16 +98,17 @@ def roles_in(folder: Path) -> dict[str, Role]:
 
     Raises:
         ExposureError: It cannot be read, or a role is none.
+        UserFileError: It is no file with a text of that size, or is nested too deeply.
     """
     path = folder / CLIENTS
     try:
-        return checked(parse_toml(path.read_bytes()), dict[str, Role])
+        return checked(read_toml(path, "clients"), dict[str, Role])
     except OSError as error:
         raise ExposureError(f"{path}: {error.strerror}; `tvist keys` makes it") from error
+    except tomllib.TOMLDecodeError as error:
+        raise ExposureError(f"{path}: it is no TOML: {error}; {_LINE}") from error
     except ProtocolError as error:
-        raise ExposureError(
-            f'{path}: {error.why}; a line is "NAME" = "operator" or "NAME" = "viewer"'
-        ) from error
+        raise ExposureError(f"{path}: {error.why}; {_LINE}") from error
 
 
 def _secured(endpoint: str) -> str:
@@ -143,7 +147,7 @@ def _check_pair(folder: Path) -> None:
     """Shake hands with oneself, as a client will: Zenoh would say what is wrong in its own words, or to nobody."""
     for name in (AUTHORITY, CERTIFICATE, KEY):
         try:
-            (folder / name).read_bytes()
+            read_bytes(folder / name, "certificates")
         except OSError as error:
             raise ExposureError(f"{folder / name}: {error.strerror}; `tvist keys` makes it") from error
     try:

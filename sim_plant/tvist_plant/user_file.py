@@ -1,0 +1,156 @@
+"""Files that a user names, read so that none of them holds the program up or brings it down.
+
+A path on the command line may be anything: a device without end, a pipe nobody writes to, a file of another kind
+with gigabytes in it, or one that was made to be nested too deeply for a parser.
+"""
+
+import os
+import re
+import stat
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+LARGEST: Final = 4 << 20
+"""Bytes of a file at most: a hundred times the largest that there is a use for."""
+DEEPEST: Final = 100
+"""Levels of brackets, or parts of a dotted key, that a TOML file may have: it needs five. The parser takes time that
+grows with the square of the parts."""
+
+Content = TypeVar("Content")
+
+
+class UserFileError(ValueError):
+    """A file is there and is not what is asked for: one sentence that names it and says what was expected."""
+
+
+def read_bytes(path: str | os.PathLike[str], what: str) -> bytes:
+    """Read a file that a user has named.
+
+    Args:
+        path: Where it is.
+        what: What it should hold, for the sentence: "robot file".
+
+    Raises:
+        UserFileError: It is no regular file, or larger than `LARGEST`.
+        OSError: There is none, or it cannot be read.
+    """
+    # Looked at before it is opened, since opening alone may do something to a device, and afterwards again, since
+    # it may be another one by now. Without waiting, for that one may be a pipe.
+    _check_kind(path, what, Path(path).stat())
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    with open(descriptor, "rb") as stream:  # noqa: PTH123  a descriptor, not a path
+        _check_kind(path, what, os.fstat(descriptor))
+        content = stream.read(LARGEST + 1)
+    if len(content) > LARGEST:
+        raise UserFileError(
+            f"{what} {path}: has more than {LARGEST >> 20} MiB; is it another file than you meant?"
+        )
+    return content
+
+
+def read_text(path: str | os.PathLike[str], what: str) -> str:
+    """Read a text that a user has named.
+
+    Raises:
+        UserFileError: As `read_bytes`, or it is not UTF-8.
+        OSError: As `read_bytes`.
+    """
+    try:
+        return read_bytes(path, what).decode()
+    except UnicodeDecodeError as error:
+        raise UserFileError(
+            f"{what} {path}: is no text in UTF-8 ({error.reason} at byte {error.start})"
+        ) from error
+
+
+def read_toml(path: str | os.PathLike[str], what: str) -> dict[str, Any]:
+    """Read a TOML file that a user has named.
+
+    Raises:
+        UserFileError: As `read_text`, or it has more than `DEEPEST` levels.
+        TOMLDecodeError: It is no TOML.
+        OSError: As `read_bytes`.
+    """
+    text = read_text(path, what)
+    if _is_deeper(text, DEEPEST):
+        raise UserFileError(f"{what} {path}: is nested too deeply: at most {DEEPEST} levels are supported")
+    return toml(text)
+
+
+def toml(text: str) -> dict[str, Any]:
+    """Parse TOML.
+
+    Raises:
+        TOMLDecodeError: It is none, or has an integer of thousands of digits, which the parser leaves to Python.
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        raise
+    except ValueError as error:
+        raise tomllib.TOMLDecodeError("a number has too many digits") from error
+
+
+def parsed(path: str | os.PathLike[str], what: str, parse: Callable[[], Content]) -> Content:
+    """What a parser that minds its own depth makes of a file.
+
+    Args:
+        path: Where it is.
+        what: What it should hold, for the sentence.
+        parse: Parses it.
+
+    Raises:
+        UserFileError: It is nested more deeply than the parser follows.
+    """
+    try:
+        return parse()
+    except RecursionError:
+        raise UserFileError(f"{what} {path}: is nested too deeply") from None
+
+
+def _is_deeper(text: str, most: int) -> bool:
+    """Whether a TOML text has more levels of brackets, or more dots in one key."""
+    depth = dots = 0
+    for token in _TOKENS.finditer(text):
+        match token[0]:
+            case "[" | "{":
+                depth, dots = depth + 1, 0
+            case "]" | "}":
+                depth, dots = depth - 1, 0
+            case ".":
+                dots += 1
+            case "\n" | "," | "=":
+                dots = 0
+        if depth > most or dots > most:
+            return True
+    return False
+
+
+_TOKENS: Final = re.compile(
+    r'"""(?:\\.|[^"\\]|"(?!""))*+(?:""")?'  # strings, which a file that is wrong may not end
+    r"|'''(?:[^']|'(?!''))*+(?:''')?"
+    r'|"(?:\\.|[^"\\\n])*+"?'
+    r"|'[^'\n]*+'?"
+    r"|#[^\n]*+"
+    r"|[\[\]{}.,=\n]",
+    re.DOTALL,
+)
+"""What depth depends on, and what hides it. Each character is looked at once, whatever the text."""
+
+
+def _check_kind(path: str | os.PathLike[str], what: str, status: os.stat_result) -> None:
+    if stat.S_ISREG(status.st_mode):
+        return
+    kind = next((kind for is_kind, kind in _KINDS if is_kind(status.st_mode)), "no regular file")
+    raise UserFileError(f"{what} {path}: is {kind}; give the path of a file")
+
+
+_KINDS: Final = (
+    (stat.S_ISDIR, "a directory"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISSOCK, "a socket"),
+)
