@@ -2,6 +2,7 @@
 
 import io
 import os
+import queue
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from tvist_protocol.generate import FOLDER
 from tvist_protocol.journal import Entry, entry_of
 from tvist_protocol.recorded import JsonReader
 from tvist_server.recording import Recorder, RecordingError
+from tvist_server.recording import recorder as recorder_module
 from tvist_server.recording.writer import RecordingWriter
 
 
@@ -262,6 +264,67 @@ def test_a_message_that_cannot_be_written_stops_the_recording_not_the_robot(path
     assert told.wait(60)
     recorder.close()
     assert "object" in recorder.error
+
+
+@pytest.fixture
+def looking(monkeypatch):
+    """A recorder that looks for its file at every turn."""
+    monkeypatch.setattr(recorder_module, "LOOK", 0.0)
+
+
+def test_one_that_is_deleted_stops_and_says_so(path, looking):
+    told = queue.SimpleQueue()
+    recorder = Recorder(path, INFO, {}, on_error=told.put)
+    path.unlink()
+    assert (
+        told.get(timeout=60)
+        == f"the recording {path} was deleted: what it held is lost, and no more is recorded"
+    )
+    recorder.state(state(1))
+    assert recorder.dropped == 1
+    recorder.close()
+    assert recorder.error is not None
+    assert told.empty()
+
+
+@pytest.mark.parametrize("how", ["renamed", "replaced", "folder"])
+def test_one_that_is_moved_goes_on_where_it_is_and_says_so_once(path, tmp_path, looking, how):
+    told = queue.SimpleQueue()
+    path = tmp_path / "folder" / "run.mcap"
+    path.parent.mkdir()
+    recorder = Recorder(path, INFO, {}, on_moved=told.put)
+    new = tmp_path / "new.mcap"
+    if how == "folder":
+        path.parent.rename(tmp_path / "other")
+        new = tmp_path / "other" / "run.mcap"
+    else:
+        path.rename(new)
+    if how == "replaced":
+        path.write_bytes(b"somebody else's")
+    assert told.get(timeout=60) == f"the recording {path} was moved away: it goes on in {new}"
+    recorder.state(state(1))
+    recorder.close()
+    assert recorder.error is None
+    assert recorder.place == new
+    assert told.empty()
+    assert [one.tick for one in read(new)["state"]] == [1]
+
+
+def test_one_that_is_moved_there_and_back_is_where_it_was(path, tmp_path, looking):
+    told = queue.SimpleQueue()
+    recorder = Recorder(path, INFO, {}, on_moved=told.put)
+    path.rename(tmp_path / "new.mcap")
+    assert told.get(timeout=60)
+    (tmp_path / "new.mcap").rename(path)
+    recorder.close()
+    assert recorder.place == path
+
+
+def test_one_that_is_deleted_at_the_last_moment_is_not_taken_for_one_that_is_there(path):
+    recorder = Recorder(path, INFO, {})
+    path.unlink()
+    recorder.close()
+    assert "was deleted" in recorder.error
 
 
 def test_on_error_may_close(path):

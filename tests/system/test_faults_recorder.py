@@ -58,6 +58,42 @@ def test_a_disk_that_fills_up_ends_the_recording_and_is_named_and_counted(small_
     assert [state.tick for state in content.states] == list(range(1, len(content.states) + 1))
 
 
+def test_a_recording_that_is_deleted_is_told_to_all_and_not_claimed_at_the_end(tmp_path):
+    path = tmp_path / "run.mcap"
+    with Served("--record", str(path)) as served:
+        with Bystander(served.endpoint) as bystander:
+            path.unlink()
+            served.wait_until_said("was deleted")
+            assert f"the recording {path} was deleted" in bystander.event("warning")["why"]
+            bystander.next("telemetry", lambda telemetry: telemetry["recorder_dropped"] > 0)
+            bystander.assert_undisturbed()
+        assert served.end() == 1
+        assert f"the recording {path} was deleted" in served.lines[-1]
+        assert "recorded into" not in served.said
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_recording_that_is_moved_goes_on_there_and_is_told_to_all(tmp_path):
+    path, new = tmp_path / "run.mcap", tmp_path / "moved.mcap"
+    with Served("--record", str(path)) as served:
+        with Bystander(served.endpoint) as bystander:
+            path.rename(new)
+            served.wait_until_said("was moved away")
+            why = f"the recording {path} was moved away: it goes on in {new}"
+            assert bystander.event("warning")["why"] == why
+            bystander.until_later(500)
+            last = bystander.received["state"][-1]["tick"]
+            bystander.assert_undisturbed()
+        assert served.end() == 0
+        assert served.said.count(why) == 1
+        assert f"recorded into {new}" in served.lines[-1]
+        assert f"recorded into {path}" not in served.said
+    content = read(new)
+    assert content.complete
+    assert [state.tick for state in content.states] == list(range(1, content.states[-1].tick + 1))
+    assert content.states[-1].tick >= last
+
+
 def test_a_disk_that_does_not_answer_for_a_second_costs_nothing(system, tmp_path):
     path = tmp_path / "run.mcap"
     with Served("--record", str(path), "--truth") as served, Bystander(served.endpoint) as bystander:

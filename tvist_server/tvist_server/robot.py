@@ -52,6 +52,7 @@ class ServedRobot:
                 setup.to_builtins(),
                 wait=lockstep,
                 on_error=self._recorder_failed,
+                on_moved=self._recording_moved,
             )
         black_box = BlackBox(dump, lambda: info_of(self.controller), setup.to_builtins(), self.recorder)
         self.outlet = Outlet(black_box, lossless=lockstep)
@@ -162,7 +163,16 @@ class ServedRobot:
             self.recorder.path.unlink(missing_ok=True)
 
     def _recorder_failed(self, why: str) -> None:
-        """Say so in the log, and to clients; it is no event of the controller's, whose replay knows no disk."""
+        """Say so in the log, and to clients."""
         log.error("the recording ended: %s", why)
+        self._warn(why)
+
+    def _recording_moved(self, where: str) -> None:
+        """Say so in the log, and to clients."""
+        log.warning("%s", where)
+        self._warn(where)
+
+    def _warn(self, why: str) -> None:
+        """Tell clients; it is no event of the controller's, whose replay knows no disk."""
         tick = self.controller.tick_number + 1
         self.driven.post(lambda: self.outlet.event(Event(tick=tick, kind="warning", why=why)))

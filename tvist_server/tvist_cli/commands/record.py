@@ -37,12 +37,12 @@ def record(
 
     ending = Ending()
 
-    async def run() -> tuple[int, int]:
+    async def run() -> tuple[Path | None, int, int]:
         ticks: list[int] = []
         ended, loop = asyncio.Event(), asyncio.get_running_loop()
         ending.hear(lambda: loop.call_soon_threadsafe(ended.set))
         async with await Robot.connect(endpoint, name, security=security) as robot:
-            with Recorder(file, await robot.info(), {}) as recorder:
+            with Recorder(file, await robot.info(), {}, on_error=say, on_moved=say) as recorder:
                 robot.on_state(recorder.state)
                 robot.on_state(lambda state: ticks.append(state.tick))
                 robot.on_event(recorder.event)
@@ -55,13 +55,13 @@ def record(
             if not ticks:
                 raise Failure(f"{name} told no state: is it in lockstep, with nobody stepping it?")
             missing = ticks[-1] - ticks[0] + 1 - len(ticks)
-            return len(ticks), missing + recorder.dropped
+            return recorder.place, len(ticks), missing + recorder.dropped
 
     with told(RecordingError):
-        states, lost = asyncio.run(run())
+        place, states, lost = asyncio.run(run())
     ending.close()
     if json:
-        print_json({"file": str(file), "states": states, "lost": lost})
+        print_json({"file": place and str(place), "states": states, "lost": lost})
     else:
         say(f"{states} states recorded, {lost} lost")
     if ending.interrupted:

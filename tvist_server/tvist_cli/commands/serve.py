@@ -121,7 +121,7 @@ def serve(
     for recorder in recorders:
         if recorder.error is None:
             note = f", {recorder.dropped} messages dropped" if recorder.dropped else ""
-            say(f"recorded into {recorder.path}{note}")
+            say(f"recorded into {recorder.place or f'a file that is no longer {recorder.path}'}{note}")
     errors = [recorder.error for recorder in recorders if recorder.error is not None]
     if errors:
         raise Failure("; ".join(errors))

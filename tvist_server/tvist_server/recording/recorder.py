@@ -1,6 +1,7 @@
 """The recorder: takes messages from the tick without making it wait, writes them in a thread of its own."""
 
 import os
+import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -17,6 +18,7 @@ from tvist_protocol.info import Info
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import Recorded, topics
 from tvist_protocol.stream import Event, State, Truth
+from tvist_server.recording.whereabouts import DeletedError, whereabouts
 from tvist_server.recording.writer import RecordingWriter, heading
 
 QUEUE_SIZE = 8192
@@ -25,6 +27,8 @@ disk that does not answer, the time a file system takes to commit, in about 30 M
 PAUSE = 0.02
 """Time between two looks into the queue [s]. Nobody wakes the writer: that would cost the tick a system
 call, and the interpreter's lock in the middle of its work."""
+LOOK = 1.0
+"""Time between two looks whether the file is still where it was [s]."""
 
 
 class RecordingError(TvistError):
@@ -46,7 +50,9 @@ class Recorder:
         queue_size: Messages that may wait for the writer.
         wait: Whether a full queue is waited for: for a robot whose time waits too, in lockstep and free.
         on_error: Called once, from the writer's thread, with a sentence when the recording has stopped by
-            itself.
+            itself: the disk is full, or the file was deleted.
+        on_moved: Called once, from the writer's thread, with a sentence when the file was moved away. The recording
+            goes on in it, wherever it is.
 
     Raises:
         RecordingError: The file exists, cannot be written, or `start` cannot.
@@ -62,10 +68,14 @@ class Recorder:
         queue_size: int = QUEUE_SIZE,
         wait: bool = False,
         on_error: Callable[[str], None] | None = None,
+        on_moved: Callable[[str], None] | None = None,
     ) -> None:
         if queue_size < 1:
             raise RecordingError(f"queue_size is {queue_size}: must be at least 1")
         self.path = Path(path)
+        self.place: Path | None = self.path
+        """Where the file is, as far as is known: `path`, unless it was moved away. After `close` it is where it was
+        at the end."""
         self.error: str | None = None
         """Why the recording stopped by itself, as a sentence."""
         self._dropped: dict[type[msgspec.Struct], int] = dict.fromkeys((State, Event, Truth, Entry), 0)
@@ -73,6 +83,7 @@ class Recorder:
         self._queue_size = queue_size
         self._wait = wait
         self._on_error = on_error
+        self._on_moved = on_moved
         self._stopped = False
         self._closing = False
         self._wake = Flag()
@@ -155,15 +166,36 @@ class Recorder:
 
     def _run(self) -> None:
         try:
+            looked = time.monotonic()
             while not self._closing:
                 self._wake.wait(PAUSE)
                 self._wake.clear()
                 self._drain()
+                if time.monotonic() - looked >= LOOK:
+                    self._look()
+                    looked = time.monotonic()
             self._drain()
             self._writer.finish(self._dropped)
+            self._look()
             self._stream.close()
+        except DeletedError:
+            self._stop(
+                f"the recording {self.path} was deleted: what it held is lost, and no more is recorded"
+            )
         except Exception as error:  # noqa: BLE001  a thread has nobody above it: whatever it was must be told
-            self._stop(error)
+            self._stop(f"the recording {self.path} has stopped and is incomplete: {_reason(error)}")
+
+    def _look(self) -> None:
+        """Say once that the file was moved away.
+
+        Raises:
+            DeletedError: It was deleted: to go on would fill the disk with what nobody can read.
+        """
+        self.place = whereabouts(self.path, self._stream.fileno())
+        if self.place != self.path and self._on_moved is not None:
+            where = "it goes on in that file" if self.place is None else f"it goes on in {self.place}"
+            self._on_moved(f"the recording {self.path} was moved away: {where}")
+            self._on_moved = None
 
     def _drain(self) -> None:
         """Write what waits now; what comes meanwhile is the next round's, lest the file wait for ever."""
@@ -172,12 +204,12 @@ class Recorder:
         self._writer.flush()
         self._room.set()
 
-    def _stop(self, error: Exception) -> None:
+    def _stop(self, why: str) -> None:
         self._stopped = True
         self._queue.clear()
         self._room.set()
         self._abandon()
-        self.error = f"the recording {self.path} has stopped and is incomplete: {_reason(error)}"
+        self.error = why
         if self._on_error is not None:
             self._on_error(self.error)
 

@@ -1,0 +1,37 @@
+"""Where a file is that is being written: somebody may move or delete it meanwhile, which no write fails at."""
+
+import os
+from pathlib import Path
+
+
+class DeletedError(Exception):
+    """The file has no name any more: when it is closed, what was written is lost."""
+
+
+def whereabouts(path: Path, descriptor: int) -> Path | None:
+    """Where an open file is now.
+
+    Args:
+        path: Where it was opened.
+        descriptor: It.
+
+    Returns:
+        `path` while that is this file, else the file's new name; None where the system does not tell it.
+
+    Raises:
+        DeletedError: It has none.
+    """
+    here = os.fstat(descriptor)
+    if here.st_nlink == 0:
+        raise DeletedError
+    try:
+        if os.path.samestat(path.stat(), here):
+            return path
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except OSError:  # the folder cannot be looked into now: that says nothing about the file
+        return path
+    try:
+        return Path(f"/proc/self/fd/{descriptor}").readlink()
+    except OSError:
+        return None
