@@ -45,7 +45,7 @@ def read_bytes(path: str | os.PathLike[str], what: str) -> bytes:
         content = stream.read(LARGEST + 1)
     if len(content) > LARGEST:
         raise UserFileError(
-            f"{what} {path}: has more than {LARGEST >> 20} MiB; is it another file than you meant?"
+            f"{what} {path} has more than {LARGEST >> 20} MiB, the most that is read: is it the right file?"
         )
     return content
 
@@ -61,7 +61,7 @@ def read_text(path: str | os.PathLike[str], what: str) -> str:
         return read_bytes(path, what).decode()
     except UnicodeDecodeError as error:
         raise UserFileError(
-            f"{what} {path}: is no text in UTF-8 ({error.reason} at byte {error.start})"
+            f"{what} {path} is not text in UTF-8 ({error.reason} at byte {error.start})"
         ) from error
 
 
@@ -75,7 +75,7 @@ def read_toml(path: str | os.PathLike[str], what: str) -> dict[str, Any]:
     """
     text = read_text(path, what)
     if _is_deeper(text, DEEPEST):
-        raise UserFileError(f"{what} {path}: is nested too deeply: at most {DEEPEST} levels are supported")
+        raise UserFileError(f"{what} {path} is nested too deeply: at most {DEEPEST} levels are supported")
     return toml(text)
 
 
@@ -107,7 +107,7 @@ def parsed(path: str | os.PathLike[str], what: str, parse: Callable[[], Content]
     try:
         return parse()
     except RecursionError:
-        raise UserFileError(f"{what} {path}: is nested too deeply") from None
+        raise UserFileError(f"{what} {path} is nested too deeply") from None
 
 
 def _is_deeper(text: str, most: int) -> bool:
@@ -143,8 +143,8 @@ _TOKENS: Final = re.compile(
 def _check_kind(path: str | os.PathLike[str], what: str, status: os.stat_result) -> None:
     if stat.S_ISREG(status.st_mode):
         return
-    kind = next((kind for is_kind, kind in _KINDS if is_kind(status.st_mode)), "no regular file")
-    raise UserFileError(f"{what} {path}: is {kind}; give the path of a file")
+    kind = next((kind for is_kind, kind in _KINDS if is_kind(status.st_mode)), "something else")
+    raise UserFileError(f"{what} {path} is {kind}, not a file")
 
 
 _KINDS: Final = (

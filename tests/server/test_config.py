@@ -154,7 +154,7 @@ def test_a_file_that_cannot_be_read_or_is_no_toml(tmp_path):
 
 @pytest.mark.parametrize("key", ["robot", "state", "calibration"])
 def test_a_file_that_is_none_is_not_taken_for_a_wrong_value(key, tmp_path):
-    with pytest.raises(UserFileError, match=f"{key}.*{tmp_path}: is a directory"):
+    with pytest.raises(UserFileError, match=f"{key}.*{tmp_path} is a directory"):
         config(**{key: str(tmp_path)}).setup()
 
 

@@ -87,10 +87,12 @@ def test_the_console_says_what_became_of_a_program_and_a_flood_of_them_does_not_
             )
             stream.sendall(b"textmsg(1)\n" * 10_000)
             began = time.monotonic()
-            served.wait_until_said("lines before this one were left out")
+            served.wait_until_said("not shown since the last line")
         assert served.end() == 0
         took = time.monotonic() - began
         lines = [line for line in served.lines if "the script" in line]
         assert len(lines) <= 3 + took
-        left_out = [int(count) for line in lines for count in re.findall(r"\((\d+) lines before", line)]
+        left_out = [
+            int(count) for line in lines for count in re.findall(r"since the last line: (\d+)\)", line)
+        ]
         assert len(lines) + sum(left_out) == 10_001

@@ -29,7 +29,7 @@ async def test_a_flood_is_a_line_a_second_with_the_number_of_those_left_out(late
         notices.tell(f"line {number}")
     assert said == ["line 0"]
     await later(EVERY)
-    assert said[1:] == ["line 999 (998 lines before this one were left out)"]
+    assert said[1:] == ["line 999 (not shown since the last line: 998)"]
     notices.tell("one more")
     assert len(said) == 2  # the line before it was said just now
     await later(EVERY)
@@ -46,4 +46,4 @@ async def test_what_waits_at_the_end_is_said():
         notices.tell(str(number))
     notices.flush()
     notices.flush()
-    assert said == ["0", "2 (1 lines before this one were left out)"]
+    assert said == ["0", "2 (not shown since the last line: 1)"]

@@ -102,7 +102,7 @@ def roles_in(folder: Path) -> dict[str, Role]:
     """
     path = folder / CLIENTS
     try:
-        return checked(read_toml(path, "clients"), dict[str, Role])
+        return checked(read_toml(path, "file of roles"), dict[str, Role])
     except OSError as error:
         raise ExposureError(f"{path}: {error.strerror}; `tvist keys` makes it") from error
     except tomllib.TOMLDecodeError as error:
@@ -147,7 +147,7 @@ def _check_pair(folder: Path) -> None:
     """Shake hands with oneself, as a client will: Zenoh would say what is wrong in its own words, or to nobody."""
     for name in (AUTHORITY, CERTIFICATE, KEY):
         try:
-            read_bytes(folder / name, "certificates")
+            read_bytes(folder / name, "certificate or key")
         except OSError as error:
             raise ExposureError(f"{folder / name}: {error.strerror}; `tvist keys` makes it") from error
     try:

@@ -48,4 +48,4 @@ class Notices:
 
     def _summary(self) -> str:
         others, self._waiting = self._waiting - 1, 0
-        return f"{self._newest} ({others} lines before this one were left out)" if others else self._newest
+        return f"{self._newest} (not shown since the last line: {others})" if others else self._newest
