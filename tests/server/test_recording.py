@@ -276,9 +276,8 @@ def test_one_that_is_deleted_stops_and_says_so(path, looking):
     told = queue.SimpleQueue()
     recorder = Recorder(path, INFO, {}, on_error=told.put)
     path.unlink()
-    assert (
-        told.get(timeout=60)
-        == f"the recording {path} was deleted: what it held is lost, and no more is recorded"
+    assert told.get(timeout=60) == (
+        f"the recording {path} was deleted, or moved to another file system, where it ends: no more is recorded"
     )
     recorder.state(state(1))
     assert recorder.dropped == 1

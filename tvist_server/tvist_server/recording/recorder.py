@@ -180,7 +180,8 @@ class Recorder:
             self._stream.close()
         except DeletedError:
             self._stop(
-                f"the recording {self.path} was deleted: what it held is lost, and no more is recorded"
+                f"the recording {self.path} was deleted, or moved to another file system, where it ends: "
+                "no more is recorded"
             )
         except Exception as error:  # noqa: BLE001  a thread has nobody above it: whatever it was must be told
             self._stop(f"the recording {self.path} has stopped and is incomplete: {_reason(error)}")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 
 class DeletedError(Exception):
-    """The file has no name any more: when it is closed, what was written is lost."""
+    """The file has no name any more: when it is closed, it is gone."""
 
 
 def whereabouts(path: Path, descriptor: int) -> Path | None:
