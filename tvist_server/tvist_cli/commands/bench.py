@@ -23,7 +23,9 @@ def bench(
     if soak is not None and soak <= 0.0:
         raise Failure(f"soak is {soak:g} minutes: must be more than 0", code=2)
     if hostile is not None and not (hostile >= 2 and seconds > 0.0):
-        raise Failure(f"hostile is {hostile}: must be at least 2 pairs of runs, of more than 0 seconds", code=2)
+        raise Failure(
+            f"hostile is {hostile}: must be at least 2 pairs of runs, of more than 0 seconds", code=2
+        )
     try:
         if hostile is not None:
             _hostile(hostile, seconds, json)
