@@ -102,7 +102,7 @@ run = Server.run
 def ticks(self):
     return self.robots[0].controller.tick_number
 
-async def busy(self, ready):
+async def busy(self, ready, ending=None):
     async def block():
         while True:
             end = ticks(self) + 25
@@ -110,7 +110,7 @@ async def busy(self, ready):
                 {how}
             await asyncio.sleep(0.05)
     blocking = asyncio.ensure_future(block())
-    await run(self, ready)
+    await run(self, ready, ending)
     blocking.cancel()
 
 Server.run = busy

@@ -112,8 +112,6 @@ MISUSE = [
     (("keys", "ring", "--robot", "UPPER", "--host", "x"), ["robot is 'UPPER'"]),
     # files
     (("serve", "--config", "nope.toml"), ["nope.toml", "No such file"]),
-    (("serve", "--state", "."), ["state .", "directory"]),
-    (("serve", "--robot", "."), ["robot '.'", "ur5e"]),
     (("evaluate", "--moves", "nope.json"), ["nope.json", "No such file"]),
     (("shaperbench", "--shaper", "nope.py"), ["nope.py"]),
 ]  # fmt: skip
@@ -138,6 +136,8 @@ def test_misuse_is_a_sentence_and_exit_code_2(tvist, arguments, words):
         (("check", "tls/127.0.0.1:7447", "--security", "nope"), ["nope", "tvist keys"]),
         (("record", "x.mcap", "--endpoint", NOWHERE), ["nobody answers"]),
         (("analyze", "."), [".", "directory"]),
+        (("serve", "--state", "."), ["state .", "directory"]),
+        (("serve", "--robot", "."), ["robot file .", "directory"]),
         (("replay", "nope.mcap"), ["nope.mcap"]),
         (("serve", "--record", "nope/x.mcap"), ["nope/x.mcap", "No such file"]),
         (("shapers", "--figures", "/dev/null/x"), ["/dev/null/x"]),

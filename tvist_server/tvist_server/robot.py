@@ -1,6 +1,5 @@
 """One robot of a server: its controller, and what stands between that and clock, network and file."""
 
-import logging
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,8 +18,6 @@ from tvist_server.reception import Reception
 from tvist_server.recording.black_box import BlackBox
 from tvist_server.recording.recorder import Recorder
 from tvist_server.setup import Setup
-
-log = logging.getLogger(__name__)
 
 
 class ServedRobot:
@@ -51,8 +48,8 @@ class ServedRobot:
                 info_of(self.controller),
                 setup.to_builtins(),
                 wait=lockstep,
-                on_error=self._recorder_failed,
-                on_moved=self._recording_moved,
+                on_error=self._warn,
+                on_moved=self._warn,
             )
         black_box = BlackBox(dump, lambda: info_of(self.controller), setup.to_builtins(), self.recorder)
         self.outlet = Outlet(black_box, lossless=lockstep)
@@ -162,17 +159,7 @@ class ServedRobot:
             self.recorder.close()
             self.recorder.path.unlink(missing_ok=True)
 
-    def _recorder_failed(self, why: str) -> None:
-        """Say so in the log, and to clients."""
-        log.error("the recording ended: %s", why)
-        self._warn(why)
-
-    def _recording_moved(self, where: str) -> None:
-        """Say so in the log, and to clients."""
-        log.warning("%s", where)
-        self._warn(where)
-
     def _warn(self, why: str) -> None:
-        """Tell clients; it is no event of the controller's, whose replay knows no disk."""
+        """Tell clients, and with them the console; it is no event of the controller's, whose replay knows no disk."""
         tick = self.controller.tick_number + 1
         self.driven.post(lambda: self.outlet.event(Event(tick=tick, kind="warning", why=why)))

@@ -55,7 +55,9 @@ def open_access(robots: Sequence[str]) -> dict[str, Any]:
     Args:
         robots: Names of the robots it serves.
     """
-    rules = [*_viewing(robots), *_operating(robots)]
+    # By keys with wildcards, too: what may go out is said below, and a query reaches nobody but the server.
+    asking = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query", "query"]
+    rules = [*_viewing(robots), *_operating(robots), _rule("ask for anything", "ingress", asking, ["**"])]
     return {
         "enabled": True,
         "default_permission": "deny",
