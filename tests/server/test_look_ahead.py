@@ -10,9 +10,10 @@ from tvist_plant.description import Payload
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_server.about import info_of
+from tvist_server.ahead import MOST_AHEAD, resting_after
 from tvist_server.collision import CLEARANCE, CollisionModel
 from tvist_server.cycle import STILL
-from tvist_server.outlook import MOST_AHEAD, Outlook, resting_after
+from tvist_server.outlook import Outlook
 
 from .robots import FITTING, PAPER, Q3, UR5E, H, Robot, cycle, without_arm
 

@@ -6,19 +6,15 @@ from dataclasses import replace
 import numpy as np
 
 from tvist_plant.plant import PERIOD
-from tvist_server.control.differentiator import Differentiator, Floats
-from tvist_server.cycle import STILL, ControlCycle, rests
-from tvist_server.line_filter import LineFilter
+from tvist_server.ahead import MOST_AHEAD, Ahead
+from tvist_server.control.differentiator import Floats
+from tvist_server.cycle import ControlCycle
 from tvist_server.stops import StopPlan, StopPlanner
 from tvist_server.trajectory import Line, LineStop, Stop, Trajectory
 from tvist_shaping.base import Filter
 
 EVEN = 1e-12
 """Differences of steps below this are rounding [rad]."""
-SOON_OVER = 16
-"""Ticks in which a motion that has barely begun can be stopped."""
-MOST_AHEAD = 4000
-"""Ticks that a motion is run ahead at most to see how it will end."""
 
 
 def _anywhere(_: Stop) -> bool:
@@ -49,19 +45,18 @@ class Outlook:
             The two shaped references played last and those to come until they rest, one a tick, shape (k, n) [rad];
             None where that takes more than `MOST_AHEAD` ticks.
         """
+        ahead = self._ahead(tvist, trajectory)
+        ahead.until(MOST_AHEAD)
+        return np.array(ahead.references) if ahead.rests else None
+
+    def _ahead(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Ahead:
+        """As `foresee`, to be run as far as one likes."""
         stopping = self._cycle.stopping
         present, line_filter, differentiator = self._cycle.fork()
         trajectory = present if trajectory is None else trajectory.fork()
         if tvist is not None and not stopping:
             line_filter.use(tvist.fork())
-        return run_ahead(trajectory, None if stopping else line_filter, differentiator)
-
-    def _next(self, ticks: int) -> Floats:
-        """The two shaped references played last and those of the next ticks, shape (ticks + 2, n) [rad]."""
-        trajectory, line_filter, differentiator = self._cycle.fork()
-        ahead = [differentiator.published.q, differentiator.position]
-        ahead += [line_filter.filter(trajectory.next()) for _ in range(ticks)]
-        return np.array(ahead)
+        return Ahead(trajectory, None if stopping else line_filter, differentiator)
 
     def stop(self, deceleration: float | None) -> StopPlan | None:
         """Come to rest as soon as is permitted.
@@ -115,17 +110,20 @@ class Outlook:
         cycle, line = self._cycle, self._shaped(line)
         stop = self.stops.on_line(cycle.published, cycle.position, line, deceleration)
         lets_run_out = StopPlan(None, None, deceleration is not None, None, None)
-        if stop is None and line.steady > SOON_OVER * PERIOD and not line.turns:
-            # Barely begun: it will move on for longer than a stop from here takes, so that a little of it is enough.
-            stop = self.stops.under(self._next(SOON_OVER), SOON_OVER + 1, cycle.published, line, deceleration)
+        ahead = None
         if stop is None:
-            ahead = self.foresee()
-            if ahead is None:  # it lasts for so long that any stop is sooner
+            ahead = self._ahead()
+            # What goes no way back need be run ahead no further than a stop lasts.
+            ahead.until(MOST_AHEAD if line.turns else 0)
+            stop = self.stops.under(ahead, cycle.published, line, deceleration)
+        if stop is None and ahead is not None:
+            ahead.until(MOST_AHEAD)
+            if not ahead.rests:  # it lasts for so long that any stop is sooner
                 stop = self.stops.on_line(cycle.published, cycle.position, line, deceleration, certain=False)
             else:
-                last = resting_after(ahead)
-                stop = self.stops.under(ahead, last, cycle.published, line, deceleration)
-                lets_run_out = self._plan(None, deceleration, (last - 1) * PERIOD, ahead[-1])
+                last, asked = ahead.last, self.stops.asked(np.array(ahead.references))
+                stop = self.stops.under(ahead, cycle.published, line, deceleration, asked)
+                lets_run_out = self._plan(None, deceleration, (last - 1) * PERIOD, ahead.references[-1])
         if stop is not None:
             return self._plan(stop, deceleration, stop.duration, stop.end)
         return None if cycle.stopping else lets_run_out
@@ -154,34 +152,3 @@ class Outlook:
             steady=line.steady if known else 0.0,
             turns=peak > 1.0,
         )
-
-
-def run_ahead(
-    trajectory: Trajectory, line_filter: LineFilter | None, differentiator: Differentiator
-) -> Floats | None:
-    """References of a trajectory until they rest.
-
-    Args:
-        trajectory: What to follow; it is used up.
-        line_filter: What shapes it, used up likewise; None for a stop, which bypasses it.
-        differentiator: Where the shaped reference is, used up likewise.
-
-    Returns:
-        As `Outlook.foresee`.
-    """
-    ahead = [differentiator.published.q, differentiator.position]
-    for _ in range(MOST_AHEAD):
-        reference = trajectory.next()
-        shaped = reference if line_filter is None else line_filter.filter(reference)
-        target = differentiator.update(shaped)
-        ahead.append(shaped)
-        settled = line_filter is None or line_filter.settled
-        if trajectory.standing and settled and rests(reference, target):
-            return np.array(ahead)
-    return None
-
-
-def resting_after(ahead: Floats) -> int:
-    """Index of the last of some references, one a tick and of shape (k, n), that has moved; 0: none has."""
-    moves = np.flatnonzero(np.abs(np.diff(ahead, axis=0)).max(axis=1) > STILL)
-    return int(moves[-1]) + 1 if len(moves) else 0

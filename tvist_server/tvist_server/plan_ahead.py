@@ -90,6 +90,8 @@ class PlanAhead:
         if isinstance(command, PLANNED):
             taken: SimpleQueue[bool] = SimpleQueue()
             for _ in range(TRIES):
+                self._post(lambda: taken.put(True))
+                taken.get()  # just before a tick: most plans are ready long before the next
                 plan = self._planner.plan(command, self._host.standing.basis)
                 self._post(lambda plan=plan: taken.put(self._take(waiting, plan)))  # type: ignore[misc]
                 if taken.get():

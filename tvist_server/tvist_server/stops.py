@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -29,6 +29,22 @@ COUNTED = 0.9
 """Share of the present velocity that a motion is counted on to keep until it brakes [-]."""
 ROUNDING = 1e-12
 """Difference of two positions that is none [rad]."""
+
+
+class References(Protocol):
+    """References of a motion that are still to come."""
+
+    references: list[Floats]
+    """The two shaped references played last and those to come that are known, one a tick, each of shape (n,) [rad]."""
+    rests: bool
+    """Whether they are known until they rest."""
+
+    def until(self, ticks: int) -> None:
+        """See that so many references to come are known, or all until they rest."""
+
+    @property
+    def last(self) -> int:
+        """Index of the last one known that has moved; 0: none has."""
 
 
 @dataclass(frozen=True)
@@ -101,32 +117,48 @@ class StopPlanner:
         return self._quickest_on_line(state, newest, line, wanted, np.zeros_like(state.q), permitted)
 
     def under(
-        self, ahead: Floats, rests: int, state: Target, line: Line, wanted: float | None
+        self,
+        ahead: References,
+        state: Target,
+        line: Line,
+        wanted: float | None,
+        asked: Floats | None = None,
     ) -> LineStop | None:
-        """The quickest stop along the line of a motion whose rest is known.
+        """The quickest stop along the line of a motion that is run ahead.
 
         Args:
-            ahead: The two shaped references played last, and those to come until it rests, one a tick, shape
-                (k, n) [rad].
-            rests: Index of the last of them that moves.
+            ahead: The motion; it is run ahead as far as a stop lasts. One that may turn back is known until it rests.
             state: As in `on_line`.
             line: As in `on_line`.
             wanted: As in `on_line`.
+            asked: Largest torques that the motion itself would ask for from now on, shape (n,) [N m]; None: they are
+                not known, and a stop may ask for its share alone.
 
         Returns:
             None where none is permitted but to let the motion run out.
         """
-        asked = torque_along(self._dynamics, ahead, self.period)
         leading = int(np.argmax(np.abs(line.direction)))
-        along = (ahead[2:, leading] - ahead[1, leading]) * np.sign(line.direction[leading])
+        sign, newest = float(np.sign(line.direction[leading])), ahead.references[1]
 
         def permitted(stop: LineStop) -> bool:
-            if math.ceil(stop.duration / self.period) > rests - 1:
+            ticks = math.ceil(stop.duration / self.period)
+            ahead.until(ticks + 1)
+            along = [sign * float(q[leading] - newest[leading]) for q in ahead.references[2:]]
+            if ahead.rests and ticks > ahead.last - 1:
                 return False
             shares = (stop.share((number + 1) * self.period) for number in range(len(along)))
-            return all(share <= limit + ROUNDING for share, limit in zip(shares, along.tolist(), strict=True))
+            return all(share <= limit + ROUNDING for share, limit in zip(shares, along, strict=True))
 
-        return self._quickest_on_line(state, ahead[1], line, wanted, asked, permitted)
+        none = np.zeros_like(newest) if asked is None else asked
+        return self._quickest_on_line(state, newest, line, wanted, none, permitted)
+
+    def asked(self, ahead: Floats) -> Floats:
+        """Largest torques that a motion asks for from now on, shape (n,) [N m].
+
+        Args:
+            ahead: Its `References`, shape (k, n) [rad].
+        """
+        return torque_along(self._dynamics, ahead, self.period)
 
     def by_joints(self, state: Target, wanted: float | None, clear: Callable[[Stop], bool]) -> Stop | None:
         """The quickest stop of every joint by itself that is clear all along and keeps the torque.

@@ -6,11 +6,12 @@ import numpy as np
 
 from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD
+from tvist_server.ahead import resting_after
 from tvist_server.collision import CLEARANCE, CollisionModel, Meeting
 from tvist_server.control.differentiator import Floats
 from tvist_server.cycle import ControlCycle
 from tvist_server.look_ahead import LookAhead
-from tvist_server.outlook import Outlook, resting_after
+from tvist_server.outlook import Outlook
 from tvist_server.refusal import RefusalError
 from tvist_server.safety import TorqueRoom
 from tvist_server.stops import StopPlan

@@ -11,8 +11,8 @@ from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
+from tvist_server.ahead import resting_after
 from tvist_server.collision import CLEARANCE, CollisionModel
-from tvist_server.outlook import resting_after
 from tvist_server.safety import TORQUE_SHARE
 from tvist_server.setup import body, paper_payload
 

@@ -6,11 +6,11 @@ import numpy as np
 
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
+from tvist_server.ahead import MOST_AHEAD, Ahead
 from tvist_server.collision import CLEARANCE, CollisionModel
 from tvist_server.control.differentiator import Differentiator, Floats
 from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.line_filter import LineFilter
-from tvist_server.outlook import run_ahead
 from tvist_server.planning.basis import MotionBasis
 from tvist_server.planning.filter_planner import FilterPlanner
 from tvist_server.refusal import RefusalError, check_joints, check_motion
@@ -105,9 +105,11 @@ class MovePlanner:
         return most
 
     def _shaped(self, trajectory: DoubleS, basis: MotionBasis) -> Floats | None:
-        """References of the shaped motion; see `run_ahead`."""
+        """References of the shaped motion, shape (k, n) [rad]; None where it lasts for too long to know."""
         tvist = self._filters.present(basis.filter)
         tvist.reset(basis.q)
         tvist.aim(trajectory.target)
         line_filter = LineFilter(tvist, trajectory.limits)
-        return run_ahead(trajectory.fork(), line_filter, Differentiator(basis.q, PERIOD))
+        ahead = Ahead(trajectory.fork(), line_filter, Differentiator(basis.q, PERIOD))
+        ahead.until(MOST_AHEAD)
+        return np.array(ahead.references) if ahead.rests else None

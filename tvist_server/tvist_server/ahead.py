@@ -1,0 +1,52 @@
+"""References that are still to come, run ahead as far as somebody wants to know them."""
+
+import numpy as np
+
+from tvist_server.control.differentiator import Differentiator, Floats
+from tvist_server.cycle import STILL, rests
+from tvist_server.line_filter import LineFilter
+from tvist_server.trajectory import Trajectory
+
+MOST_AHEAD = 4000
+"""Ticks that a motion is run ahead at most to see how it will end."""
+
+
+class Ahead:
+    """A control line without its arm, run ahead of itself.
+
+    Args:
+        trajectory: What is followed; it is used up.
+        line_filter: What shapes it, used up likewise; None for a stop, which bypasses it.
+        differentiator: Where the shaped reference is, used up likewise.
+    """
+
+    def __init__(
+        self, trajectory: Trajectory, line_filter: LineFilter | None, differentiator: Differentiator
+    ) -> None:
+        self._trajectory, self._line_filter, self._differentiator = trajectory, line_filter, differentiator
+        self.references: list[Floats] = [differentiator.published.q, differentiator.position]
+        """The two shaped references played last and those to come, one a tick, each of shape (n,) [rad]."""
+        self.rests = False
+        """Whether the last of them rests."""
+
+    def until(self, ticks: int) -> None:
+        """Run on until so many references to come are known, or they rest."""
+        trajectory, line_filter = self._trajectory, self._line_filter
+        while not self.rests and len(self.references) < ticks + 2:
+            reference = trajectory.next()
+            shaped = reference if line_filter is None else line_filter.filter(reference)
+            target = self._differentiator.update(shaped)
+            self.references.append(shaped)
+            settled = line_filter is None or line_filter.settled
+            self.rests = trajectory.standing and settled and rests(reference, target)
+
+    @property
+    def last(self) -> int:
+        """Index of the last reference known that has moved; 0: none has."""
+        return resting_after(np.array(self.references))
+
+
+def resting_after(references: Floats) -> int:
+    """Index of the last of some references, one a tick and of shape (k, n), that has moved; 0: none has."""
+    moves = np.flatnonzero(np.abs(np.diff(references, axis=0)).max(axis=1) > STILL)
+    return int(moves[-1]) + 1 if len(moves) else 0
