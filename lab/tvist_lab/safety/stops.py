@@ -20,6 +20,8 @@ EARLY = 17
 """Tick before which some moves are stopped: those that have barely begun."""
 BARELY, BARELY_WAY = 3e-3, 1e-3
 """What moves no faster [rad/s] goes no farther [rad] when it is stopped."""
+PAUSES = {"pause", "safeguard"}
+"""Kinds that slow the motion's own time down, through the filter."""
 ROUNDING = 1e-9
 """Difference of two positions that counts as none [rad]."""
 TORQUE_ROUNDING = 1e-3
@@ -97,7 +99,7 @@ class Outcome:
             and self.late <= 0
             and self.torque <= TORQUE_ROUNDING
             and self.near <= 0.0
-            and (self.speed > BARELY or self.way <= BARELY_WAY)
+            and (self.speed > BARELY or self.way <= BARELY_WAY or self.case.kind in PAUSES)
         )
 
 
