@@ -1,5 +1,6 @@
 """The thread that plans beside the controller's."""
 
+import logging
 import threading
 from collections.abc import Callable
 from queue import SimpleQueue
@@ -12,6 +13,8 @@ from tvist_server.admission import Admitted
 from tvist_server.gateways.base import Reply
 from tvist_server.host import Host
 from tvist_server.planning.planner import PLANNED, Plan, Planner
+
+log = logging.getLogger(__name__)
 
 MOST_WAITING = 64
 """Commands that may wait to be planned."""
@@ -92,7 +95,11 @@ class PlanAhead:
             for _ in range(TRIES):
                 self._post(lambda: taken.put(True))
                 taken.get()  # just before a tick: most plans are ready long before the next
-                plan = self._planner.plan(command, self._host.standing.basis)
+                try:
+                    plan = self._planner.plan(command, self._host.standing.basis)
+                except Exception:
+                    log.exception("a plan failed; the controller's thread tries it")
+                    break
                 self._post(lambda plan=plan: taken.put(self._take(waiting, plan)))  # type: ignore[misc]
                 if taken.get():
                     return

@@ -161,5 +161,8 @@ class ServedRobot:
 
     def _warn(self, why: str) -> None:
         """Tell clients, and with them the console; it is no event of the controller's, whose replay knows no disk."""
-        tick = self.controller.tick_number + 1
-        self.driven.post(lambda: self.outlet.event(Event(tick=tick, kind="warning", why=why)))
+
+        def tell() -> None:
+            self.outlet.event(Event(tick=self.controller.tick_number + 1, kind="warning", why=why))
+
+        self.driven.post(tell)
