@@ -123,9 +123,9 @@ class Arm(Terminals, Simulation):
             acceleration=number(acceleration, "acceleration"),
             jerk=number(jerk, "jerk"),
         )
-        await self.robot.request(start)
         servo = Servo(self, every, joints)
-        with servo:
+        with servo:  # it hears of the stream's end, which may come before the answer
+            await self.robot.request(start)
             try:
                 yield servo
             except BaseException:
@@ -221,7 +221,7 @@ class Arm(Terminals, Simulation):
         """Choose where the shaper's frequency and damping come from.
 
         Args:
-            name: `fixed` with `f_d` and `zeta`, or `polynomial` with `calibration`.
+            name: `fixed` with `f_d` and `zeta`, `polynomial` or `modal` with `calibration`.
             f_d: Damped frequency of each mode [Hz]; a number stands for one mode.
             zeta: Damping ratio of each mode [-]; likewise.
             calibration: Name of one of those in `info`, or the content as a map.

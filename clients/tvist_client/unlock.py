@@ -5,11 +5,11 @@ import asyncio
 import msgspec
 
 from tvist_client.arm import UNLOCKED_TICKS, Arm
-from tvist_client.errors import MisuseError, ProtectiveStopError
+from tvist_client.errors import ProtectiveStopError
 from tvist_client.readiness import look, unlock_command
 from tvist_client.robot import ENDPOINT, NAME, Robot
 from tvist_client.transports.certificates import Folder
-from tvist_client.transports.zenoh import robots_at
+from tvist_client.transports.zenoh import only_robot
 from tvist_protocol.info import StopReason
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 
@@ -62,8 +62,7 @@ def unlock(
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
 
     Raises:
-        NotConnectedError: Nobody listens there, or there is no such robot.
-        MisuseError: There are several robots, and none was named.
+        NotConnectedError: Nobody listens there, there is no such robot, or there are several and none was named.
         RefusedError: Another client has control.
     """
     return asyncio.run(_unlock(endpoint, name, security, power_on=power_on))
@@ -114,7 +113,7 @@ async def _rest(robot: Robot) -> None:
 
 
 async def _unlock(endpoint: str, name: str | None, security: Folder | None, *, power_on: bool) -> Report:
-    name = name or await _only(endpoint, security)
+    name = name or await only_robot(endpoint, NAME, security)
     command = unlock_command(endpoint, name, security)
     async with await Robot.connect(endpoint, name, security=security) as robot:
         found, done = await look(robot, command), list[str]()
@@ -133,15 +132,3 @@ async def _unlock(endpoint: str, name: str | None, security: Folder | None, *, p
         why=found.why,
         next=found.next,
     )
-
-
-async def _only(endpoint: str, security: Folder | None) -> str:
-    """Name of the robot that is meant where none is said."""
-    robots = await robots_at(endpoint, security)
-    if not robots or NAME in robots:
-        return NAME
-    if len(robots) > 1:
-        raise MisuseError(
-            f"there are {len(robots)} robots at {endpoint}, {', '.join(robots)}: say which one with --name"
-        )
-    return robots[0]

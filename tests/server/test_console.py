@@ -26,7 +26,7 @@ def said(caplog):
 
 
 def publish(console, *events, name="left"):
-    gateway = ConsoleGateway(console, name, "tvist unlock --name left")
+    gateway = ConsoleGateway(console, name, lambda command: f"tvist {command} --name left")
     for event in events:
         gateway.publish("event", event, b"")
 

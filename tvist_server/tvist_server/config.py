@@ -129,15 +129,17 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             )
         return str(address), self.ur_ports.open()
 
-    def unlock_command(self, name: str) -> str:
-        """What to type on this machine to unlock a robot.
+    def command_line(self, command: str, name: str) -> str:
+        """What to type on this machine for a command to reach a robot.
 
         Args:
+            command: Such as `unlock`.
             name: The robot's.
         """
-        words = ["tvist unlock"]
+        words = ["tvist", command]
         if self.listen and self.listen[0] != DEFAULT_ENDPOINT:
-            words.append(self.listen[0].replace("0.0.0.0", "127.0.0.1"))  # noqa: S104  nothing listens by this
+            here = self.listen[0].replace("0.0.0.0", "127.0.0.1").replace("[::]", "[::1]")  # noqa: S104  only said
+            words.append(here)
         words += ["--name", name] if name != DEFAULT_NAME else []
         return " ".join([*words, "--security", "FOLDER"] if self.security is not None else words)
 

@@ -433,6 +433,8 @@ class Controller:
             self._seed = command.seed
         self.cycle.reset(q, carried=carried, seed=self._seed)
         self.motion.put(command.mode)
+        if command.mode is not None:
+            self._stop_reasons.forget()
         self.latest = self._state(self.cycle.standing)
         self._payload_monitor.reset()
         self._reporter.forget_modes()

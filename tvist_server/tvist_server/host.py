@@ -56,6 +56,7 @@ class Host:
         self._sink = sink
         self.standing = self._standing()
         """What any thread may know of the controller."""
+        self._info: tuple[Standing | None, bytes] = None, b""
 
     def request(self, data: bytes) -> bytes:
         """Admit and carry out a command; its encoded reply."""
@@ -76,7 +77,11 @@ class Host:
         command = admitted.command
         session = admitted.session
         entry = Entry(tick=self._next, kind="command", message=admitted.content, session=session)
-        reply = self.controller.receive(command, plan, session)
+        try:
+            reply = self.controller.receive(command, plan, session)
+        except Exception:
+            self._note(entry)  # whoever looks for the error needs it
+            raise
         # A command of the lease's holder renews the lease even where it is refused; a stranger's does nothing.
         if not isinstance(reply, Refused) or self._is_holders(command):
             self._note(entry)
@@ -107,8 +112,10 @@ class Host:
         self.controller.missed(ticks)
 
     def info(self) -> bytes:
-        """What the controller says of itself."""
-        return encode(info_of(self.controller))
+        """What the controller says of itself; made once, however many ask between two ticks."""
+        if self._info[0] is not self.standing:
+            self._info = self.standing, encode(info_of(self.controller))
+        return self._info[1]
 
     def tick(self) -> None:
         """One control period."""

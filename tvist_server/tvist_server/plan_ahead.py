@@ -7,7 +7,7 @@ from queue import SimpleQueue
 from typing import NamedTuple
 
 from tvist_protocol.codec import encode
-from tvist_protocol.commands import Stop
+from tvist_protocol.commands import PowerOff, Stop
 from tvist_protocol.replies import Refused
 from tvist_server.admission import Admitted
 from tvist_server.gateways.base import Reply
@@ -16,12 +16,31 @@ from tvist_server.planning.planner import PLANNED, Plan, Planner
 
 log = logging.getLogger(__name__)
 
-MOST_WAITING = 64
-"""Commands that may wait to be planned."""
+MOST_WAITING = 16
+"""Commands that may wait to be planned, and behind one that is."""
 TRIES = 10
 """Plans that may be overtaken by what changes meanwhile, before one is made in the controller's thread."""
 CLOSE_WAIT = 1.0
 """How long the plan that is being made may take at close [s]."""
+
+
+STOPPING = (Stop, PowerOff)
+"""Commands that stop the arm."""
+_BUSY = encode(
+    Refused(
+        code="busy",
+        where="",
+        why=f"{MOST_WAITING} commands wait to be planned, or the server ends: send the next when one is answered",
+        limit=MOST_WAITING,
+    )
+)
+_FAILED = encode(
+    Refused(
+        code="wrong_mode",
+        where="",
+        why="this command could not be planned, by an error of the server's: see its log",
+    )
+)
 
 
 class _Waiting(NamedTuple):
@@ -34,7 +53,8 @@ class PlanAhead:
 
     A plan is made of what the controller said of itself after its last tick. Where something that it depends on has
     changed until the controller has it, it is made anew. A command that comes while one before it is being planned
-    waits for it. Only a stop of something that moves does not wait: whatever is being planned then, it is no motion.
+    waits for it. What stops the arm is carried out at once, and again when it is its turn: so it ends what moves now,
+    and also a motion that was sent before it and begins after it.
 
     Args:
         host: The controller.
@@ -46,6 +66,7 @@ class PlanAhead:
         self._host, self._planner, self._post = host, planner, post
         self._lock = threading.Lock()
         self._count = 0
+        self._closing = False
         self._queue: SimpleQueue[_Waiting | None] = SimpleQueue()
         self._thread = threading.Thread(target=self._run, name="tvist-plan", daemon=True)
 
@@ -53,11 +74,20 @@ class PlanAhead:
         """Begin."""
         self._thread.start()
 
-    def close(self) -> None:
-        """End, after what waits; before the controller's thread does."""
+    def end(self) -> None:
+        """Refuse what waits, and what comes."""
+        self._closing = True
         self._queue.put(None)
+
+    def close(self) -> None:
+        """Wait for the end, before the controller's thread ends."""
         if self._thread.is_alive():
             self._thread.join(CLOSE_WAIT)
+
+    @property
+    def waiting(self) -> int:
+        """Commands that wait."""
+        return self._count
 
     def submit(self, admitted: Admitted, reply: Reply) -> None:
         """Have a command carried out. From any thread; never waits.
@@ -66,21 +96,17 @@ class PlanAhead:
             admitted: The command.
             reply: Takes the answer, in the controller's thread.
         """
+        stops = isinstance(admitted.command, STOPPING)
         with self._lock:
-            if not self._waits(admitted):
-                self._post(lambda: reply(self._host.carry_out(admitted)))
-                return
-            if self._count < MOST_WAITING:
+            waits = self._count > 0 or isinstance(admitted.command, PLANNED)
+            full = self._count >= MOST_WAITING or self._closing
+            if waits and not full:
                 self._count += 1
-                self._queue.put(_Waiting(admitted, reply))
-                return
-        why = f"{MOST_WAITING} commands wait to be planned: send the next when one is answered"
-        reply(encode(Refused(code="busy", where="", why=why, limit=MOST_WAITING)))
-
-    def _waits(self, admitted: Admitted) -> bool:
-        if isinstance(admitted.command, Stop) and self._host.standing.basis.motion is None:
-            return False
-        return self._count > 0 or isinstance(admitted.command, PLANNED)
+                self._queue.put(_Waiting(admitted, _nobody if stops else reply))
+        if not waits or stops:
+            self._post(lambda: reply(self._host.carry_out(admitted)))
+        elif full:
+            self._post(lambda: reply(_BUSY))
 
     def _run(self) -> None:
         while (waiting := self._queue.get()) is not None:
@@ -90,6 +116,9 @@ class PlanAhead:
 
     def _hand_over(self, waiting: _Waiting) -> None:
         command = waiting.admitted.command
+        if self._closing:
+            self._post(lambda: waiting.reply(_BUSY))
+            return
         if isinstance(command, PLANNED):
             taken: SimpleQueue[bool] = SimpleQueue()
             for _ in range(TRIES):
@@ -98,8 +127,9 @@ class PlanAhead:
                 try:
                     plan = self._planner.plan(command, self._host.standing.basis)
                 except Exception:
-                    log.exception("a plan failed; the controller's thread tries it")
-                    break
+                    log.exception("a plan failed, its command is refused")
+                    self._post(lambda: waiting.reply(_FAILED))
+                    return
                 self._post(lambda plan=plan: taken.put(self._take(waiting, plan)))  # type: ignore[misc]
                 if taken.get():
                     return
@@ -111,3 +141,7 @@ class PlanAhead:
             return False
         waiting.reply(self._host.carry_out(waiting.admitted, plan))
         return True
+
+
+def _nobody(data: bytes) -> None:
+    """The sender has its answer."""

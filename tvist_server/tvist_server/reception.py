@@ -73,7 +73,11 @@ class Reception:
         """A client's liveliness token is gone, or its session."""
         with self._lock:
             self._presence.gone(client, session)
-        self._post(lambda: self._host.client_gone(client, session))
+        lease = self._host.standing.lease
+        if (
+            lease is not None and lease.client == client
+        ):  # one that is being given to it now: see _unless_gone
+            self._post(lambda: self._host.client_gone(client, session))
 
     def session_gone(self, session: str) -> None:
         """A session has ended, whoever else holds its clients' liveliness tokens."""

@@ -106,8 +106,13 @@ class ServedRobot:
         if self._plan_ahead is not None:
             self._plan_ahead.start()
 
+    def end_planning(self) -> None:
+        """Plan nothing more."""
+        if self._plan_ahead is not None:
+            self._plan_ahead.end()
+
     def stop_planning(self) -> None:
-        """End planning, after what waits; before its clock ends."""
+        """Wait for the plan that is being made; before its clock ends."""
         if self._plan_ahead is not None:
             self._plan_ahead.close()
 

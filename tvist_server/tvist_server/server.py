@@ -5,6 +5,7 @@ import contextlib
 import gc
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from threading import Thread
 
@@ -70,7 +71,7 @@ class Server:
                     self._doors.append(_doors(robot, config, number))
                 wake = self._couriers[number].wake if lockstep else None
                 name = robot.setup.name
-                console = ConsoleGateway(self._console, name, config.unlock_command(name))
+                console = ConsoleGateway(self._console, name, partial(config.command_line, name=name))
                 robot.outlet.open([self._gateways[number], *self._doors[number : number + 1], console], wake)
         except BaseException:  # a signal, too
             for doors in self._doors:
@@ -99,6 +100,8 @@ class Server:
         """End in order: no more ticks, recordings closed, what waits handed on, as far as clients take it."""
         for robot in self.robots:
             robot.outlet.hurry()
+            robot.end_planning()
+        for robot in self.robots:
             robot.stop_planning()
         for clock in self._clocks:
             clock.close()
@@ -112,13 +115,15 @@ class Server:
 
     def _leave(self) -> None:
         """Leave the network. A client that has stopped reading can hold this up for ten seconds."""
-        for courier in self._couriers:
-            courier.close()
-        for doors in self._doors:
-            doors.close()
-        self._console.close()
-        with contextlib.suppress(Exception):
-            self._network.close()
+        try:
+            for courier in self._couriers:
+                courier.close()
+            for doors in self._doors:
+                doors.close()
+            self._console.close()
+        finally:
+            with contextlib.suppress(Exception):
+                self._network.close()
 
     async def run(self, ready: Callable[[], None], ending: Ending) -> None:
         """Serve until a signal comes, or until a controller fails; then `failure` says why.

@@ -22,15 +22,16 @@ class Lease:
 class NoControlError(Exception):
     """A command that needs control came without it."""
 
-    def __init__(self, code: Code, why: str) -> None:
+    def __init__(self, code: Code, why: str, where: str = "token") -> None:
         super().__init__(why)
         self.code = code
         self.why = why
+        self.where = where
 
     @property
     def reply(self) -> Refused:
         """The answer."""
-        return Refused(code=self.code, where="token", why=self.why)
+        return Refused(code=self.code, where=self.where, why=self.why)
 
 
 def check_token(lease: Lease | None, token: str) -> Lease:

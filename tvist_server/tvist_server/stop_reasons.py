@@ -33,6 +33,10 @@ class StopReasons:
         if self._events and safety in _MAY_MOVE and robot is RobotMode.RUNNING:
             self._events.clear()
 
+    def forget(self) -> None:
+        """Forget everything: the robot was put into a mode."""
+        self._events.clear()
+
     def present(self, robot: RobotMode, safety: SafetyMode) -> StopReason | None:
         """The stop that keeps the robot from moving.
 

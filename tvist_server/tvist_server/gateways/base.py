@@ -22,7 +22,7 @@ class Desk(Protocol):
     """Where a gateway hands in what arrives. Callable from any thread; nothing here may wait."""
 
     def request(self, data: bytes, reply: Reply) -> None:
-        """Take an encoded command; `reply` is called exactly once, later, from another thread."""
+        """Take an encoded command; `reply` is called once: at once if it is turned away, else from another thread."""
 
     def setpoint(self, data: bytes) -> None:
         """Take an encoded set-point."""

@@ -3,7 +3,7 @@
 import logging
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from queue import SimpleQueue
 
 from tvist_protocol.stream import Event, EventKind
@@ -94,7 +94,8 @@ class Console:
             for throttle in self._throttles.values():
                 self._put(throttle.rest())
         self._queue.put(None)
-        self._thread.join(LEAVE)
+        if self._thread.is_alive():
+            self._thread.join(LEAVE)
 
     def _put(self, lines: Sequence[str]) -> None:
         for line in lines:
@@ -111,20 +112,22 @@ class ConsoleGateway(Gateway):
     Args:
         console: Where they go.
         name: The robot's.
-        unlock: The command that unlocks it.
+        command_line: What to type for a command to reach it.
     """
 
     setpoints_refused = 0
 
-    def __init__(self, console: Console, name: str, unlock: str) -> None:
-        self._console, self._name, self._unlock = console, name, unlock
+    def __init__(self, console: Console, name: str, command_line: Callable[[str], str]) -> None:
+        self._console, self._name, self._command_line = console, name, command_line
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  every gateway gets it
         """Say it where it is for a person."""
         if not isinstance(message, Event) or message.kind not in _TOLD:
             return
         stop = message.kind != "warning"
-        then = f". Next: {self._unlock}" if stop else ""
+        # After other stops it depends on what has happened since: check says.
+        command = {"protective_stop": "unlock", "safety_stop": "check"}.get(message.kind)
+        then = "" if command is None else f". Next: {self._command_line(command)}"
         what = _TOLD[message.kind]
         self._console.say(f"{self._name}: {what} at tick {message.tick}: {message.why}{then}", stop=stop)
 

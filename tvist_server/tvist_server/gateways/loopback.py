@@ -1,17 +1,15 @@
 """The server in process: no network, no thread, no clock. Time passes when a client steps it."""
 
 from collections.abc import Callable
-from typing import Literal
 
 from tvist_protocol.codec import encode
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.controller import Controller
+from tvist_server.gateways.base import Topic
 from tvist_server.host import Host
 from tvist_server.setup import Setup
-
-Topic = Literal["state", "event", "truth", "telemetry", "io"]
 
 
 class LoopbackHost:

@@ -32,6 +32,7 @@ def whereabouts(path: Path, descriptor: int) -> Path | None:
     except OSError:  # the folder cannot be looked into now: that says nothing about the file
         return path
     try:
-        return Path(f"/proc/self/fd/{descriptor}").readlink()
-    except OSError:
+        there = Path(f"/proc/self/fd/{descriptor}").readlink()
+        return there if os.path.samestat(there.stat(), here) else None
+    except OSError:  # of several names the system may tell one that is gone
         return None

@@ -169,9 +169,9 @@ class UrDoors(Gateway):
             server.close()
         for connection in tuple(self._connections):
             connection.close()
+        await asyncio.sleep(0)  # in which they end
         self._scripts.flush()
         self._coming_and_going.flush()
-        await asyncio.sleep(0)
 
     def close(self) -> None:
         """Listen no more. A second call does nothing."""

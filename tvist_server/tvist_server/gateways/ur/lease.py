@@ -67,9 +67,13 @@ class HostLease:
         """A connection is closed; with the last one that used it control is given back."""
         self._users.discard(connection)
         if not self._users and self._token != _NO_TOKEN:
-            self.ask(ReleaseControl(token=self._token), _nothing)
-            self._desk.client_gone(self.client)
+            self.ask(ReleaseControl(token=self._token), self._gone)
             self._token = _NO_TOKEN
+
+    def _gone(self, _: Reply) -> None:
+        """Control was given back; unless somebody has come meanwhile, the client is there no more."""
+        if not self._users:
+            self._desk.client_gone(self.client)
 
     def keep_alive(self) -> None:
         """Renew the lease, where there is one."""
