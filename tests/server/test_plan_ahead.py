@@ -242,3 +242,42 @@ def test_copies_of_a_name_are_not_given_control_and_do_not_keep_it_alive(served)
         served.jobs.popleft()()
     assert served.host.standing.lease is None
     assert isinstance(served.ask(c.TakeControl(client="bert")), Accepted), "one of that name is left"
+
+
+def test_the_command_that_broke_the_controller_is_in_the_journal(served, monkeypatch):
+    def broken(*_):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(served.host.controller, "receive", broken)
+    served.send(served.of(c.KeepAlive))
+    with pytest.raises(ZeroDivisionError):
+        served.jobs.popleft()()
+    assert served.sink.entries[-1].message["type"] == "keep_alive"
+
+
+def test_a_plan_that_fails_is_a_refusal_and_the_next_one_is_made(served, monkeypatch, caplog):
+    planner = served.ahead._planner
+    with monkeypatch.context() as patch:
+        patch.setattr(planner, "plan", lambda *_: 1 / 0)
+        assert served.ask(served.of(c.SetShaper, name="zvd")).code == "wrong_mode"
+    assert "ZeroDivisionError" in caplog.text
+    assert served.ask(served.of(c.SetShaper, name="zvd")) == Done()
+
+
+def test_at_its_end_what_waits_is_refused(served):
+    for _ in range(5):
+        served.send(served.of(c.SetShaper, name="auto"))
+    served.ahead.end()
+    served.serve(6)
+    assert served.replies[-1].code == "busy"
+    served.empty()
+
+
+def test_info_is_made_once_between_two_ticks(served):
+    first = served.host.info()
+    assert served.host.info() is first
+    served.tick()
+    assert served.host.info() is not first
+    before = served.host.info()
+    served.ask(served.of(c.SetShaper, name="ei3"))
+    assert served.host.info() != before

@@ -18,6 +18,7 @@ from tvist_protocol.journal import Entry, entry_of
 from tvist_protocol.recorded import JsonReader
 from tvist_server.recording import Recorder, RecordingError
 from tvist_server.recording import recorder as recorder_module
+from tvist_server.recording.whereabouts import whereabouts
 from tvist_server.recording.writer import RecordingWriter
 
 
@@ -398,3 +399,12 @@ def test_a_file_that_may_grow_no_further_is_readable_up_to_there(path):
     assert not found.complete
     assert [s.tick for s in found.states] == list(range(1, len(found.states) + 1))
     assert len(found.states) > 100
+
+
+def test_a_file_whose_first_name_is_gone_and_another_is_left_is_nowhere_that_could_be_said(tmp_path):
+    path, other = tmp_path / "run.mcap", tmp_path / "kept.mcap"
+    with path.open("wb") as stream:
+        assert whereabouts(path, stream.fileno()) == path
+        other.hardlink_to(path)
+        path.unlink()
+        assert whereabouts(path, stream.fileno()) in {None, other}

@@ -116,3 +116,14 @@ def test_a_protective_stop_made_again_under_a_safeguard_has_its_own_tick():
 def test_modes_are_said_before_the_first_tick():
     found = said(Robot(mode="POWER_OFF"))
     assert (found.tick, found.robot_mode, found.safety_mode) == (0, RobotMode.POWER_OFF, SafetyMode.NORMAL)
+
+
+def test_a_robot_that_was_put_into_a_mode_is_stopped_by_nothing_of_before():
+    robot = Robot()
+    robot.send(c.SimulationInject, fault="violation")
+    robot.tick(5)
+    assert info_of(robot.controller).stop is not None
+    robot.send(c.SimulationReset, mode="RUNNING")
+    robot.send(c.PowerOff)
+    robot.tick(200)
+    assert info_of(robot.controller).stop is None
