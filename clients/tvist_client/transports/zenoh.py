@@ -264,7 +264,8 @@ async def only_robot(endpoint: str, wanted: str, security: Folder | None = None)
     if wanted in robots or not robots:
         return wanted
     if len(robots) > 1:
-        raise NotConnectedError(f"there are several robots at {endpoint}: name one of {', '.join(robots)}")
+        why = f"there are several robots at {endpoint}, {', '.join(robots)}: say which one with --name"
+        raise NotConnectedError(why)
     return robots[0]
 
 

@@ -289,8 +289,9 @@ async def test_hosts_that_have_gone_are_forgotten(desk):
         writer.close()
         await until(lambda: desk.holder() is None)
     await until(lambda: not desk.doors._connections)
-    gc.collect()
-    assert not desk.doors._leases
+    await until(
+        lambda: gc.collect() >= 0 and not desk.doors._leases
+    )  # the answer to the last release is on its way
 
 
 async def test_who_quits_behind_a_slow_command_waits_for_no_tick(desk):
