@@ -56,7 +56,7 @@ class Host:
         self._sink = sink
         self.standing = self._standing()
         """What any thread may know of the controller."""
-        self._info: tuple[Standing | None, bytes] = None, b""
+        self._info: tuple[int, Standing | None, bytes] = -1, None, b""
 
     def request(self, data: bytes) -> bytes:
         """Admit and carry out a command; its encoded reply."""
@@ -111,11 +111,16 @@ class Host:
         self._note(Entry(tick=self._next, kind="missed", count=ticks))
         self.controller.missed(ticks)
 
+    def publish(self) -> None:
+        """Tell what any thread may know, as it is now; after a tick that is done only where it matters."""
+        self.standing = self._standing()
+
     def info(self) -> bytes:
         """What the controller says of itself; made once, however many ask between two ticks."""
-        if self._info[0] is not self.standing:
-            self._info = self.standing, encode(info_of(self.controller))
-        return self._info[1]
+        now = self.controller.tick_number, self.standing
+        if self._info[0] != now[0] or self._info[1] is not now[1]:
+            self._info = *now, encode(info_of(self.controller))
+        return self._info[2]
 
     def tick(self) -> None:
         """One control period."""
@@ -128,7 +133,12 @@ class Host:
         self._sink.state(state)
         if self.controller.setup.truth:
             self._sink.truth(self.controller.truth())
-        self.standing = self._standing()
+        told = self.standing
+        if (
+            self.controller.session.lease is not told.lease
+            or self.controller.motion.may_move is not told.may_move
+        ):
+            self.publish()
 
     @property
     def _next(self) -> int:

@@ -104,13 +104,18 @@ class MotionControl:
         """
         self._check("move_j")
 
+    @property
+    def may_move(self) -> bool:
+        """Whether what the robot is doing lets a point-to-point motion begin."""
+        return after(self.activity, "move_j") is not None
+
     def basis(self, on: FilterBasis) -> MotionBasis | None:
         """What a point-to-point motion from here depends on; None where the arm is busy or without power.
 
         Args:
             on: The present filter.
         """
-        if after(self.activity, "move_j") is None:
+        if not self.may_move:
             return None
         cycle = self.cycle
         return MotionBasis(

@@ -51,7 +51,7 @@ class _Waiting(NamedTuple):
 class PlanAhead:
     """Hands commands to the controller in the order in which they came, those that take long with a plan.
 
-    A plan is made of what the controller said of itself after its last tick. Where something that it depends on has
+    A plan is made of what the controller last said of itself. Where something that it depends on has
     changed until the controller has it, it is made anew. A command that comes while one before it is being planned
     waits for it. What stops the arm is carried out at once, and again when it is its turn: so it ends what moves now,
     and also a motion that was sent before it and begins after it.
@@ -138,6 +138,7 @@ class PlanAhead:
     def _take(self, waiting: _Waiting, plan: Plan) -> bool:
         """Carry out a command by its plan, where that holds; in the controller's thread."""
         if not plan.holds(self._host.controller.basis):
+            self._host.publish()
             return False
         waiting.reply(self._host.carry_out(waiting.admitted, plan))
         return True

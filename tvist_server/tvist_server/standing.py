@@ -13,3 +13,8 @@ class Standing(NamedTuple):
     """Who has control."""
     basis: Basis
     """What plans for commands depend on."""
+
+    @property
+    def may_move(self) -> bool:
+        """Whether a point-to-point motion may begin."""
+        return self.basis.motion is not None
