@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
+from tvist_protocol.channels import tag
 from tvist_protocol.codec import Envelope, decode_command, decode_envelope, decode_setpoint, refusal
 from tvist_protocol.commands import Command, SetEstimator, Setpoint, SimulationStep, TakeControl
 from tvist_protocol.errors import ProtocolError
@@ -16,9 +17,8 @@ from tvist_protocol.explain import EXPLAINED_BYTES
 from tvist_protocol.replies import Refused
 from tvist_server.session import Lease, NoControlError, check_free, check_token
 
-LONG = frozenset({"set_estimator", "simulation.step"})
+LONG = frozenset(tag(kind) for kind in (SetEstimator, SimulationStep))
 """Types of commands that may have more than `EXPLAINED_BYTES`."""
-assert {SetEstimator.__struct_config__.tag, SimulationStep.__struct_config__.tag} == LONG
 
 
 class Admitted(NamedTuple):

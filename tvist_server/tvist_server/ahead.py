@@ -1,5 +1,7 @@
 """References that are still to come, run ahead as far as somebody wants to know them."""
 
+from functools import cached_property
+
 import numpy as np
 
 from tvist_server.control.differentiator import Differentiator, Floats
@@ -27,7 +29,7 @@ class Ahead:
         self.references: list[Floats] = [differentiator.published.q, differentiator.position]
         """The two shaped references played last and those to come, one a tick, each of shape (n,) [rad]."""
         self.rests = False
-        """Whether the last of them rests."""
+        """Whether the last of them rests: then there are no more."""
 
     def until(self, ticks: int) -> None:
         """Run on until so many references to come are known, or they rest."""
@@ -40,9 +42,9 @@ class Ahead:
             settled = line_filter is None or line_filter.settled
             self.rests = trajectory.standing and settled and rests(reference, target)
 
-    @property
+    @cached_property
     def last(self) -> int:
-        """Index of the last reference known that has moved; 0: none has."""
+        """Index of the last reference that has moved, for those that rest; 0: none has."""
         return resting_after(np.array(self.references))
 
 

@@ -44,7 +44,7 @@ class References(Protocol):
 
     @property
     def last(self) -> int:
-        """Index of the last one known that has moved; 0: none has."""
+        """Index of the last one that has moved, for those that rest; 0: none has."""
 
 
 @dataclass(frozen=True)
@@ -139,11 +139,13 @@ class StopPlanner:
         """
         leading = int(np.argmax(np.abs(line.direction)))
         sign, newest = float(np.sign(line.direction[leading])), ahead.references[1]
+        along: list[float] = []  # how far it has come at each tick that is known
 
         def permitted(stop: LineStop) -> bool:
             ticks = math.ceil(stop.duration / self.period)
             ahead.until(ticks + 1)
-            along = [sign * float(q[leading] - newest[leading]) for q in ahead.references[2:]]
+            news = ahead.references[2 + len(along) :]
+            along.extend(sign * float(q[leading] - newest[leading]) for q in news)
             if ahead.rests and ticks > ahead.last - 1:
                 return False
             shares = (stop.share((number + 1) * self.period) for number in range(len(along)))
