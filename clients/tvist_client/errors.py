@@ -6,9 +6,10 @@ TvistError
 └── ClientError
     ├── NotConnectedError    nobody answers; also a ConnectionError
     ├── AnswerTimeoutError   somebody is there and does not answer; also a TimeoutError
-    ├── MotionStoppedError   a motion ended before its target
-    ├── StreamStoppedError   the robot ended the stream of set-points
-    ├── ProtectiveStopError  an unlocked robot stopped again at once
+    ├── StoppedError         the robot ended something, and told why in an event
+    │   ├── MotionStoppedError   a motion ended before its target
+    │   ├── StreamStoppedError   the robot ended the stream of set-points
+    │   └── ProtectiveStopError  an unlocked robot stopped again at once
     ├── ArgumentError        an argument is no value of its kind; also a ValueError
     ├── UnexpectedReplyError the answer is none of this protocol
     └── MisuseError          called when it makes no sense
@@ -57,11 +58,11 @@ class ArgumentError(ClientError, ValueError):
         return self.why
 
 
-class MotionStoppedError(ClientError):
-    """A motion ended before its target.
+class StoppedError(ClientError):
+    """The robot ended something, and told of it in an event.
 
     Attributes:
-        event: The robot's `motion_stopped`.
+        event: The event.
     """
 
     def __init__(self, event: Event) -> None:
@@ -70,36 +71,35 @@ class MotionStoppedError(ClientError):
 
     def __str__(self) -> str:
         why = f": {self.event.why}" if self.event.why else ""
-        return f"motion {self.event.id} was stopped at tick {self.event.tick}{why}"
+        return f"{self._what} at tick {self.event.tick}{why}"
+
+    @property
+    def _what(self) -> str:
+        return "the robot stopped"
 
 
-class StreamStoppedError(ClientError):
-    """The robot ended the stream of set-points; `servo` begins a new one.
+class MotionStoppedError(StoppedError):
+    """A motion ended before its target; the event is the robot's `motion_stopped`."""
 
-    Attributes:
-        event: The robot's `stream_stopped`.
-    """
-
-    def __init__(self, event: Event) -> None:
-        super().__init__(event)
-        self.event = event
-
-    def __str__(self) -> str:
-        why = f": {self.event.why}" if self.event.why else ""
-        return f"the stream of set-points was ended at tick {self.event.tick}{why}"
+    @property
+    def _what(self) -> str:
+        return f"motion {self.event.id} was stopped"
 
 
-class ProtectiveStopError(ClientError):
+class StreamStoppedError(StoppedError):
+    """The robot ended the stream of set-points; `servo` begins a new one. The event is its `stream_stopped`."""
+
+    @property
+    def _what(self) -> str:
+        return "the stream of set-points was ended"
+
+
+class ProtectiveStopError(StoppedError):
     """A robot that was unlocked stopped again at once: what made it stop is still there.
 
-    Attributes:
-        event: The robot's `protective_stop`.
+    The event is its `protective_stop`.
     """
 
-    def __init__(self, event: Event) -> None:
-        super().__init__(event)
-        self.event = event
-
-    def __str__(self) -> str:
-        why = f": {self.event.why}" if self.event.why else ""
-        return f"the robot made another protective stop at tick {self.event.tick}{why}"
+    @property
+    def _what(self) -> str:
+        return "the robot made another protective stop"
