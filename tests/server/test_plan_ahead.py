@@ -15,7 +15,7 @@ from tvist_server.plan_ahead import MOST_WAITING, PlanAhead
 from tvist_server.planning.planner import Planner
 from tvist_server.reception import Reception
 
-from .robots import Q2, Q3, Robot, setup
+from .robots import Q2, Q3, Robot, calibration, setup
 
 WAIT = 20.0
 LIGHT = {"mass": 2.0, "com": (0.0, 0.0, 0.04), "inertia": (0.002, 0.0, 0.0, 0.002, 0.0, 0.002)}
@@ -281,3 +281,14 @@ def test_info_is_made_once_between_two_ticks(served):
     before = served.host.info()
     served.ask(served.of(c.SetShaper, name="ei3"))
     assert served.host.info() != before
+
+
+@pytest.mark.parametrize("shaper", ["zv", "auto"])
+def test_a_payload_that_no_body_can_be_is_refused_by_what_is_wrong_with_it(shaper, caplog):
+    """Nor is a filter planned for it, which takes an arm that could exist."""
+    served = Served(calibration=calibration(), shaper=shaper)
+    reply = served.ask(served.of(c.SetPayload, **LIGHT | {"inertia": (-1.0, 0.0, 0.0, -1.0, 0.0, -1.0)}))
+    assert (reply.code, reply.where) == ("out_of_range", "inertia")
+    served.ahead.end()
+    served.ahead.close()
+    assert not caplog.text

@@ -18,7 +18,7 @@ from tvist_protocol.io import Io, SetIo, SetRegisters, SetTcp, SimulationSetInpu
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Accepted, Done, Reply
 from tvist_protocol.stream import Event, EventKind, State, Truth
-from tvist_protocol.values import PROTOCOL_VERSION, Payload
+from tvist_protocol.values import PROTOCOL_VERSION
 from tvist_server.collision import CollisionModel
 from tvist_server.cycle import ControlCycle, Sample
 from tvist_server.events import Fields
@@ -30,7 +30,7 @@ from tvist_server.peripherals import Peripherals
 from tvist_server.planning.basis import Basis
 from tvist_server.planning.filter_planner import PlannedFilter
 from tvist_server.planning.planner import Plan, Planner
-from tvist_server.refusal import RefusalError, check_body, check_joints, check_motion
+from tvist_server.refusal import RefusalError, check_content, check_joints, check_motion, payload_of
 from tvist_server.reporting import Reporter
 from tvist_server.safety_control import SafetyControl
 from tvist_server.session import NoControlError, Session
@@ -285,8 +285,7 @@ class Controller:
     def move_j(self, command: c.MoveJ) -> Reply:
         """Start a point-to-point motion."""
         self._authorize(command.token)
-        check_joints(command.q, self.setup.description)
-        check_motion(command.velocity, command.acceleration, command.jerk, self.setup.description)
+        check_content(command, self.setup.description)
         self.motion.check_move()
         return Accepted(id=self.motion.move(self._planned(command)))
 
@@ -404,8 +403,8 @@ class Controller:
     def set_payload(self, command: c.SetPayload) -> Reply:
         """Change what the controller believes that the arm carries."""
         self._authorize(command.token)
-        payload = Payload(mass=command.mass, com=command.com, inertia=command.inertia)
-        check_body(payload, rated=self.setup.description.limits.payload)
+        check_content(command, self.setup.description)
+        payload = payload_of(command)
         tvist: Filter | None = self._planned(command)
         self.motion.ahead.check_payload(body(payload), tvist)
         self.declared = payload
@@ -417,11 +416,7 @@ class Controller:
     def simulation_reset(self, command: c.SimulationReset) -> Reply:
         """Put the simulated arm somewhere at rest."""
         self._authorize(command.token)
-        description = self.setup.description
-        if command.q is not None:
-            check_joints(command.q, description)
-        if command.payload is not None:
-            check_body(command.payload, "payload")
+        check_content(command, self.setup.description)
         chosen: PlannedFilter | None = self._planned(command)
         self.motion.abandon("simulation.reset")
         self._faults.clear()

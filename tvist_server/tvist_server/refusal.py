@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 from tvist_plant.description import RobotDescription, is_real_body
+from tvist_protocol.commands import Command, MoveJ, SetPayload, SimulationReset
 from tvist_protocol.replies import Code, Refused
 from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload
@@ -90,3 +91,23 @@ def check_body(payload: Payload, where: str = "", rated: float = math.inf) -> No
         field = f"{prefix}inertia"
         why = f"{field} is {list(payload.inertia)}: no body has these moments of inertia"
         raise RefusalError("out_of_range", field, why)
+
+
+def check_content(command: Command, description: RobotDescription) -> None:
+    """Refuse what no such robot can do, whatever it is doing."""
+    match command:
+        case MoveJ():
+            check_joints(command.q, description)
+            check_motion(command.velocity, command.acceleration, command.jerk, description)
+        case SetPayload():
+            check_body(payload_of(command), rated=description.limits.payload)
+        case SimulationReset():
+            if command.q is not None:
+                check_joints(command.q, description)
+            if command.payload is not None:
+                check_body(command.payload, "payload")
+
+
+def payload_of(command: SetPayload) -> Payload:
+    """The payload that a command declares."""
+    return Payload(mass=command.mass, com=command.com, inertia=command.inertia)

@@ -13,7 +13,7 @@ from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.line_filter import LineFilter
 from tvist_server.planning.basis import MotionBasis
 from tvist_server.planning.filter_planner import FilterPlanner
-from tvist_server.refusal import RefusalError, check_joints, check_motion
+from tvist_server.refusal import RefusalError
 from tvist_server.safety import largest_torque, torque_along
 from tvist_server.setup import Setup, body
 from tvist_server.trajectory import DoubleS, Limits
@@ -52,13 +52,11 @@ class MovePlanner:
         self._torque = np.array(setup.description.limits.torque)
 
     def move(self, command: MoveJ, basis: MotionBasis) -> PlannedMove:
-        """Plan a motion from rest.
+        """Plan a motion from rest, whose content was checked.
 
         Raises:
             RefusalError: There is no such motion, or something would meet on its way.
         """
-        check_joints(command.q, self._description)
-        check_motion(command.velocity, command.acceleration, command.jerk, self._description)
         limits = Limits(command.velocity, command.acceleration, command.jerk)
         spared = replace(limits, acceleration=limits.acceleration * (1.0 - basis.excess))
         rate = basis.speed if basis.slowest is None else min(basis.speed, basis.slowest / limits.velocity)

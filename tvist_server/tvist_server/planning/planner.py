@@ -1,19 +1,14 @@
 """Plans for the commands that take longer than a tick may wait."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
 
 from tvist_protocol import commands as c
-from tvist_protocol.values import Payload
 from tvist_server.planning.basis import Basis, FilterBasis, MotionBasis
 from tvist_server.planning.filter_planner import FilterPlanner, PlannedFilter
 from tvist_server.planning.move_planner import MovePlanner, PlannedMove
-from tvist_server.refusal import RefusalError
+from tvist_server.refusal import RefusalError, check_content, payload_of
 from tvist_server.setup import Setup
 from tvist_shaping.base import Filter
-
-T = TypeVar("T")
 
 PLANNED = (c.MoveJ, c.SetShaper, c.SetEstimator, c.SetPayload, c.SimulationReset)
 """Commands that are planned."""
@@ -47,35 +42,30 @@ class Planner:
     """
 
     def __init__(self, setup: Setup) -> None:
+        self._description = setup.description
         self.filters = FilterPlanner(setup)
         self._moves = MovePlanner(setup, self.filters)
 
     def plan(self, command: c.Command, basis: Basis) -> Plan:
         """Plan a command; that it is refused is a plan, too."""
-        if isinstance(command, c.MoveJ):
-            motion = basis.motion
-            return Plan(
-                motion, None if motion is None else _or_refusal(lambda: self._moves.move(command, motion))
-            )
-        return Plan(basis.filter, _or_refusal(lambda: self._filter(command, basis.filter)))
+        on = basis.motion if isinstance(command, c.MoveJ) else basis.filter
+        try:
+            return Plan(on, self._find(command, basis))
+        except RefusalError as refusal:
+            return Plan(on, refusal)
 
-    def _filter(self, command: c.Command, on: FilterBasis) -> PlannedFilter | Filter | None:
-        filters = self.filters
+    def _find(self, command: c.Command, basis: Basis) -> PlannedMove | PlannedFilter | Filter | None:
+        check_content(command, self._description)
+        on, filters = basis.filter, self.filters
         match command:
+            case c.MoveJ() if basis.motion is not None:
+                return self._moves.move(command, basis.motion)
             case c.SetShaper():
                 return filters.choose(command.name, command.modes, on.source, on.declared, "name")
             case c.SetEstimator():
                 return filters.estimate(command, on)
             case c.SetPayload():
-                payload = Payload(mass=command.mass, com=command.com, inertia=command.inertia)
-                return filters.with_payload(payload, on)
+                return filters.with_payload(payload_of(command), on)
             case c.SimulationReset() if command.shaper is not None:
                 return filters.choose(command.shaper, 1, on.source, on.declared)
         return None
-
-
-def _or_refusal(plan: Callable[[], T]) -> T | RefusalError:
-    try:
-        return plan()
-    except RefusalError as refusal:
-        return refusal
