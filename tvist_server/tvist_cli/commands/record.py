@@ -1,7 +1,6 @@
 """`tvist record`: record a served robot from outside."""
 
 import asyncio
-import contextlib
 from pathlib import Path
 
 from tvist_cli.failure import Failure, interrupted, told
@@ -26,7 +25,7 @@ def record(
         endpoint: Zenoh endpoint of the robot.
         name: Its name.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
-        seconds: End by itself after this time.
+        seconds: End by itself this time after the first state.
         json: Print one JSON object at the end.
     """
     if seconds is not None and seconds <= 0.0:
@@ -48,13 +47,18 @@ def record(
                 robot.on_event(recorder.event)
                 robot.on_truth(recorder.truth)
                 say(f"recording {name} into {file}; Control+C ends it")
-                with contextlib.suppress(TimeoutError):
-                    await asyncio.wait_for(ended.wait(), seconds)
+                end = asyncio.ensure_future(ended.wait())
+                # The time that was asked for begins with the first state; in lockstep it may be a second away.
+                first = asyncio.ensure_future(robot.state())
+                await asyncio.wait((end, first), return_when=asyncio.FIRST_COMPLETED)
+                if first.done():
+                    first.result()
+                    await asyncio.wait((end,), timeout=seconds)
+                for task in (end, first):
+                    task.cancel()
             if recorder.error is not None:
                 raise Failure(recorder.error)
-            if not ticks:
-                raise Failure(f"{name} told no state: is it in lockstep, with nobody stepping it?")
-            missing = ticks[-1] - ticks[0] + 1 - len(ticks)
+            missing = ticks[-1] - ticks[0] + 1 - len(ticks) if ticks else 0
             return recorder.place, len(ticks), missing + recorder.dropped
 
     with told(RecordingError):
