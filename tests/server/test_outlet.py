@@ -29,8 +29,8 @@ class NotingGateway:
         self.news.set()
 
 
-def outlet(*, lossless=False, recorder=None):
-    gateway, made = NotingGateway(), Outlet(recorder, lossless=lossless)
+def outlet(*, lossless=False):
+    gateway, made = NotingGateway(), Outlet(lossless=lossless)
     made.open([gateway])
     return gateway, made
 
@@ -39,7 +39,7 @@ def test_messages_and_answers_go_out_in_their_order():
     gateway, made = outlet()
     made.event(Event(tick=1, kind="warning"))
     made.state(STATE)
-    made.reply(lambda data: gateway.published.append(("reply", data)), b"answer")
+    made.answer(lambda: gateway.published.append(("reply", None)))
     assert gateway.published == []
     made.hand_on()
     assert [topic for topic, _ in gateway.published] == ["event", "state", "reply"]
@@ -59,7 +59,7 @@ def test_in_real_time_states_without_room_are_dropped_and_counted_and_events_are
 
 def test_in_lockstep_the_robot_waits_for_room_and_nothing_is_lost():
     gateway, made = outlet(lossless=True)
-    courier = Courier([made])
+    courier = Courier([made.hand_on])
     made.open([gateway], courier.wake)
     gateway.free.clear()
     courier.start()
@@ -86,7 +86,7 @@ def test_whoever_waits_for_room_goes_on_when_the_robot_is_about_to_end():
 
 def test_one_courier_empties_the_outlets_of_several_robots():
     pairs = [outlet() for _ in range(3)]
-    courier = Courier([made for _, made in pairs])
+    courier = Courier([made.hand_on for _, made in pairs])
     courier.start()
     for _, made in pairs:
         made.state(STATE)
@@ -98,7 +98,7 @@ def test_one_courier_empties_the_outlets_of_several_robots():
 
 def test_a_gateway_that_fails_is_logged_and_the_next_message_goes_out(caplog):
     gateway, made = outlet()
-    made.reply(lambda _: 1 / 0, b"")
+    made.answer(lambda: 1 / 0)
     made.state(STATE)
     made.hand_on()
     assert "ZeroDivisionError" in caplog.text

@@ -6,7 +6,7 @@ from collections import deque
 import pytest
 
 from tvist_protocol import commands as c
-from tvist_protocol.codec import decode_reply, encode
+from tvist_protocol.codec import encode
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.values import Payload
 from tvist_server.controller import Controller
@@ -43,7 +43,7 @@ class Served:
         self.jobs, self.came = deque(), threading.Condition()
         self.ahead = PlanAhead(self.host, Planner(start), self.post)
         self.ahead.start()
-        self.reception = Reception(self.host, self.post, self.ahead.submit)
+        self.reception = Reception(self.host, self.post, self.ahead.submit, lambda call: call())
         self.replies = []
         self.token = self.ask(c.TakeControl(client="anna", lease_s=3600.0)).token
 
@@ -53,10 +53,10 @@ class Served:
             self.came.notify()
 
     def send(self, command):
-        self.reception.request(encode(command), self.answer, self.answer)
+        self.reception.request(encode(command), self.answer)
 
-    def answer(self, data):
-        self.replies.append(decode_reply(data))
+    def answer(self, reply):
+        self.replies.append(reply)
 
     def of(self, kind, **fields):
         return kind(token=self.token, **fields)
@@ -213,7 +213,7 @@ def test_nothing_that_a_stranger_sends_is_journaled_or_reaches_the_controller(se
     ]
     for command in strangers:
         served.send(command)
-    served.reception.request(b"\xc1", served.answer, served.answer)
+    served.reception.request(b"\xc1", served.answer)
     served.reception.setpoint(encode(c.Setpoint(token="x", sequence=0, q=tuple(Q2.tolist()))))
     assert [type(reply) for reply in served.replies[1:]] == [Refused] * 5
     assert (len(served.sink.entries), len(served.jobs)) == (before, jobs)

@@ -8,6 +8,7 @@ import pytest
 from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
 from tvist_protocol.journal import Entry
+from tvist_protocol.replies import Done
 from tvist_server.controller import Controller
 from tvist_server.host import Host
 from tvist_server.streaming import TIMEOUT
@@ -104,7 +105,7 @@ def test_what_was_refused_in_an_earlier_stream_is_not_blamed_for_the_end_of_the_
     for _ in range(200):
         host.tick()
     sink.events.clear()
-    assert b"done" in host.request(encode(c.ServoStart(token=token)))
+    assert host.request(encode(c.ServoStart(token=token))) == Done()
     assert end_of(host, sink) == "no set-point for 0.25 s"
 
 

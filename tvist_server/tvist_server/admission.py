@@ -44,9 +44,22 @@ def admit(data: bytes, lease: Lease | None) -> Admitted | Refused:
         if len(data) > EXPLAINED_BYTES:
             _check_envelope(decode_envelope(data), len(data), lease)
         command = decode_command(data)
-        _authorize(command, lease)
     except ProtocolError as error:
         return refusal(error)
+    except NoControlError as error:
+        return error.reply
+    return admit_command(command, lease)
+
+
+def admit_command(command: Command, lease: Lease | None) -> Admitted | Refused:
+    """Check that whoever sends a command may send it.
+
+    Args:
+        command: The command.
+        lease: Who has control.
+    """
+    try:
+        _authorize(command, lease)
     except NoControlError as error:
         return error.reply
     return Admitted(command, msgspec.to_builtins(command))

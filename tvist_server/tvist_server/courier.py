@@ -1,24 +1,22 @@
 """The thread that hands on what waits in outlets."""
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from queue import SimpleQueue
-
-from tvist_server.outlet import Outlet
 
 CLOSE_WAIT = 0.2
 """How long the last messages may take at close [s]; a client that has stopped reading holds them up for 5 s."""
 
 
 class Courier:
-    """Empties outlets whenever it is woken.
+    """Has robots hand on what waits whenever it is woken.
 
     Args:
-        outlets: Of one robot or several.
+        hand_on: Hands on what waits of one robot; one for each.
     """
 
-    def __init__(self, outlets: Sequence[Outlet]) -> None:
-        self._outlets = outlets
+    def __init__(self, hand_on: Sequence[Callable[[], None]]) -> None:
+        self._hand_on = hand_on
         self._running = True
         self._calls: SimpleQueue[None] = SimpleQueue()
         self._thread = threading.Thread(target=self._run, name="tvist-outlet", daemon=True)
@@ -42,5 +40,5 @@ class Courier:
     def _run(self) -> None:
         while self._running:
             self._calls.get()
-            for outlet in self._outlets:
-                outlet.hand_on()
+            for hand_on in self._hand_on:
+                hand_on()

@@ -1,74 +1,50 @@
-"""Bytes around one controller: what is admitted is carried out and journaled, what comes out goes to a sink.
+"""What is around one controller: what was admitted is carried out and journaled, what comes out goes to sinks.
 
 Still without clock, thread or socket: whoever calls `tick` lets time pass. In lockstep and free it is the client,
 through `simulation.step`.
 """
 
-import logging
-from typing import Protocol
-
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command, Setpoint, SimulationStep
-from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry, entry_of
-from tvist_protocol.replies import Done, Refused
-from tvist_protocol.stream import Event, State, Truth
+from tvist_protocol.replies import Done, Refused, Reply
+from tvist_protocol.stream import Event
 from tvist_server.about import info_of
 from tvist_server.admission import Admitted, Unreadable, admit, admit_setpoint
 from tvist_server.controller import Controller
 from tvist_server.planning.planner import Plan
+from tvist_server.sink import Sink
 from tvist_server.standing import Standing
-
-log = logging.getLogger(__name__)
-
-
-class Sink(Protocol):
-    """Where a controller's output goes. Nothing here may wait or raise."""
-
-    def state(self, state: State) -> None:
-        """A tick's state."""
-
-    def event(self, event: Event) -> None:
-        """An event; it comes before the state of its tick."""
-
-    def truth(self, truth: Truth) -> None:
-        """What no robot can know, where that is told."""
-
-    def io(self, io: Io) -> None:
-        """Inputs, outputs and registers, where they changed; it comes before the state of its tick."""
-
-    def journal(self, entry: Entry) -> None:
-        """What reached the controller before the tick of that number."""
 
 
 class Host:
-    """One controller, spoken to in bytes.
+    """One controller, its journal and its sinks.
 
     Args:
         controller: The robot.
-        sink: Takes what it puts out.
+        sinks: They take what it puts out, in this order.
     """
 
-    def __init__(self, controller: Controller, sink: Sink) -> None:
+    def __init__(self, controller: Controller, *sinks: Sink) -> None:
         self.controller = controller
         self.failure: str | None = None
         """Why the controller ticks no more, where it does not."""
-        self._sink = sink
+        self._sinks = sinks
         self.standing = self._standing()
         """What any thread may know of the controller."""
         self._info: tuple[int, Standing | None, bytes] = -1, None, b""
 
-    def request(self, data: bytes) -> bytes:
-        """Admit and carry out a command; its encoded reply."""
+    def request(self, data: bytes) -> Reply:
+        """Admit and carry out an encoded command."""
         admitted = admit(data, self.standing.lease)
         if isinstance(admitted, Refused):
             self.controller.counters.commands += 1
             self.controller.counters.refused += 1
-            return encode(admitted)
+            return admitted
         return self.carry_out(admitted)
 
-    def carry_out(self, admitted: Admitted, plan: Plan | None = None) -> bytes:
-        """Carry out a command; its encoded reply.
+    def carry_out(self, admitted: Admitted, plan: Plan | None = None) -> Reply:
+        """Carry out a command.
 
         Args:
             admitted: The command.
@@ -88,7 +64,7 @@ class Host:
         if isinstance(command, SimulationStep) and isinstance(reply, Done):
             reply = self._step(command, reply)
         self.standing = self._standing()
-        return encode(reply)
+        return reply
 
     def setpoint(self, data: bytes) -> None:
         """Admit and take a set-point."""
@@ -126,13 +102,16 @@ class Host:
         """One control period."""
         io = self.controller.changed_io()
         if io is not None:
-            self._sink.io(io)
+            for sink in self._sinks:
+                sink.io(io)
         state, events = self.controller.tick()
-        for event in events:
-            self._sink.event(event)
-        self._sink.state(state)
-        if self.controller.setup.truth:
-            self._sink.truth(self.controller.truth())
+        truth = self.controller.truth() if self.controller.setup.truth else None
+        for sink in self._sinks:
+            for event in events:
+                sink.event(event)
+            sink.state(state)
+            if truth is not None:
+                sink.truth(truth)
         told = self.standing
         if (
             self.controller.session.lease is not told.lease
@@ -140,12 +119,19 @@ class Host:
         ):
             self.publish()
 
+    def warn(self, why: str) -> None:
+        """Tell clients of something outside the controller, whose replay knows nothing of it."""
+        event = Event(tick=self._next, kind="warning", why=why)
+        for sink in self._sinks:
+            sink.event(event)
+
     @property
     def _next(self) -> int:
         return self.controller.tick_number + 1
 
     def _note(self, entry: Entry) -> None:
-        self._sink.journal(entry)
+        for sink in self._sinks:
+            sink.journal(entry)
 
     def receive_setpoint(self, setpoint: Setpoint | Unreadable) -> None:
         """Take a set-point that was admitted."""

@@ -8,13 +8,12 @@ import logging
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
 
 from tvist_protocol.codec import encode
 from tvist_protocol.io import Io
-from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, State, Telemetry, Truth
-from tvist_server.gateways.base import Gateway, Message, Reply, Topic
+from tvist_server.gateways.base import Gateway, Message, Topic
+from tvist_server.sink import Sink
 
 log = logging.getLogger(__name__)
 
@@ -32,36 +31,18 @@ TOPICS: Mapping[type[Message], Topic] = {
 }
 
 
-class Recorder(Protocol):
-    """What a recorder offers."""
-
-    def state(self, state: State) -> None:
-        """Record a state."""
-
-    def event(self, event: Event) -> None:
-        """Record an event."""
-
-    def truth(self, truth: Truth) -> None:
-        """Record what no robot can know."""
-
-    def journal(self, entry: Entry) -> None:
-        """Record what reached the controller."""
-
-
-class Outlet:
-    """A `host.Sink` that others empty.
+class Outlet(Sink):
+    """A sink that others empty.
 
     Args:
-        recorder: Records everything, where there is one.
         lossless: Whether the controller waits rather than drop a state.
     """
 
-    def __init__(self, recorder: Recorder | None, *, lossless: bool) -> None:
-        self._recorder = recorder
+    def __init__(self, *, lossless: bool) -> None:
         self._lossless = lossless
         self._gateways: Sequence[Gateway] = ()
         self._wake: Callable[[], None] = _nobody
-        self._queue: deque[Message | tuple[Reply, bytes]] = deque()
+        self._queue: deque[Message | Callable[[], None]] = deque()
         self._room = threading.Event()
         self._io: Io | None = None
         self.dropped = 0
@@ -95,21 +76,15 @@ class Outlet:
                 log.exception("could not hand on a message")
 
     def state(self, state: State) -> None:
-        """Queue a state; the recorder's own queue takes it at once."""
-        if self._recorder is not None:
-            self._recorder.state(state)
+        """Queue a state."""
         self._offer(state)
 
     def event(self, event: Event) -> None:
         """Queue an event."""
-        if self._recorder is not None:
-            self._recorder.event(event)
         self._put(event)
 
     def truth(self, truth: Truth) -> None:
         """Queue what no robot can know."""
-        if self._recorder is not None:
-            self._recorder.truth(truth)
         self._offer(truth)
 
     def io(self, io: Io) -> None:
@@ -117,20 +92,15 @@ class Outlet:
         self._io = io
         self._offer(io)
 
-    def journal(self, entry: Entry) -> None:
-        """Record what reached the controller."""
-        if self._recorder is not None:
-            self._recorder.journal(entry)
-
     def telemetry(self, telemetry: Telemetry) -> None:
         """Queue the server's own figures, and tell inputs, outputs and registers again."""
         if self._io is not None:
             self._put(self._io)
         self._put(telemetry)
 
-    def reply(self, reply: Reply, data: bytes) -> None:
-        """Queue a reply, behind the states that came before it."""
-        self._put((reply, data))
+    def answer(self, call: Callable[[], None]) -> None:
+        """Queue a call that answers a client, behind the states that came before it."""
+        self._put(call)
 
     def repeat(self, state: State, io: Io) -> None:
         """Tell the present state, inputs, outputs and registers again, for those who come late."""
@@ -148,14 +118,13 @@ class Outlet:
         else:
             self.dropped += 1
 
-    def _put(self, item: Message | tuple[Reply, bytes]) -> None:
+    def _put(self, item: Message | Callable[[], None]) -> None:
         self._queue.append(item)
         self._wake()
 
-    def _publish(self, item: Message | tuple[Reply, bytes]) -> None:
-        if isinstance(item, tuple):
-            reply, data = item
-            reply(data)
+    def _publish(self, item: Message | Callable[[], None]) -> None:
+        if not isinstance(item, Message):
+            item()
             return
         topic, data = TOPICS[type(item)], encode(item)
         for gateway in self._gateways:

@@ -6,11 +6,10 @@ from collections.abc import Callable
 from queue import SimpleQueue
 from typing import NamedTuple
 
-from tvist_protocol.codec import encode
 from tvist_protocol.commands import PowerOff, Stop
-from tvist_protocol.replies import Refused
+from tvist_protocol.replies import Refused, Reply
 from tvist_server.admission import Admitted
-from tvist_server.gateways.base import Reply
+from tvist_server.gateways.base import Answer
 from tvist_server.host import Host
 from tvist_server.planning.planner import PLANNED, Plan, Planner
 
@@ -26,26 +25,22 @@ CLOSE_WAIT = 1.0
 
 STOPPING = (Stop, PowerOff)
 """Commands that stop the arm."""
-_BUSY = encode(
-    Refused(
-        code="busy",
-        where="",
-        why=f"{MOST_WAITING} commands wait to be planned, or the server ends: send the next when one is answered",
-        limit=MOST_WAITING,
-    )
+_BUSY = Refused(
+    code="busy",
+    where="",
+    why=f"{MOST_WAITING} commands wait to be planned, or the server ends: send the next when one is answered",
+    limit=MOST_WAITING,
 )
-_FAILED = encode(
-    Refused(
-        code="wrong_mode",
-        where="",
-        why="this command could not be planned, by an error of the server's: see its log",
-    )
+_FAILED = Refused(
+    code="wrong_mode",
+    where="",
+    why="this command could not be planned, by an error of the server's: see its log",
 )
 
 
 class _Waiting(NamedTuple):
     admitted: Admitted
-    reply: Reply
+    answer: Answer
 
 
 class PlanAhead:
@@ -89,12 +84,12 @@ class PlanAhead:
         """Commands that wait."""
         return self._count
 
-    def submit(self, admitted: Admitted, reply: Reply) -> None:
+    def submit(self, admitted: Admitted, answer: Answer) -> None:
         """Have a command carried out. From any thread; never waits.
 
         Args:
             admitted: The command.
-            reply: Takes the answer, in the controller's thread.
+            answer: Takes the reply, in the controller's thread.
         """
         stops = isinstance(admitted.command, STOPPING)
         with self._lock:
@@ -102,11 +97,11 @@ class PlanAhead:
             full = self._count >= MOST_WAITING or self._closing
             if waits and not full:
                 self._count += 1
-                self._queue.put(_Waiting(admitted, _nobody if stops else reply))
+                self._queue.put(_Waiting(admitted, _nobody if stops else answer))
         if not waits or stops:
-            self._post(lambda: reply(self._host.carry_out(admitted)))
+            self._post(lambda: answer(self._host.carry_out(admitted)))
         elif full:
-            self._post(lambda: reply(_BUSY))
+            self._post(lambda: answer(_BUSY))
 
     def _run(self) -> None:
         while (waiting := self._queue.get()) is not None:
@@ -117,7 +112,7 @@ class PlanAhead:
     def _hand_over(self, waiting: _Waiting) -> None:
         command = waiting.admitted.command
         if self._closing:
-            self._post(lambda: waiting.reply(_BUSY))
+            self._post(lambda: waiting.answer(_BUSY))
             return
         if isinstance(command, PLANNED):
             taken: SimpleQueue[bool] = SimpleQueue()
@@ -128,21 +123,21 @@ class PlanAhead:
                     plan = self._planner.plan(command, self._host.standing.basis)
                 except Exception:
                     log.exception("a plan failed, its command is refused")
-                    self._post(lambda: waiting.reply(_FAILED))
+                    self._post(lambda: waiting.answer(_FAILED))
                     return
                 self._post(lambda plan=plan: taken.put(self._take(waiting, plan)))  # type: ignore[misc]
                 if taken.get():
                     return
-        self._post(lambda: waiting.reply(self._host.carry_out(waiting.admitted)))
+        self._post(lambda: waiting.answer(self._host.carry_out(waiting.admitted)))
 
     def _take(self, waiting: _Waiting, plan: Plan) -> bool:
         """Carry out a command by its plan, where that holds; in the controller's thread."""
         if not plan.holds(self._host.controller.basis):
             self._host.publish()
             return False
-        waiting.reply(self._host.carry_out(waiting.admitted, plan))
+        waiting.answer(self._host.carry_out(waiting.admitted, plan))
         return True
 
 
-def _nobody(data: bytes) -> None:
+def _nobody(reply: Reply) -> None:
     """The sender has its answer."""

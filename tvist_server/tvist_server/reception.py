@@ -3,32 +3,34 @@
 import threading
 from collections.abc import Callable
 
-from tvist_protocol.codec import encode
-from tvist_protocol.commands import HandOver, TakeControl
-from tvist_protocol.replies import Refused
-from tvist_server.admission import Admitted, admit, admit_setpoint
-from tvist_server.gateways.base import Reply
+from tvist_protocol.commands import Command, HandOver, TakeControl
+from tvist_protocol.replies import Refused, Reply
+from tvist_server.admission import Admitted, admit, admit_command, admit_setpoint
+from tvist_server.gateways.base import Answer, Desk
 from tvist_server.host import Host
 from tvist_server.presence import Presence
 from tvist_server.session import NoControlError
 
 Post = Callable[[Callable[[], None]], None]
 """Has something done in the controller's thread, before its next tick. From any thread; never waits."""
-CarryOut = Callable[[Admitted, Reply], None]
+CarryOut = Callable[[Admitted, Answer], None]
 """Has a command carried out in the controller's thread, and answered there. From any thread; never waits."""
 
 
-class Reception:
-    """Admits what arrives, and turns away the rest at once: that costs the controller nothing.
+class Reception(Desk):
+    """The desk of one robot: admits what arrives, and turns away the rest at once, which costs the controller nothing.
 
     Args:
         host: The controller; of what it does in its thread nothing is called here.
         post: Into the controller's thread.
         carry_out: Takes commands that were admitted.
+        hand_on: Takes calls that answer clients, in the controller's thread.
     """
 
-    def __init__(self, host: Host, post: Post, carry_out: CarryOut) -> None:
-        self._host, self._post, self._carry_out = host, post, carry_out
+    def __init__(
+        self, host: Host, post: Post, carry_out: CarryOut, hand_on: Callable[[Callable[[], None]], None]
+    ) -> None:
+        self._host, self._post, self._carry_out, self._hand_on = host, post, carry_out, hand_on
         self._lock = threading.Lock()
         self._presence = Presence()
         self.commands_refused = 0
@@ -36,24 +38,27 @@ class Reception:
         self.setpoints_refused = 0
         """Set-points that were."""
 
-    def request(self, data: bytes, turn_away: Reply, answer: Reply) -> None:
-        """Admit a command.
+    def request(self, data: bytes, answer: Answer) -> None:
+        """Take an encoded command; the reply comes from another thread, or at once where it is turned away."""
+        self._hand_in(admit(data, self._host.standing.lease), answer)
 
-        Args:
-            data: The message.
-            turn_away: Takes the reply to one that is not admitted.
-            answer: Takes the reply to one that is, in the controller's thread.
-        """
-        admitted = admit(data, self._host.standing.lease)
-        if isinstance(admitted, Admitted) and isinstance(admitted.command, TakeControl | HandOver):
-            client = admitted.command.client
-            admitted, answer = self._with_session(admitted, client), self._unless_gone(client, answer)
-        if isinstance(admitted, Refused):
-            with self._lock:
-                self.commands_refused += 1
-            turn_away(encode(admitted))
-        else:
-            self._carry_out(admitted, answer)
+    def command(self, command: Command, answer: Answer) -> None:
+        """Take a command; `answer` as for `request`."""
+        self._hand_in(admit_command(command, self._host.standing.lease), answer)
+
+    def info(self, answer: Callable[[bytes], None]) -> None:
+        """Say what the robot is."""
+
+        def tell() -> None:
+            data = self._host.info()
+            self._hand_on(lambda: answer(data))
+
+        self._post(tell)
+
+    def holder(self) -> str | None:
+        """Client that has control; None: nobody."""
+        lease = self._host.standing.lease
+        return None if lease is None else lease.client
 
     def setpoint(self, data: bytes) -> None:
         """Admit a set-point."""
@@ -64,12 +69,12 @@ class Reception:
         else:
             self._post(lambda: self._host.receive_setpoint(setpoint))
 
-    def client_seen(self, client: str, session: str) -> None:
+    def client_seen(self, client: str, session: str = "") -> None:
         """A client's liveliness token is there."""
         with self._lock:
             self._presence.seen(client, session)
 
-    def client_gone(self, client: str, session: str) -> None:
+    def client_gone(self, client: str, session: str = "") -> None:
         """A client's liveliness token is gone, or its session."""
         with self._lock:
             self._presence.gone(client, session)
@@ -86,6 +91,21 @@ class Reception:
         for client in clients:
             self.client_gone(client, session)
 
+    def _hand_in(self, admitted: Admitted | Refused, answer: Answer) -> None:
+        def hand_on(reply: Reply) -> None:
+            self._hand_on(lambda: answer(reply))
+
+        answered: Answer = hand_on
+        if isinstance(admitted, Admitted) and isinstance(admitted.command, TakeControl | HandOver):
+            client = admitted.command.client
+            admitted, answered = self._with_session(admitted, client), self._unless_gone(client, hand_on)
+        if isinstance(admitted, Refused):
+            with self._lock:
+                self.commands_refused += 1
+            answer(admitted)
+        else:
+            self._carry_out(admitted, answered)
+
     def _with_session(self, admitted: Admitted, client: str) -> Admitted | Refused:
         try:
             with self._lock:
@@ -93,16 +113,16 @@ class Reception:
         except NoControlError as error:
             return error.reply
 
-    def _unless_gone(self, client: str, answer: Reply) -> Reply:
+    def _unless_gone(self, client: str, answer: Answer) -> Answer:
         """Answer a command that gives control to a client, and end its lease where it has gone meanwhile."""
 
-        def answered(data: bytes) -> None:
+        def answered(reply: Reply) -> None:
             lease = self._host.standing.lease
             if lease is not None and lease.client == client and lease.session is not None:
                 with self._lock:
                     there = self._presence.has(client, lease.session)
                 if not there:
                     self._host.client_gone(client, lease.session)
-            answer(data)
+            answer(reply)
 
         return answered

@@ -1,14 +1,14 @@
 """One robot of a server: its controller, and what stands between that and clock, network and file."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from tvist_protocol.stream import Event, Telemetry
+from tvist_protocol.stream import Telemetry
 from tvist_server.about import info_of
 from tvist_server.admission import Admitted
-from tvist_server.clock import Driven
+from tvist_server.clock import Clock, Driven
 from tvist_server.controller import Controller
-from tvist_server.gateways.base import Gateway, Reply
+from tvist_server.gateways.base import Answer, Gateway
 from tvist_server.host import Host
 from tvist_server.lateness import Punctuality
 from tvist_server.outlet import Outlet
@@ -22,9 +22,6 @@ from tvist_server.setup import Setup
 
 class ServedRobot:
     """A robot with everything that is its own: robots share a process, the tick thread and the network alone.
-
-    It is the desk to its gateways: what they hand in is admitted in their threads and waits for the one that owns the
-    controller.
 
     Args:
         setup: How it starts.
@@ -51,53 +48,39 @@ class ServedRobot:
                 on_error=self._warn,
                 on_moved=self._warn,
             )
-        black_box = BlackBox(dump, lambda: info_of(self.controller), setup.to_builtins(), self.recorder)
-        self.outlet = Outlet(black_box, lossless=lockstep)
-        self._host = Host(self.controller, self.outlet)
+        black_box = BlackBox(dump, lambda: info_of(self.controller), setup.to_builtins())
+        self._outlet = Outlet(lossless=lockstep)
+        recorded = () if self.recorder is None else (self.recorder,)
+        self._host = Host(self.controller, *recorded, black_box, self._outlet)
         self.driven = Driven(self._host)
         """For the clock."""
         # Where a client lets time pass nothing is late, and plans are made where they are used.
         self._plan_ahead = None if lockstep else PlanAhead(self._host, Planner(setup), self.driven.post)
         carry_out = self._carry_out if self._plan_ahead is None else self._plan_ahead.submit
-        self._reception = Reception(self._host, self.driven.post, carry_out)
+        self.reception = Reception(self._host, self.driven.post, carry_out, self._outlet.answer)
+        """Where gateways hand in what arrives."""
+        self._gateways: Sequence[Gateway] = ()
 
-    # ------------------------------------------------------------------ the desk: what its gateways ask for
+    def open(self, gateways: Sequence[Gateway], wake: Callable[[], None] | None = None) -> None:
+        """Say which gateways are this robot's: they get what it puts out, and it sees to their life.
 
-    def request(self, data: bytes, reply: Reply) -> None:
-        """Carry out a command; the reply comes from another thread, or at once where the command is turned away."""
-        self._reception.request(data, reply, lambda answer: self.outlet.reply(reply, answer))
+        Args:
+            gateways: Its own.
+            wake: Called with every message, where nobody hands them on by himself.
+        """
+        self._gateways = gateways
+        self._outlet.open(gateways, wake)
 
-    def setpoint(self, data: bytes) -> None:
-        """Take a set-point."""
-        self._reception.setpoint(data)
-
-    def info(self, reply: Reply) -> None:
-        """Say what the robot is."""
-        self.driven.post(lambda: self.outlet.reply(reply, self._host.info()))
-
-    def client_seen(self, client: str, session: str = "") -> None:
-        """A client's liveliness token is there."""
-        self._reception.client_seen(client, session)
-
-    def client_gone(self, client: str, session: str = "") -> None:
-        """A client's liveliness token is gone, or its session."""
-        self._reception.client_gone(client, session)
-
-    def session_gone(self, session: str) -> None:
-        """A session has ended."""
-        self._reception.session_gone(session)
-
-    def holder(self) -> str | None:
-        """Client that has control; None: nobody."""
-        lease = self._host.standing.lease
-        return None if lease is None else lease.client
+    def hand_on(self) -> None:
+        """Hand on what waits for the gateways."""
+        self._outlet.hand_on()
 
     def repeat(self) -> None:
         """Tell how the robot stands, while no time passes, for those who come late; in the controller's thread."""
-        self.outlet.repeat(self.controller.latest, self.controller.io())
+        self._outlet.repeat(self.controller.latest, self.controller.io())
 
-    def _carry_out(self, admitted: Admitted, reply: Reply) -> None:
-        self.driven.post(lambda: reply(self._host.carry_out(admitted)))
+    def _carry_out(self, admitted: Admitted, answer: Answer) -> None:
+        self.driven.post(lambda: answer(self._host.carry_out(admitted)))
 
     # ------------------------------------------------------------------ how it is doing, and its end
 
@@ -106,8 +89,19 @@ class ServedRobot:
         if self._plan_ahead is not None:
             self._plan_ahead.start()
 
-    def end_planning(self) -> None:
-        """Plan nothing more."""
+    async def let_in(self) -> None:
+        """Let clients in; it ticks."""
+        for gateway in self._gateways:
+            await gateway.open()
+
+    async def let_out(self) -> None:
+        """Let nobody in any more, and everybody out who would stay."""
+        for gateway in self._gateways:
+            await gateway.shut()
+
+    def hurry(self) -> None:
+        """Plan nothing more and wait for no client: it is about to end."""
+        self._outlet.hurry()
         if self._plan_ahead is not None:
             self._plan_ahead.end()
 
@@ -116,22 +110,24 @@ class ServedRobot:
         if self._plan_ahead is not None:
             self._plan_ahead.close()
 
+    def close(self) -> None:
+        """Close its gateways."""
+        for gateway in self._gateways:
+            gateway.close()
+
     @property
     def failure(self) -> str | None:
         """Why the robot ticks no more, where it does not."""
         return self._host.failure
 
-    def tell_telemetry(self, gateways: Sequence[Gateway], punctuality: Punctuality | None) -> None:
-        """Put the server's own figures on this robot, from the controller's thread.
+    def tell_telemetry(self, clock: Clock) -> None:
+        """Put the server's own figures on this robot, from the controller's thread."""
+        punctuality = clock.punctuality(self.driven)
+        self.driven.post(lambda: self._outlet.telemetry(self._telemetry(punctuality)))
 
-        Args:
-            gateways: The robot's.
-            punctuality: Of its ticks; None where a client lets time pass.
-        """
-        self.driven.post(lambda: self.outlet.telemetry(self._telemetry(gateways, punctuality)))
-
-    def _telemetry(self, gateways: Sequence[Gateway], punctuality: Punctuality | None) -> Telemetry:
-        controller, counters, reception = self.controller, self.controller.counters, self._reception
+    def _telemetry(self, punctuality: Punctuality | None) -> Telemetry:
+        controller, counters, reception = self.controller, self.controller.counters, self.reception
+        gateways = self._gateways
         late, lost, limited = controller.motion.counters()
         refused = reception.setpoints_refused + sum(gateway.setpoints_refused for gateway in gateways)
         on_time = punctuality or Punctuality(0, 1.0, 0.0, 0.0, 0.0)
@@ -142,7 +138,7 @@ class ServedRobot:
             late_p99_us=on_time.p99_us,
             late_max_us=on_time.max_us,
             missed_ticks=counters.missed_ticks,
-            dropped_states=self.outlet.dropped + sum(gateway.dropped for gateway in gateways),
+            dropped_states=self._outlet.dropped + sum(gateway.dropped for gateway in gateways),
             recorder_dropped=self.recorder.dropped if self.recorder is not None else 0,
             setpoints_received=counters.setpoints_received + refused,
             setpoints_refused=counters.setpoints_refused + refused,
@@ -165,9 +161,5 @@ class ServedRobot:
             self.recorder.path.unlink(missing_ok=True)
 
     def _warn(self, why: str) -> None:
-        """Tell clients, and with them the console; it is no event of the controller's, whose replay knows no disk."""
-
-        def tell() -> None:
-            self.outlet.event(Event(tick=self.controller.tick_number + 1, kind="warning", why=why))
-
-        self.driven.post(tell)
+        """Tell clients, and with them the console."""
+        self.driven.post(lambda: self._host.warn(why))

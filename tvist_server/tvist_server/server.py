@@ -15,6 +15,7 @@ from tvist_server.config import ConfigError, ServeConfig
 from tvist_server.courier import Courier
 from tvist_server.ending import Ending
 from tvist_server.fleet import recording_of
+from tvist_server.gateways.base import Gateway
 from tvist_server.gateways.console import Console, ConsoleGateway
 from tvist_server.gateways.exposure import ExposureError, guarded, guarded_doors
 from tvist_server.gateways.network import Network
@@ -51,7 +52,6 @@ class Server:
         except ExposureError as error:
             raise ConfigError(str(error)) from error
         self.robots: list[ServedRobot] = []
-        self._doors: list[UrDoors] = []
         self.left = True
         """After `close`: whether the network is left. Zenoh may still wait for a client that has stopped reading."""
         try:
@@ -60,25 +60,31 @@ class Server:
             self._couriers, self._clocks = _drivers(config, self.robots)
             lockstep = config.clock != "realtime"
             self._network = Network(listen, guard, lockstep=lockstep)
-            self._gateways = [
-                self._network.gateway(robot.setup.name, robot, lockstep=lockstep, truth=robot.setup.truth)
-                for robot in self.robots
-            ]
             self._console = Console()
-            # In real time the clock sees to it that messages are handed on; in lockstep each message does.
+            self.ur: list[tuple[str, dict[Door, int]]] = []
+            """Address and ports of each robot's UR interfaces; none where they are not open."""
             for number, robot in enumerate(self.robots):
-                if config.ur:
-                    self._doors.append(_doors(robot, config, number))
-                wake = self._couriers[number].wake if lockstep else None
-                name = robot.setup.name
-                console = ConsoleGateway(self._console, name, partial(config.command_line, name=name))
-                robot.outlet.open([self._gateways[number], *self._doors[number : number + 1], console], wake)
+                # In real time the clock sees to it that messages are handed on; in lockstep each message does.
+                robot.open(
+                    self._gateways(robot, config, number), self._couriers[number].wake if lockstep else None
+                )
         except BaseException:  # a signal, too
-            for doors in self._doors:
-                doors.close()
             for robot in self.robots:
+                robot.close()
                 robot.discard_recording()
             raise
+
+    def _gateways(self, robot: ServedRobot, config: ServeConfig, number: int) -> list[Gateway]:
+        name, desk, lockstep = robot.setup.name, robot.reception, config.clock != "realtime"
+        gateways: list[Gateway] = [
+            self._network.gateway(name, desk, lockstep=lockstep, truth=robot.setup.truth),
+            ConsoleGateway(self._console, name, partial(config.command_line, name=name)),
+        ]
+        if config.ur:
+            doors = _doors(robot, config, number)
+            self.ur.append((doors.address, doors.ports))
+            gateways.insert(1, doors)
+        return gateways
 
     # ------------------------------------------------------------------ life
 
@@ -99,8 +105,7 @@ class Server:
     def close(self) -> None:
         """End in order: no more ticks, recordings closed, what waits handed on, as far as clients take it."""
         for robot in self.robots:
-            robot.outlet.hurry()
-            robot.end_planning()
+            robot.hurry()
         for robot in self.robots:
             robot.stop_planning()
         for clock in self._clocks:
@@ -118,8 +123,8 @@ class Server:
         try:
             for courier in self._couriers:
                 courier.close()
-            for doors in self._doors:
-                doors.close()
+            for robot in self.robots:
+                robot.close()
             self._console.close()
         finally:
             with contextlib.suppress(Exception):
@@ -136,23 +141,17 @@ class Server:
         ending.hear(lambda: loop.call_soon_threadsafe(ended.set))
         self.start()
         try:
-            for doors in self._doors:
-                await doors.first_tick()
-                await doors.open()
+            for robot in self.robots:
+                await robot.let_in()
             ready()
             while not ended.is_set() and self.failure is None:
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(ended.wait(), 1.0)
                 self._tell_telemetry()
         finally:
-            for doors in self._doors:
-                await doors.shut()
+            for robot in self.robots:
+                await robot.let_out()
             self.close()
-
-    @property
-    def ur(self) -> list[tuple[str, dict[Door, int]]]:
-        """Address and ports of each robot's UR interfaces; none where they are not open."""
-        return [(doors.address, doors.ports) for doors in self._doors]
 
     @property
     def failure(self) -> str | None:
@@ -162,9 +161,8 @@ class Server:
     def _tell_telemetry(self) -> None:
         # In lockstep each robot has a clock of its own.
         clocks = self._clocks if len(self._clocks) > 1 else self._clocks * len(self.robots)
-        for number, (robot, clock) in enumerate(zip(self.robots, clocks, strict=True)):
-            gateways = [self._gateways[number], *self._doors[number : number + 1]]
-            robot.tell_telemetry(gateways, clock.punctuality(robot.driven))
+        for robot, clock in zip(self.robots, clocks, strict=True):
+            robot.tell_telemetry(clock)
         self._console.update()
 
 
@@ -184,9 +182,8 @@ def _doors(robot: ServedRobot, config: ServeConfig, number: int) -> UrDoors:
         guarded_doors(address, insecure=config.insecure)
     except ExposureError as error:
         raise ConfigError(str(error)) from error
-    return UrDoors(
-        robot, robot.setup.description, robot.setup.name, address, ports, lockstep=config.clock != "realtime"
-    )
+    setup, lockstep = robot.setup, config.clock != "realtime"
+    return UrDoors(robot.reception, setup.description, setup.name, address, ports, lockstep=lockstep)
 
 
 def _drivers(config: ServeConfig, robots: Sequence[ServedRobot]) -> tuple[list[Courier], list[Clock]]:
@@ -195,8 +192,8 @@ def _drivers(config: ServeConfig, robots: Sequence[ServedRobot]) -> tuple[list[C
     In lockstep nothing may be lost, so that whoever hands on waits for a slow client, and for one robot alone.
     """
     if config.clock == "realtime":
-        courier, driven = Courier([robot.outlet for robot in robots]), [robot.driven for robot in robots]
+        courier, driven = Courier([robot.hand_on for robot in robots]), [robot.driven for robot in robots]
         clock = Realtime(driven, courier.wake, PERIOD, config.speed, priority=config.realtime_priority)
         return [courier], [clock]
-    couriers = [Courier([robot.outlet]) for robot in robots]
+    couriers = [Courier([robot.hand_on]) for robot in robots]
     return couriers, [Lockstep(robot.driven, robot.repeat) for robot in robots]

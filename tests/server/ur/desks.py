@@ -4,8 +4,9 @@ import asyncio
 
 from tests.server.robots import Robot
 
-from tvist_protocol.codec import decode_command
+from tvist_protocol.codec import encode
 from tvist_server.host import Host
+from tvist_server.sink import Sink
 from tvist_server.ur_ports import UrPorts
 
 EVERYWHERE = dict.fromkeys(UrPorts().open(), 0)
@@ -14,7 +15,7 @@ PATIENCE = 60.0
 """After how long something is taken to hang [s]."""
 
 
-class Desk:
+class Desk(Sink):
     """A controller in the loop's own thread; `tick` lets time pass."""
 
     def __init__(self):
@@ -24,9 +25,9 @@ class Desk:
         self.doors = None
         self.writers = []
 
-    def request(self, data, reply):
-        self.last = decode_command(data)
-        reply(self.host.request(data))
+    def command(self, command, answer):
+        self.last = command
+        answer(self.host.request(encode(command)))
 
     def client_seen(self, name, session=""):
         """Nobody asks."""
@@ -46,8 +47,6 @@ class Desk:
 
     def io(self, io):
         self.doors.publish("io", io, b"")
-
-    def journal(self, entry): ...
 
     async def tick(self, count=1):
         for _ in range(count):

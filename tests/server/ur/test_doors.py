@@ -248,7 +248,7 @@ async def test_scripts_by_the_thousand_cut_nobody_off_who_hears_of_them(desk):
 async def test_no_more_commands_of_a_client_wait_than_a_tick_can_do(desk, monkeypatch):
     await desk.tick()
     due = []
-    monkeypatch.setattr(desk, "request", lambda data, reply: due.append((data, reply)))
+    monkeypatch.setattr(desk, "command", lambda command, answer: due.append((command, answer)))
     _, writer = await connect(desk, "realtime")
     writer.write(b"stop program\n" * 1000)
     done = most = 0
@@ -257,8 +257,8 @@ async def test_no_more_commands_of_a_client_wait_than_a_tick_can_do(desk, monkey
         most = max(most, len(due))
         assert len(due) < 100
         done += len(due)
-        for data, reply in due:
-            reply(desk.host.request(data))
+        for command, answer in due:
+            answer(desk.host.request(encode(command)))
         due.clear()
     assert most > 1
 
@@ -266,12 +266,11 @@ async def test_no_more_commands_of_a_client_wait_than_a_tick_can_do(desk, monkey
 async def test_who_comes_first_finds_a_robot():
     desk = Desk()
     desk.doors = UrDoors(desk, UR5E, "ur5e", "127.0.0.1", {"dashboard": 0})
-    waiting = asyncio.create_task(desk.doors.first_tick())
+    waiting = asyncio.create_task(desk.doors.open())
     await asyncio.sleep(0)
     assert not waiting.done()
     await desk.tick()
     await waiting
-    await desk.doors.open()
     assert desk.doors.robot.latest.state.tick == 1
     await desk.doors.shut()
     desk.doors.close()

@@ -12,6 +12,7 @@ from random import Random
 import pytest
 from tests.server.robots import UR5E, Robot
 
+from tvist_protocol.codec import encode
 from tvist_server.gateways.ur.dashboard.commands import COMMANDS
 from tvist_server.gateways.ur.dashboard.session import DashboardSession
 from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
@@ -21,6 +22,7 @@ from tvist_server.gateways.ur.robot import UrRobot
 from tvist_server.gateways.ur.rtde.session import RtdeSession
 from tvist_server.host import Host
 from tvist_server.instruments.snapshot import Instruments
+from tvist_server.sink import Sink
 
 from . import rtde_client
 from .decoders import split
@@ -38,7 +40,7 @@ LIVES = 60
 READ = ["timestamp", "actual_q"]
 
 
-class House:
+class House(Sink):
     """A robot with doors and no sockets; `tick` lets time pass, `answer` gives the replies that are due."""
 
     def __init__(self):
@@ -55,8 +57,8 @@ class House:
     def due_append(self, action):
         self.due.append(action)
 
-    def request(self, data, reply):
-        self.due.append(lambda: reply(self.host.request(data)))
+    def command(self, command, answer):
+        self.due.append(lambda: answer(self.host.request(encode(command))))
 
     def client_seen(self, name, session=""):
         """Nobody asks."""

@@ -5,7 +5,6 @@ from collections import deque
 from tests.server.robots import Robot
 
 from tvist_protocol import commands as c
-from tvist_protocol.codec import decode_command, encode
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
 
@@ -20,14 +19,14 @@ class Desk:
         self._due = deque()
         self.present = set()
 
-    def request(self, data, reply):
-        self._due.append((decode_command(data), reply))
+    def command(self, command, answer):
+        self._due.append((command, answer))
 
     def answer(self):
         while self._due:
-            command, reply = self._due.popleft()
+            command, answer = self._due.popleft()
             self.kinds.append(type(command).__name__)
-            reply(encode(self.controller.receive(command)))
+            answer(self.controller.receive(command))
 
     def client_seen(self, name, _session=""):
         self.present.add(name)

@@ -4,14 +4,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Literal, Protocol
 
+from tvist_protocol.commands import Command
 from tvist_protocol.io import Io
+from tvist_protocol.replies import Reply
 from tvist_protocol.stream import Event, State, Telemetry, Truth
 
 Topic = Literal["state", "event", "truth", "telemetry", "io"]
 """What is put without being asked for."""
 Message = State | Event | Truth | Telemetry | Io
-Reply = Callable[[bytes], None]
-"""Takes the encoded answer, once, from any thread."""
+Answer = Callable[[Reply], None]
+"""Takes the reply to a command, once, from any thread."""
 
 
 class GatewayError(Exception):
@@ -21,14 +23,17 @@ class GatewayError(Exception):
 class Desk(Protocol):
     """Where a gateway hands in what arrives. Callable from any thread; nothing here may wait."""
 
-    def request(self, data: bytes, reply: Reply) -> None:
-        """Take an encoded command; `reply` is called once: at once if it is turned away, else from another thread."""
+    def request(self, data: bytes, answer: Answer) -> None:
+        """Take an encoded command; `answer` is called once: at once if it is turned away, else from another thread."""
+
+    def command(self, command: Command, answer: Answer) -> None:
+        """Take a command that the gateway made itself; `answer` as for `request`."""
 
     def setpoint(self, data: bytes) -> None:
         """Take an encoded set-point."""
 
-    def info(self, reply: Reply) -> None:
-        """Take a question for `info`; `reply` as for `request`."""
+    def info(self, answer: Callable[[bytes], None]) -> None:
+        """Take a question for `info`; `answer` is called once with the encoded message, from another thread."""
 
     def client_seen(self, client: str, session: str = "") -> None:
         """Note that a client's liveliness token is there.
@@ -59,6 +64,12 @@ class Gateway(ABC):
     @abstractmethod
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:
         """Put a message, which is there encoded, too. Called from one thread; raises nothing for the network's sake."""
+
+    async def open(self) -> None:  # noqa: B027  not every one waits for something
+        """Let clients in. The robot ticks."""
+
+    async def shut(self) -> None:  # noqa: B027  likewise
+        """Let nobody in any more, and everybody out."""
 
     @abstractmethod
     def close(self) -> None:

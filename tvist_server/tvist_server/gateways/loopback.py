@@ -10,9 +10,10 @@ from tvist_server.controller import Controller
 from tvist_server.gateways.base import Topic
 from tvist_server.host import Host
 from tvist_server.setup import Setup
+from tvist_server.sink import Sink
 
 
-class LoopbackHost:
+class LoopbackHost(Sink):
     """A robot in the caller's own thread, as fast as it computes. Every message still goes through the codec.
 
     Args:
@@ -28,7 +29,7 @@ class LoopbackHost:
 
     def request(self, client: str, data: bytes) -> bytes:  # noqa: ARG002  a network's door knows no client either
         """Carry out a command; its encoded reply."""
-        return self._host.request(data)
+        return encode(self._host.request(data))
 
     def put_setpoint(self, client: str, data: bytes) -> None:  # noqa: ARG002
         """Take a set-point."""

@@ -2,11 +2,13 @@
 
 import contextlib
 import threading
+from collections.abc import Callable
 from queue import SimpleQueue
 
 import zenoh
 
-from tvist_server.gateways.base import Reply
+from tvist_protocol.codec import encode
+from tvist_protocol.replies import Reply
 
 ENCODING = zenoh.Encoding("application/msgpack")
 
@@ -24,14 +26,14 @@ class Answers:
     """
 
     def __init__(self) -> None:
-        self._queue: SimpleQueue[tuple[zenoh.Query, str, bytes] | None] = SimpleQueue()
+        self._queue: SimpleQueue[tuple[zenoh.Query, str, Reply | bytes] | None] = SimpleQueue()
         self._closed = False
         self._thread = threading.Thread(target=self._run, name="zenoh-answers", daemon=True)
         self._thread.start()
 
-    def to(self, query: zenoh.Query, key: str) -> Reply:
-        """Make the function that answers a query on a key. Zenoh ends the query when it is called."""
-        return lambda data: self._queue.put((query, key, data))
+    def to(self, query: zenoh.Query, key: str) -> Callable[[Reply | bytes], None]:
+        """Make the function that answers a query on a key, encoded or not. Zenoh ends the query when it is called."""
+        return lambda reply: self._queue.put((query, key, reply))
 
     def close(self) -> None:
         """Send what is waiting, as far as that is quick."""
@@ -41,7 +43,8 @@ class Answers:
 
     def _run(self) -> None:
         while not self._closed and (answer := self._queue.get()) is not None:
-            query, key, data = answer
+            query, key, reply = answer
+            data = reply if isinstance(reply, bytes) else encode(reply)
             # The client may have left, the session may be closed: then nobody waits.
             with contextlib.suppress(zenoh.ZError), query:
                 query.reply(key, data, encoding=ENCODING)

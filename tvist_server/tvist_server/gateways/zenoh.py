@@ -6,15 +6,16 @@ bytes, hand them to the desk and return; one may still be running when the sessi
 """
 
 import contextlib
+from collections.abc import Callable
 from functools import partial
 
 import zenoh
 from zenoh.handlers import Callback
 
 from tvist_protocol import keys
-from tvist_protocol.codec import MAX_BYTES, encode
-from tvist_protocol.replies import Refused
-from tvist_server.gateways.base import Desk, Gateway, Message, Reply, Topic
+from tvist_protocol.codec import MAX_BYTES
+from tvist_protocol.replies import Refused, Reply
+from tvist_server.gateways.base import Desk, Gateway, Message, Topic
 from tvist_server.gateways.replies import ENCODING, Answers
 
 
@@ -74,34 +75,34 @@ class ZenohGateway(Gateway):
     # ------------------------------------------------------------------ what arrives, in Zenoh's threads
 
     def _on_command(self, key: str, query: zenoh.Query) -> None:
-        reply = self._reply(key, query)
-        if reply is None:
+        answer = self._answer(key, query)
+        if answer is None:
             return
         payload = query.payload
         if payload is None:
-            reply(_malformed("", "the query has no payload: a command is the payload of a query"))
+            answer(_malformed("", "the query has no payload: a command is the payload of a query"))
         elif len(payload) > MAX_BYTES:
             why = f"the message has {len(payload)} bytes, at most {MAX_BYTES} are allowed"
-            reply(_malformed("", why, MAX_BYTES))
+            answer(_malformed("", why, MAX_BYTES))
         else:
-            self._desk.request(payload.to_bytes(), reply)
+            self._desk.request(payload.to_bytes(), answer)
 
     def _on_info(self, key: str, query: zenoh.Query) -> None:
-        reply = self._reply(key, query)
-        if reply is not None:
-            self._desk.info(reply)
+        answer = self._answer(key, query)
+        if answer is not None:
+            self._desk.info(answer)
 
-    def _reply(self, key: str, query: zenoh.Query) -> Reply | None:
+    def _answer(self, key: str, query: zenoh.Query) -> Callable[[Reply | bytes], None] | None:
         """How to answer; None where there is nothing to do any more."""
         if self._closed:
             query.drop()  # type: ignore[no-untyped-call]
             return None
-        reply = self._answers.to(query, key)
+        answer = self._answers.to(query, key)
         asked = str(query.key_expr)
         if asked != key:
-            reply(_malformed("key", f"key is {asked:.80}, which has a wildcard: ask on {key}"))
+            answer(_malformed("key", f"key is {asked:.80}, which has a wildcard: ask on {key}"))
             return None
-        return reply
+        return answer
 
     def _on_setpoint(self, key: str, sample: zenoh.Sample) -> None:
         if self._closed:
@@ -169,5 +170,5 @@ def _publishers(
     return publishers
 
 
-def _malformed(where: str, why: str, limit: float | None = None) -> bytes:
-    return encode(Refused(code="malformed", where=where, why=why, limit=limit))
+def _malformed(where: str, why: str, limit: float | None = None) -> Refused:
+    return Refused(code="malformed", where=where, why=why, limit=limit)

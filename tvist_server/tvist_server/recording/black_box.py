@@ -6,13 +6,14 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from threading import Thread
-from typing import Any, Protocol
+from typing import Any
 
 from tvist_protocol.info import Info
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import Recorded
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.recording.recorder import Recorder, RecordingError
+from tvist_server.sink import Sink
 
 log = logging.getLogger(__name__)
 
@@ -22,30 +23,13 @@ MOST_FILES = 10
 """Files of one robot: one that fails again and again does not fill the disk."""
 
 
-class Recording(Protocol):
-    """What takes the messages, too."""
-
-    def state(self, state: State) -> None:
-        """Record a state."""
-
-    def event(self, event: Event) -> None:
-        """Record an event."""
-
-    def truth(self, truth: Truth) -> None:
-        """Record what no robot can know."""
-
-    def journal(self, entry: Entry) -> None:
-        """Record what reached the controller."""
-
-
-class BlackBox:
-    """Stands before a recorder, where there is one; nothing here waits or raises.
+class BlackBox(Sink):
+    """Keeps what came last in memory.
 
     Args:
         folder: For the files.
         info: The robot as it says of itself; asked when a file is written.
         start: How the server was started, as in every recording.
-        recorder: Gets every message, too.
     """
 
     def __init__(
@@ -53,10 +37,8 @@ class BlackBox:
         folder: Path,
         info: Callable[[], Info],
         start: Mapping[str, Any],
-        recorder: Recording | None,
     ) -> None:
         self._folder, self._info, self._start = folder, info, start
-        self._recorder = recorder
         self._kept: deque[Recorded] = deque()
         self._failed = False
         self._written = 0
@@ -67,8 +49,6 @@ class BlackBox:
         kept.append(state)
         while kept[0].tick < state.tick - KEPT:
             kept.popleft()
-        if self._recorder is not None:
-            self._recorder.state(state)
         if self._failed:
             self._failed = False
             self._write(state.tick)
@@ -76,21 +56,15 @@ class BlackBox:
     def event(self, event: Event) -> None:
         """Keep an event."""
         self._kept.append(event)
-        if self._recorder is not None:
-            self._recorder.event(event)
         self._failed |= event.code == "plant_failure"
 
     def truth(self, truth: Truth) -> None:
         """Keep what no robot can know."""
         self._kept.append(truth)
-        if self._recorder is not None:
-            self._recorder.truth(truth)
 
     def journal(self, entry: Entry) -> None:
         """Keep what reached the controller."""
         self._kept.append(entry)
-        if self._recorder is not None:
-            self._recorder.journal(entry)
 
     def _write(self, tick: int) -> None:
         if self._written < MOST_FILES:

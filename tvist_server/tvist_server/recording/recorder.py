@@ -20,6 +20,7 @@ from tvist_protocol.recorded import Recorded, topics
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.recording.whereabouts import DeletedError, whereabouts
 from tvist_server.recording.writer import RecordingWriter, heading
+from tvist_server.sink import Sink
 
 QUEUE_SIZE = 8192
 """Messages that may wait. State, truth and a set-point every tick are 1500 a second: five seconds of a
@@ -35,7 +36,7 @@ class RecordingError(TvistError):
     """A recording cannot be begun."""
 
 
-class Recorder:
+class Recorder(Sink):
     """Records one robot until it is closed.
 
     Messages come from one thread; they are not copied, and must not be changed afterwards. Without `wait`, no

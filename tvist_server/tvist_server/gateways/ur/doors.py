@@ -104,7 +104,7 @@ class UrDoors(Gateway):
         """Port by door, as they are."""
         return {door: bound.getsockname()[1] for door, bound in self._sockets.items()}
 
-    async def first_tick(self) -> None:
+    async def _first_tick(self) -> None:
         """Wait for it, where time passes by itself: clients that come before would find no controller."""
         for _ in range(0 if self._lockstep else FIRST):
             if self._early:
@@ -112,7 +112,8 @@ class UrDoors(Gateway):
             await asyncio.sleep(PERIOD)
 
     async def open(self) -> None:
-        """Let clients in; they are served by the running loop."""
+        """Let clients in, after the first tick; they are served by the running loop."""
+        await self._first_tick()
         self._loop = asyncio.get_running_loop()
         places = Places[Connection](self._loop.time, self._coming_and_going.tell)
         self._connections = places.taken

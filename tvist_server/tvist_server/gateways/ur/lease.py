@@ -6,7 +6,6 @@ It is given back when the last of them that used it is closed.
 
 from collections.abc import Callable
 
-from tvist_protocol.codec import decode_reply, encode
 from tvist_protocol.commands import Command, KeepAlive, ReleaseControl, TakeControl
 from tvist_protocol.replies import Accepted, Refused, Reply
 from tvist_server.gateways.base import Desk
@@ -61,7 +60,7 @@ class HostLease:
 
     def ask(self, command: Command, then: Then) -> None:
         """Send a command as it is."""
-        self._desk.request(encode(command), lambda data: self._soon(lambda: then(decode_reply(data))))
+        self._desk.command(command, lambda reply: self._soon(lambda: then(reply)))
 
     def leave(self, connection: object) -> None:
         """A connection is closed; with the last one that used it control is given back."""

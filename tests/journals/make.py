@@ -1,0 +1,308 @@
+"""Record the runs whose journals are kept here: `python -m tests.journals.make FOLDER [NAME ...]`.
+
+Each is a served robot with the clients that its name tells of. What runs in real time comes out a little different
+every time; only its replay is always the same.
+"""
+
+import math
+import random
+import socket
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+from tests.conformance.served import PATIENCE, Served
+from tests.conformance.wire import Q1, Wire
+
+Q2 = [0.0, -2.9, 0.4, -1.4, 0.3, 0.2]
+Q3 = [0.6, -2.7, 0.5, -1.9, -0.3, 0.6]
+SHAPERS = ("none", "zv", "zvd", "ei3", "auto", "short", "zv_3_modes", "auto-target")
+TICK = 0.002
+MOST = 1000
+"""Ticks in one step."""
+
+
+@contextmanager
+def robot(path, *options, clock="lockstep"):
+    """A served robot that records, and somebody with control of it."""
+    with (
+        Served("--clock", clock, "--record", str(path), *options) as served,
+        Wire(served.endpoint) as wire,
+    ):
+        wire.listen("event", "state")
+        answer = wire.command("take_control", client="somebody", lease_s=30.0)
+        yield Hand(wire, answer["token"], lockstep=clock == "lockstep")
+        assert served.end() == 0
+
+
+class Hand:
+    """What somebody with control does."""
+
+    def __init__(self, wire, token, *, lockstep):
+        self.wire, self.token, self.lockstep = wire, token, lockstep
+
+    def do(self, command, **fields):
+        return self.wire.command(command, token=self.token, **fields)
+
+    def wait(self, ticks):
+        """Let ticks pass."""
+        if self.lockstep:
+            for first in range(0, ticks, MOST):
+                answer = self.do("simulation.step", ticks=min(ticks - first, MOST))
+                assert answer["type"] == "done", answer
+        else:
+            time.sleep(ticks * TICK)
+
+    def move(self, q, **limits):
+        """Move, and wait for the end where it begins."""
+        answer = self.do("move_j", q=q, **limits)
+        if answer["type"] == "accepted" and not self.lockstep:
+            self.wire.wait("event", lambda e: e.get("id") == answer["id"] and e["kind"] != "motion_started")
+        elif answer["type"] == "accepted":
+            self.wait(1500)
+        return answer
+
+    def stream(self, seconds, period=TICK, *, amplitude=0.1, hertz=0.7, joint=1, sequence=0):
+        """Stream a sine from where the arm stands."""
+        start = self.wire.next("state")["reference_q"] if not self.lockstep else None
+        if start is None:
+            self.wait(1)
+            start = self.wire.received["state"][-1]["reference_q"]
+        assert self.do("servo_start", period=period)["type"] == "done"
+        for number in range(round(seconds / period)):
+            t = (number + 1) * period
+            q = list(start)
+            q[joint] += amplitude * math.sin(2 * math.pi * hertz * t) * min(t, 1.0)
+            self.wire.setpoint(token=self.token, sequence=sequence + number + 1, q=q)
+            if self.lockstep and number % 25 == 24:
+                self.wait(25 * round(period / TICK))
+            elif not self.lockstep:
+                time.sleep(period)
+
+    def stream_in_steps(self, seconds, *, joint=0, amplitude=0.1, hertz=1.0):
+        """Stream with the set-points inside steps."""
+        self.wait(1)
+        start = self.wire.received["state"][-1]["reference_q"]
+        assert self.do("servo_start", period=TICK)["type"] == "done"
+        count, number = round(seconds / TICK), 0
+        while number < count:
+            setpoints = []
+            for _ in range(50):
+                number += 1
+                q = list(start)
+                q[joint] += amplitude * math.sin(2 * math.pi * hertz * number * TICK)
+                setpoints.append({"sequence": number, "q": q})
+            answer = self.do("simulation.step", ticks=50, setpoints=setpoints)
+            assert answer["type"] == "done", answer
+
+
+def moves_with_every_shaper(path):
+    with robot(path, "--shaper", "auto") as hand:
+        for number, shaper in enumerate(SHAPERS):
+            hand.do("set_shaper", name=shaper)
+            hand.move((Q2, Q3, Q1)[number % 3], acceleration=1.4 + 0.1 * number)
+
+
+def moves_with_another_payload(path):
+    with robot(path, "--payload", "2", "--truth", "--seed", "7") as hand:
+        hand.move(Q3)
+        hand.do("set_payload", mass=0.0, com=[0, 0, 0], inertia=[0, 0, 0, 0, 0, 0])
+        hand.move(Q2, jerk=400.0)
+        hand.do("set_estimator", name="fixed", f_d=7.5, zeta=0.01)
+        hand.move(Q1)
+
+
+def stops_pauses_and_the_slider(path):
+    draw = random.Random(3)
+    with robot(path, "--shaper", "auto") as hand:
+        for number in range(10):
+            hand.do("set_shaper", name=SHAPERS[number % len(SHAPERS)])
+            hand.do("move_j", q=(Q2, Q3, Q1)[number % 3])
+            hand.wait(draw.randrange(1, 700))
+            match number % 5:
+                case 0:
+                    hand.do("stop")
+                case 1:
+                    hand.do("pause")
+                    hand.wait(draw.randrange(1, 300))
+                    hand.do("resume")
+                case 2:
+                    hand.do("set_speed", fraction=0.3)
+                    hand.wait(draw.randrange(1, 300))
+                    hand.do("set_speed", fraction=1.0)
+                case 3:
+                    hand.do("stop", deceleration=3.0)
+                case 4:
+                    hand.do("set_shaper", name="zvd")
+                    hand.do("pause")
+                    hand.wait(200)
+                    hand.do("stop")
+            hand.wait(1500)
+            hand.do("move_j", q=Q1)
+            hand.wait(1500)
+
+
+def streams(path):
+    with robot(path, "--shaper", "zv") as hand:
+        hand.stream_in_steps(2.0)
+        hand.do("servo_stop")
+        hand.wait(600)
+        hand.do("set_shaper", name="auto")
+        hand.stream(2.0, 0.008)
+        hand.do("servo_stop")
+        hand.wait(600)
+        hand.stream(1.0, joint=2, amplitude=0.4, hertz=2.0)  # beyond its limits
+        hand.do("set_shaper", name="ei3")
+        hand.wait(100)
+        hand.do("stop")
+        hand.wait(600)
+
+
+def faults(path):
+    with robot(path, "--shaper", "short") as hand:
+        for fault in (
+            "protective_stop",
+            "safeguard_stop",
+            "emergency_stop",
+            "power_loss",
+            "violation",
+            "nan",
+        ):
+            hand.do("move_j", q=Q2)
+            hand.wait(333)
+            hand.do("simulation.inject", fault=fault)
+            hand.wait(700)
+            hand.do("simulation.inject", fault="normal")
+            for command in ("unlock_protective_stop", "restart_safety", "power_on", "resume"):
+                hand.do(command)
+            hand.wait(900)
+            hand.move(Q1)
+        hand.do("simulation.inject", fault="reduced")
+        hand.move(Q3)
+        hand.do("simulation.inject", fault="torque", joint=2, value=90.0, seconds=0.4)
+        hand.wait(900)
+
+
+def collisions_and_refusals(path):
+    with robot(path) as hand:
+        hand.move([0.0, 0.5, 0.0, 0.0, 0.0, 0.0])
+        hand.move([0.0, -1.57, 3.1, 0.0, 0.0, 0.0])
+        hand.do("move_j", q=[0.0] * 5)
+        hand.do("move_j", q=Q2, velocity=99.0)
+        hand.stream(3.0, 0.02, joint=1, amplitude=1.9, hertz=0.2)
+        hand.wait(900)
+        hand.do("servo_stop")
+        hand.do("simulation.reset", q=Q3, seed=5, shaper="auto")
+        hand.move(Q2, velocity=2.5, acceleration=12.0, jerk=900.0)
+
+
+def live_moves(path):
+    with robot(path, "--shaper", "auto", clock="realtime") as hand:
+        hand.move(Q2)
+        hand.do("move_j", q=Q3)
+        hand.wait(250)
+        hand.do("stop")
+        hand.wait(500)
+        hand.move(Q1)
+
+
+def live_stream(path):
+    with robot(path, "--shaper", "zv", clock="realtime") as hand:
+        hand.stream(3.0, 0.008)
+        hand.do("servo_stop")
+        hand.wait(500)
+        hand.stream(1.0)
+        hand.wait(700)  # nobody goes on with it
+
+
+def live_faults(path):
+    with robot(path, clock="realtime") as hand:
+        for fault in ("safeguard_stop", "emergency_stop", "reduced"):
+            hand.do("move_j", q=Q2)
+            hand.wait(200)
+            hand.do("simulation.inject", fault=fault, seconds=0.3)
+            hand.wait(600)
+            for command in ("restart_safety", "power_on", "resume", "keep_alive"):
+                hand.do(command)
+            hand.wait(500)
+            hand.move(Q1)
+
+
+def live_lost_lease(path):
+    with robot(path, "--shaper", "ei3", clock="realtime") as hand:
+        answer = hand.wire.command("take_control", client="somebody", lease_s=0.5)
+        hand.token = answer["token"]
+        hand.do("move_j", q=Q3, velocity=0.4)
+        hand.wire.wait("event", lambda event: event["kind"] == "lease_lost")
+        hand.wait(700)
+
+
+def asked(host, port, *lines, waits=0.2):
+    """What UR's dashboard answers, after its greeting."""
+    said = []
+    with (
+        socket.create_connection((host, port), PATIENCE) as stream,
+        stream.makefile("rw", newline="\n") as talk,
+    ):
+        talk.readline()
+        for line in lines:
+            talk.write(f"{line}\n")
+            talk.flush()
+            said.append(talk.readline().strip())
+            time.sleep(waits)
+    return said
+
+
+def live_programs_of_the_dashboard(path):
+    address = "127.20.251.7"
+    with robot(path, "--ur", "--ur-address", address, clock="realtime") as hand:
+        hand.do("release_control")
+        asked(address, 29999, "load paper.urp", "play", "programState")
+        hand.wait(1500)
+        asked(address, 29999, "pause", "programState", "play", "stop")
+        hand.wait(500)
+        asked(address, 29999, "load Q1.urp", "play", "running")
+        hand.wait(1500)
+        asked(address, 29999, "power off", "power on", "brake release", "load wait_program.urp", "play")
+        hand.wait(200)
+        asked(address, 29999, "stop")
+
+
+def live_rtde_inputs(path):
+    import rtde_io
+
+    address = "127.20.251.8"
+    with robot(path, "--ur", "--ur-address", address, "--shaper", "auto", clock="realtime") as hand:
+        hand.do("release_control")
+        io = rtde_io.RTDEIOInterface(address)
+        asked(address, 29999, "load paper.urp", "play")
+        hand.wait(200)
+        assert io.setSpeedSlider(0.4)
+        hand.wait(300)
+        assert io.setStandardDigitalOut(3, True)
+        assert io.setInputIntRegister(20, 77)
+        assert io.setSpeedSlider(1.0)
+        hand.wait(2500)
+        io.disconnect()
+
+
+RUNS = (
+    moves_with_every_shaper, moves_with_another_payload, stops_pauses_and_the_slider, streams, faults,
+    collisions_and_refusals, live_moves, live_stream, live_faults, live_lost_lease, live_programs_of_the_dashboard,
+    live_rtde_inputs,
+)  # fmt: skip
+
+
+def main(folder, *names):
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    for run in (run for run in RUNS if not names or run.__name__ in names):
+        path = folder / f"{run.__name__}.mcap"
+        path.unlink(missing_ok=True)
+        print(path, file=sys.stderr)  # noqa: T201  it takes a minute
+        run(path)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
