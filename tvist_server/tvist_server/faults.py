@@ -9,6 +9,7 @@ import numpy as np
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import SimulationInject
 from tvist_protocol.faults import FAULTS
+from tvist_server.command_row import Row
 from tvist_server.motion import MotionControl
 from tvist_server.refusal import RefusalError
 from tvist_server.safety_control import SafetyControl
@@ -46,6 +47,7 @@ class Faults:
             "nan": lambda: motion.cycle.arm.spoil(),  # noqa: PLW0108  the line may get another arm
         }
         """What is over at once."""
+        self.rows = (Row(SimulationInject, lambda call: self.inject(call.command, call.tick)),)
         self._push = np.zeros(motion.cycle.description.joints)
         self._ends: list[tuple[int, int, str, Callable[[], None]]] = []
         self._number = count()

@@ -1,13 +1,14 @@
 """Which filter shapes, and where it has its modes from: changed on the line, and watched."""
 
+from tvist_protocol.commands import SetEstimator, SetShaper
 from tvist_protocol.values import Payload
 from tvist_server.calibrations import fits
-from tvist_server.cycle import ControlCycle
+from tvist_server.command_row import Call, Row
 from tvist_server.events import Emit
+from tvist_server.mode_source import ModeSource
+from tvist_server.motion import MotionControl
 from tvist_server.planning.basis import FilterBasis
-from tvist_server.planning.filter_planner import FilterPlanner, PlannedFilter
-from tvist_server.refusal import RefusalError
-from tvist_server.setup import Setup
+from tvist_server.planning.filter_planner import PlannedFilter
 from tvist_shaping.base import Filter
 
 
@@ -15,37 +16,26 @@ class Filters:
     """The control line's filter.
 
     Args:
-        setup: With the first shaper.
-        planner: Makes filters.
+        motion: What may not be spoiled by another filter; it has the control line.
+        source: Where the modes of the line's first filter come from.
+        declared: What the controller believes that the arm carries.
         emit: Takes what happens.
-
-    Raises:
-        ValueError: There is no such shaper for this robot.
     """
 
-    def __init__(self, setup: Setup, planner: FilterPlanner, emit: Emit) -> None:
-        self._emit = emit
-        self._clipped = False
-        self.source = setup.source()
+    def __init__(self, motion: MotionControl, source: ModeSource, declared: Payload, emit: Emit) -> None:
+        self._motion, self._cycle, self._emit = motion, motion.cycle, emit
+        self._declared, self._clipped = declared, False
+        self.source = source
         """Where the filter's modes come from."""
-        try:
-            self.source, self.first = planner.choose(setup.shaper, 1, self.source, setup.payload)
-        except RefusalError as error:
-            raise ValueError(str(error)) from error
-        planner.load()
+        self.rows = (Row(SetShaper, self._choose), Row(SetEstimator, self._estimate))
+        self._warn_of_payload()
+        self._warn_of_arm()
 
-    def attach(self, cycle: ControlCycle) -> None:
-        """Say whose filter it is; it has the first one."""
-        self._cycle = cycle
-
-    def basis(self, declared: Payload) -> FilterBasis:
-        """What another filter depends on.
-
-        Args:
-            declared: What the controller believes that the arm carries.
-        """
+    @property
+    def basis(self) -> FilterBasis:
+        """What another filter depends on."""
         tvist = self._cycle.tvist
-        return FilterBasis(tvist.name, tvist.estimator.modes, self.source, declared)
+        return FilterBasis(tvist.name, tvist.estimator.modes, self.source, self._declared)
 
     def use(self, chosen: PlannedFilter) -> None:
         """Shape with it from now on."""
@@ -54,7 +44,16 @@ class Filters:
         self._cycle.use(tvist)
         self._emit("shaper_changed", why=f"{tvist.name} with estimator {self.source.name}")
         if self.source is not before:
-            self.warn_of_arm()
+            self._warn_of_arm()
+
+    def _choose(self, call: Call[SetShaper] | Call[SetEstimator]) -> None:
+        chosen: PlannedFilter = call.planned()
+        self._motion.ahead.check_filter(chosen[1])
+        self.use(chosen)
+
+    def _estimate(self, call: Call[SetEstimator]) -> None:
+        self._choose(call)
+        self._warn_of_payload()
 
     def declare(self, payload: Payload, tvist: Filter | None) -> None:
         """The arm carries something else: so it may have other modes.
@@ -63,12 +62,14 @@ class Filters:
             payload: What the controller believes that it carries.
             tvist: The filter for it; None where its modes are not known to change.
         """
+        self._declared = payload
         if tvist is not None:
             self._cycle.use(tvist)
-        self.warn_of_payload(payload)
+        self._warn_of_payload()
 
-    def warn_of_payload(self, declared: Payload) -> None:
+    def _warn_of_payload(self) -> None:
         """Say that modes are of another payload, where they are."""
+        declared = self._declared
         calibration = self.source.calibration
         if calibration is not None and not fits(calibration, declared, self.source.name):
             self._emit(
@@ -79,7 +80,7 @@ class Filters:
                 "frequencies will be off",
             )
 
-    def warn_of_arm(self) -> None:
+    def _warn_of_arm(self) -> None:
         """Say that modes are of another arm of the same model, where they are."""
         calibration = self.source.calibration
         if calibration is not None and self.source.fits_arm is False:

@@ -1,9 +1,20 @@
 """Terminals, registers and tool centre point of a robot: what commands set there, and what is told of it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from tvist_protocol.io import BITS, NUMBERS, Bank, Io, Register, SetIo, SetRegisters, SimulationSetInputs
+from tvist_protocol.io import (
+    BITS,
+    NUMBERS,
+    Bank,
+    Io,
+    Register,
+    SetIo,
+    SetRegisters,
+    SetTcp,
+    SimulationSetInputs,
+)
 from tvist_protocol.values import Payload
+from tvist_server.command_row import Call, Row
 from tvist_server.refusal import RefusalError
 
 CURRENT = (0.004, 0.020)
@@ -27,9 +38,20 @@ def analog_share(value: float, *, voltage: bool) -> float:
 
 
 class Peripherals:
-    """What hangs on the control box, apart from the arm. It starts with everything off and at zero."""
+    """What hangs on the control box, apart from the arm. It starts with everything off and at zero.
 
-    def __init__(self) -> None:
+    Args:
+        on_tcp: Called with where the tool centre point is, when that is set.
+    """
+
+    def __init__(self, on_tcp: Callable[[tuple[float, ...]], None]) -> None:
+        self._on_tcp = on_tcp
+        self.rows = (
+            Row(SetIo, lambda call: self.set_outputs(call.command), changes_io=True),
+            Row(SetRegisters, self._set_registers, needs_lease=False, changes_io=True),
+            Row(SetTcp, lambda call: self.set_tcp(call.command.offset), changes_io=True),
+            Row(SimulationSetInputs, lambda call: self.set_inputs(call.command), changes_io=True),
+        )
         self._digital_inputs = 0
         self._digital_outputs = 0
         self._analog_inputs = [CURRENT[0], CURRENT[0]]
@@ -65,6 +87,19 @@ class Peripherals:
             self._analog_types = self._analog_types & ~0b11 | command.analog_input_types
         if command.tool_analog_input is not None:
             self._tool_analog_inputs = list(command.tool_analog_input)
+
+    def set_tcp(self, offset: tuple[float, ...]) -> None:
+        """Say where the tool centre point is in the flange frame: x y z [m] and rotation vector [rad]."""
+        self.tcp_offset = offset
+        self._on_tcp(offset)
+
+    def _set_registers(self, call: Call[SetRegisters]) -> None:
+        """Write registers; input registers anyone may."""
+        command = call.command
+        if command.token is None and command.bank.startswith("output"):
+            why = f"token is missing: {command.bank} registers are the robot's own, and take control to write"
+            raise RefusalError("missing_field", "token", why)
+        self.set_registers(command)
 
     def set_registers(self, command: SetRegisters) -> None:
         """Write registers.

@@ -7,6 +7,7 @@ from tvist_protocol.values import Payload
 from tvist_server.choices import choose_filter, choose_source, make_estimator, wanted_modes
 from tvist_server.mode_source import ModeSource, modal_source
 from tvist_server.planning.basis import FilterBasis
+from tvist_server.refusal import RefusalError
 from tvist_server.setup import Setup
 from tvist_shaping.base import Filter
 
@@ -25,11 +26,21 @@ class FilterPlanner:
         self._setup = setup
         self._modal = modal_source(setup.description, setup.calibration)
 
-    def load(self) -> None:
-        """Make and use what is compiled when it is first used, which lasts for many ticks."""
+    def first(self) -> PlannedFilter:
+        """The filter that the robot starts with. What is compiled when it is first used is compiled now.
+
+        Raises:
+            ValueError: There is no such shaper for this robot.
+        """
+        setup = self._setup
+        try:
+            chosen = self.choose(setup.shaper, 1, setup.source(), setup.payload)
+        except RefusalError as error:
+            raise ValueError(str(error)) from error
         if self._modal is not None:
-            _, tvist = self.choose("auto", 1, self._modal, self._setup.payload)
-            tvist.filter(np.zeros(self._setup.description.joints))
+            _, tvist = self.choose("auto", 1, self._modal, setup.payload)
+            tvist.filter(np.zeros(setup.description.joints))
+        return chosen
 
     def choose(
         self, name: str, modes: int, source: ModeSource, declared: Payload, where: str = "shaper"

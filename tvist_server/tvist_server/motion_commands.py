@@ -1,0 +1,59 @@
+"""Commands that move, stop and power the arm."""
+
+from tvist_protocol import commands as c
+from tvist_protocol.replies import Accepted, Reply
+from tvist_server.command_row import Call, Row
+from tvist_server.motion import MotionControl
+from tvist_server.refusal import check_content, check_motion
+from tvist_server.safety_control import SafetyControl
+from tvist_server.trajectory import Limits
+
+
+class MotionCommands:
+    """What clients may ask of motion.
+
+    Args:
+        motion: What the robot is doing.
+        safety: What its safety system does.
+    """
+
+    def __init__(self, motion: MotionControl, safety: SafetyControl) -> None:
+        self._motion, self._safety = motion, safety
+        self._description = motion.cycle.description
+        self.rows = (
+            Row(c.MoveJ, self._move_j),
+            Row(c.ServoStart, self._servo_start),
+            Row(c.ServoStop, lambda _: motion.end_stream()),
+            Row(c.Stop, self._stop, needs_lease=False),
+            Row(c.Pause, self._pause),
+            Row(c.Resume, lambda _: motion.resume()),
+            Row(c.SetSpeed, self._set_speed, changes_io=True),
+            Row(c.PowerOn, self._power_on),
+            Row(c.PowerOff, lambda _: motion.power_off()),
+            Row(c.UnlockProtectiveStop, lambda _: motion.unlock()),
+            Row(c.RestartSafety, lambda _: motion.safety.restart()),
+        )
+
+    def _move_j(self, call: Call[c.MoveJ]) -> Reply:
+        check_content(call.command, self._description)
+        self._motion.check_move()
+        return Accepted(id=self._motion.move(call.planned()))
+
+    def _servo_start(self, call: Call[c.ServoStart]) -> None:
+        command = call.command
+        check_motion(command.velocity, command.acceleration, command.jerk, self._description)
+        limits = Limits(command.velocity, command.acceleration, command.jerk)
+        self._motion.follow(command.period, limits, call.now)
+
+    def _stop(self, call: Call[c.Stop]) -> None:
+        self._motion.stop(call.command.deceleration, "a stop was commanded")
+
+    def _pause(self, _: Call[c.Pause]) -> None:
+        self._motion.pause()
+        self._safety.stay_paused()
+
+    def _set_speed(self, call: Call[c.SetSpeed]) -> None:
+        self._motion.set_speed(call.command.fraction)
+
+    def _power_on(self, call: Call[c.PowerOn]) -> None:
+        self._motion.power_on(release_brakes=call.command.release_brakes)
