@@ -1,0 +1,47 @@
+"""What robots did once they do again: runs recorded earlier, replayed by the controller as it is now.
+
+A difference is either an error or a deliberate change of what a robot does. After the latter the runs are made anew by
+`make.py` and `thin.py`, and CHANGELOG says what is different.
+"""
+
+from pathlib import Path
+
+import pytest
+
+from tvist_lab.mcap_file import read
+from tvist_lab.replay import replay_file
+
+RUNS = sorted(Path(__file__).parent.glob("*.mcap"))
+ROUNDING = 1e-6
+"""What another processor may make different in a value of about one, in SI units; what a robot does differs by more."""
+
+
+def test_there_are_runs_in_lockstep_and_live():
+    assert len(RUNS) == 12
+    assert sum(path.name.startswith("live") for path in RUNS) == 6
+
+
+@pytest.mark.parametrize("path", RUNS, ids=lambda path: path.stem)
+def test_a_recorded_run_comes_out_again(path):
+    content = read(path)
+    again = replay_file(content)
+    states = {state.tick: state for state in again.states}
+    assert len(content.states) > 15
+    for recorded in content.states:
+        replayed = states[recorded.tick]
+        for name in recorded.__struct_fields__:
+            before, after = getattr(recorded, name), getattr(replayed, name)
+            assert same(before, after), f"tick {recorded.tick}: {name} was {before}, is {after}"
+    assert list(map(told, again.events)) == list(map(told, content.events))
+
+
+def same(before, after):
+    if isinstance(before, list):
+        return len(before) == len(after) and all(map(same, before, after))
+    if isinstance(before, float) and isinstance(after, float):
+        return abs(after - before) <= ROUNDING * (1.0 + abs(before))
+    return before == after
+
+
+def told(event):
+    return event.tick, event.kind, event.id, event.code, event.category
