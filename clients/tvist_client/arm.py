@@ -38,6 +38,7 @@ from tvist_protocol.commands import (
 )
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.io import SetTcp
+from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramStop
 from tvist_protocol.replies import Accepted
 from tvist_protocol.stream import Event
 
@@ -203,6 +204,24 @@ class Arm(Terminals, Simulation):
     async def restart_safety(self) -> None:
         """Restart the safety system after a violation or a fault; the arm is without power then."""
         await self.robot.request(RestartSafety(token=self.token))
+
+    # ------------------------------------------------------------------ programs
+
+    async def load_program(self, name: str) -> None:
+        """Load a program, one of `programs` in `info`; the one that runs is stopped, and the arm with it."""
+        await self.robot.request(ProgramLoad(token=self.token, name=name))
+
+    async def play_program(self) -> None:
+        """Start the loaded program, or go on with a paused one. `io` tells how far it is; it ends with control."""
+        await self.robot.request(ProgramPlay(token=self.token))
+
+    async def pause_program(self) -> None:
+        """Hold the program and its motion; `play_program` goes on."""
+        await self.robot.request(ProgramPause(token=self.token))
+
+    async def stop_program(self) -> None:
+        """Stop the program, and the arm with it."""
+        await self.robot.request(ProgramStop(token=self.token))
 
     # ------------------------------------------------------------------ setting up
 

@@ -206,6 +206,22 @@ class Arm:
         """Switch a digital input, as what is wired to it would."""
         self._portal.call(lambda: self._arm.set_digital_input(number, on))
 
+    def load_program(self, name: str) -> None:
+        """Load a program; the one that runs is stopped."""
+        self._portal.call(lambda: self._arm.load_program(name))
+
+    def play_program(self) -> None:
+        """Start the loaded program, or go on with a paused one."""
+        self._portal.call(self._arm.play_program)
+
+    def pause_program(self) -> None:
+        """Hold the program and its motion."""
+        self._portal.call(self._arm.pause_program)
+
+    def stop_program(self) -> None:
+        """Stop the program, and the arm with it."""
+        self._portal.call(self._arm.stop_program)
+
     def set_shaper(self, name: str, modes: int = 1) -> None:
         """Choose the input shaper."""
         self._portal.call(lambda: self._arm.set_shaper(name, modes))

@@ -46,6 +46,7 @@ from tvist_protocol.errors import ProtocolError, RefusedError, TvistError
 from tvist_protocol.info import CalibrationInfo, Clock, Info, Limits, Stopping, StopReason
 from tvist_protocol.io import Bank, Io, SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramState, ProgramStop
 from tvist_protocol.replies import CODE_MEANINGS, Accepted, Code, Done, Refused, Reply
 from tvist_protocol.stream import EVENT_MEANINGS, Event, EventKind, State, Telemetry, Truth
 from tvist_protocol.values import PROTOCOL_VERSION, Payload
@@ -75,6 +76,11 @@ __all__ = [
     "Payload",
     "PowerOff",
     "PowerOn",
+    "ProgramLoad",
+    "ProgramPause",
+    "ProgramPlay",
+    "ProgramState",
+    "ProgramStop",
     "ProtocolError",
     "Refused",
     "RefusedError",

@@ -11,6 +11,7 @@ from msgspec import Meta, Struct
 from tvist_protocol.client_message import ClientMessage
 from tvist_protocol.errors import ProtocolError, short
 from tvist_protocol.io import SetIo, SetRegisters, SetTcp, SimulationSetInputs
+from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramStop
 from tvist_protocol.values import (
     PROTOCOL_VERSION,
     Acceleration,
@@ -293,6 +294,10 @@ Command = (
     | SetIo
     | SetRegisters
     | SetTcp
+    | ProgramLoad
+    | ProgramPlay
+    | ProgramPause
+    | ProgramStop
     | PowerOn
     | PowerOff
     | UnlockProtectiveStop

@@ -119,3 +119,5 @@ class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=F
     """The stop that keeps the robot from moving now; null: there is none, or nothing has told why."""
     arm: str | None = None
     """Fingerprint of what makes the arm vibrate, as a calibration's `provenance` names it; null: not told."""
+    programs: list[str] = []
+    """Programs that can be loaded."""

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from tvist_protocol.client_message import ClientMessage
+from tvist_protocol.programs import ProgramState
 from tvist_protocol.values import Fraction, Payload, Token
 
 BITS, NUMBERS = 128, 48
@@ -52,6 +53,12 @@ class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
     """Declared: what the controller believes."""
     target_speed_fraction: float
     """The speed slider [-]."""
+    program: str | None = None
+    """The program that is loaded; null: none."""
+    program_state: ProgramState = "STOPPED"
+    """What it does."""
+    program_line: int = 0
+    """Its line that is carried out, or comes next when it is played on, counted from 1; 0: none."""
 
 
 DigitalBits = Annotated[int, Meta(ge=0, le=2**18 - 1)]

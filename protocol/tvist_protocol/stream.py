@@ -105,6 +105,8 @@ class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc
     """Of a stop: from now until the shaped reference rests; null where that is too far ahead to say [s]."""
     way: float | None = None
     """Of a stop: how far the joint that turns most still turns; null likewise [rad]."""
+    line: int | None = None
+    """Line of the program that has ended by an error, counted from 1."""
 
 
 class Truth(Struct, frozen=True, kw_only=True, tag_field="type", tag="truth", gc=False):

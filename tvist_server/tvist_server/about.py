@@ -59,4 +59,5 @@ def info_of(controller: Controller) -> Info:
         safety_mode=controller.motion.safety_mode,
         stop=controller.stop_reason,
         arm=controller.arm,
+        programs=sorted(controller.programs.known),
     )

@@ -31,6 +31,7 @@ from tvist_server.peripherals import Peripherals
 from tvist_server.planning.basis import Basis
 from tvist_server.planning.filter_planner import PlannedFilter
 from tvist_server.planning.planner import Plan, Planner
+from tvist_server.programs.player import ProgramPlayer
 from tvist_server.refusal import RefusalError, check_content, check_joints
 from tvist_server.reporting import Reporter
 from tvist_server.safety_control import SafetyControl
@@ -67,6 +68,7 @@ class Controller:
         self.counters = Counters()
         self._events: list[Event] = []
         self._stop_reasons = StopReasons()
+        self._io_changed = True
         self._planner = Planner(setup)
         source, tvist = self._planner.filters.first()
         self.cycle = ControlCycle(
@@ -82,18 +84,20 @@ class Controller:
         collisions = CollisionModel(setup.description, body(setup.payload))
         self.motion = MotionControl(self.cycle, collisions, self._emit, setup.mode)
         self.session = Session(timeouts=setup.clock == "realtime")
-        self._authority = Authority(self.session, self.motion.interrupt, self._emit)
+        self._authority = Authority(self.session, self._interrupt, self._emit)
         safety = SafetyControl(self.motion, self._emit)
         self._faults = Faults(self.motion, safety)
+        self.programs = ProgramPlayer(
+            setup.description, self.motion, safety, self._move_by_program, self._emit
+        )
         self.filters = Filters(self.motion, source, setup.payload, self._emit)
         self._payload = DeclaredPayload(setup.payload, self.motion, self.filters, self._emit)
         self.peripherals = Peripherals(self._reporter.set_tcp)
         parts = (
             self._authority, MotionCommands(self.motion, safety), self.filters, self._payload, self.peripherals,
-            self._faults, self,
+            self._faults, self.programs, self,
         )  # fmt: skip
         self._rows = {row.message: row for part in parts for row in part.rows}
-        self._io_changed = True
         self.latest = self._state(self.cycle.standing)
         """State of the last tick; before the first, and where the arm was put somewhere since, how it stands there."""
 
@@ -101,7 +105,7 @@ class Controller:
     def rows(self) -> tuple[Row, ...]:
         """Commands on the whole robot."""
         return (
-            Row(c.SimulationReset, self._reset),
+            Row(c.SimulationReset, self._reset, changes_io=True),
             Row(c.SimulationStep, self._check_step),
         )
 
@@ -145,10 +149,7 @@ class Controller:
         row = self._rows[type(command)]
 
         def planned() -> Any:
-            found = (plan or self._planner.plan(command, self.basis)).found
-            if isinstance(found, RefusalError):
-                raise found
-            return found
+            return self._found(plan or self._planner.plan(command, self.basis))
 
         try:
             token: Any = getattr(command, "token", None)
@@ -201,6 +202,7 @@ class Controller:
     def tick(self) -> tuple[State, list[Event]]:
         """One control period."""
         self._watch_time()
+        self._io_changed |= self.programs.advance()
         try:
             sample = self.motion.step()
         except PlantError as error:
@@ -230,7 +232,9 @@ class Controller:
 
     def io(self) -> Io:
         """Inputs, outputs and registers as they are for the next tick."""
-        return self.peripherals.io(self.tick_number + 1, self.declared, self.motion.wanted_speed)
+        return self.peripherals.io(
+            self.tick_number + 1, self.declared, self.motion.wanted_speed, self.programs
+        )
 
     def changed_io(self) -> Io | None:
         """Inputs, outputs and registers where they changed since this was asked last, before a tick; else None."""
@@ -249,6 +253,7 @@ class Controller:
         self._events.append(event)
         if kind in {"protective_stop", "safety_stop"}:
             self._stop_reasons.note(event, self.motion.safety_mode)
+        self._io_changed |= self.programs.hear(event)
 
     def _watch_time(self) -> None:
         """End what is over, and what nobody keeps up."""
@@ -257,6 +262,22 @@ class Controller:
         if self.setup.clock == "realtime":
             self.motion.watch(self.now)
 
+    def _interrupt(self, why: str) -> None:
+        """End what nobody has control of any longer."""
+        self.programs.end()
+        self._io_changed = True
+        self.motion.interrupt(why)
+
+    def _move_by_program(self, command: c.MoveJ) -> int:
+        """Plan and start a motion of the program; its number."""
+        self.motion.check_move()
+        return self.motion.move(self._found(self._planner.plan(command, self.basis)))
+
+    def _found(self, plan: Plan) -> Any:
+        if isinstance(plan.found, RefusalError):
+            raise plan.found
+        return plan.found
+
     # ------------------------------------------------------------------ commands on the whole robot
 
     def _reset(self, call: Call[c.SimulationReset]) -> Reply:
@@ -264,6 +285,7 @@ class Controller:
         command = call.command
         check_content(command, self.setup.description)
         chosen: PlannedFilter | None = call.planned()
+        self.programs.end()
         self.motion.abandon("simulation.reset")
         self._faults.clear()
         q = self.cycle.position if command.q is None else np.array(command.q, dtype=float)

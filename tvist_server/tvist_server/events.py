@@ -20,6 +20,7 @@ class Fields(Told, total=False):
     id: int | None
     code: Code | None
     why: str | None
+    line: int | None
 
 
 class Emit(Protocol):

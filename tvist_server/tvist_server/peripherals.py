@@ -1,6 +1,7 @@
 """Terminals, registers and tool centre point of a robot: what commands set there, and what is told of it."""
 
 from collections.abc import Callable, Sequence
+from typing import Protocol
 
 from tvist_protocol.io import (
     BITS,
@@ -13,6 +14,7 @@ from tvist_protocol.io import (
     SetTcp,
     SimulationSetInputs,
 )
+from tvist_protocol.programs import ProgramState
 from tvist_protocol.values import Payload
 from tvist_server.command_row import Call, Row
 from tvist_server.refusal import RefusalError
@@ -35,6 +37,17 @@ def analog_share(value: float, *, voltage: bool) -> float:
     """Share of its range at which an analogue terminal gives a value [-]."""
     low, high = VOLTAGE if voltage else CURRENT
     return (value - low) / (high - low)
+
+
+class LoadedProgram(Protocol):
+    """What is told of the program; see `Io`."""
+
+    name: str | None
+    state: ProgramState
+
+    @property
+    def line(self) -> int:
+        """As in `Io`."""
 
 
 class Peripherals:
@@ -120,13 +133,14 @@ class Peripherals:
         else:
             self._doubles[bank][first:last] = [_double(k, value, bank) for k, value in enumerate(values)]
 
-    def io(self, tick: int, payload: Payload, speed: float) -> Io:
+    def io(self, tick: int, payload: Payload, speed: float, program: LoadedProgram) -> Io:
         """What is told of all that.
 
         Args:
             tick: First control period for which it holds.
             payload: Declared.
             speed: The speed slider [-].
+            program: The one that is loaded.
         """
         return Io(
             tick=tick,
@@ -145,6 +159,9 @@ class Peripherals:
             tcp_offset=list(self.tcp_offset),
             payload=payload,
             target_speed_fraction=speed,
+            program=program.name,
+            program_state=program.state,
+            program_line=program.line,
         )
 
     def _analog_output(self, number: int) -> float:

@@ -10,6 +10,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.calibration import Calibration
 from tvist_protocol.codec import MAX_BYTES, encode
 from tvist_protocol.io import SetIo, SetRegisters, SetTcp, SimulationSetInputs
+from tvist_protocol.programs import ProgramLoad, ProgramPlay, ProgramStop
 
 POSE = (1.57, -1.57, 1.57, -1.57, -1.57, 0.0)
 STRANGER = "none of ours"
@@ -64,6 +65,9 @@ class Messages:
             c.SetPayload(token=token, mass=mass, com=(0.0, 0.0, 0.04), inertia=(0.01, 0, 0, 0.01, 0, 0.01)),
             SetIo(token=token, digital_output_mask=255, digital_outputs=chance.randrange(256)),
             SetRegisters(bank="input_double", values=tuple(chance.uniform(-1.0, 1.0) for _ in range(24))),
+            ProgramLoad(name=chance.choice(("paper.urp", "nothing.urp"))),
+            ProgramPlay(token=token),
+            ProgramStop(token=token),
             SetTcp(token=token, offset=(0.0, 0.0, 0.1, 0.0, 0.0, 0.0)),
             SimulationSetInputs(token=token, digital_input_mask=255, digital_inputs=chance.randrange(256)),
             c.PowerOn(token=token),

@@ -57,11 +57,11 @@ class FakeControl:
         self.reply = Refused(code=code, where=where, why=why, limit=limit)
 
     def wait(self):
-        self._waiting = []
+        self._waiting = self._waiting or []
 
     def answer(self, reply=None):
         """Give every answer that is due; to one that asks again in it, too."""
-        waiting, self._waiting = self._waiting, None
+        waiting, self._waiting = self._waiting or [], None
         for then in waiting:
             then(reply or self.reply)
 

@@ -1,14 +1,17 @@
 """A robot as its doors see it, with programs."""
 
+from tests.server.robots import UR5E
+
 from tvist_server.gateways.ur.programs import Programs
 from tvist_server.gateways.ur.robot import NO_MODE
+from tvist_server.programs.built_in import built_in
 
 from .decoders import message
 
 
 def host(robot):
     """The fixture `robot`, with programs and what else the text doors share."""
-    robot.programs = Programs(robot)
+    robot.programs = Programs(robot, built_in(UR5E))
     robot.operational_mode = NO_MODE
     return robot
 

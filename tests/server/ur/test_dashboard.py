@@ -9,12 +9,13 @@ from hypothesis import strategies as st
 from tests.server.robots import UR5E
 
 from tvist_protocol import commands as c
+from tvist_protocol.programs import ProgramLoad, ProgramPlay, ProgramStop
 from tvist_protocol.replies import Accepted, Done, Refused
-from tvist_protocol.stream import Event
 from tvist_server.gateways.ur.dashboard.commands import COMMANDS, find
 from tvist_server.gateways.ur.dashboard.lines import LONGEST
 from tvist_server.gateways.ur.dashboard.session import MOST_WAITING, DashboardSession
 
+from .conftest import io
 from .decoders import message
 from .hosts import host, told
 
@@ -268,7 +269,7 @@ def test_a_program_is_loaded_played_paused_and_stopped(client, control):
     ]  # fmt: skip
     assert client.ask("get loaded program") == "Loaded program: /programs/wait_program.urp"
     assert client.ask("isProgramSaved") == "true wait_program.urp"
-    assert control.of(c.Stop)
+    assert control.of(ProgramStop)
 
 
 def test_one_segment_does_all_of_it_in_order(client, control, desk):
@@ -282,8 +283,8 @@ def test_one_segment_does_all_of_it_in_order(client, control, desk):
     assert client.heard() == []
     client.session.sample(at(102, runtime_state=1))
     assert client.heard() == ["Stopped", "STOPPED Q2.urp"]
-    assert control.of(c.MoveJ)[0].q == tuple(UR5E.poses["Q2"])
-    desk.programs.event(Event(tick=1, kind="motion_stopped", id=7))
+    assert [command.name for command in control.of(ProgramLoad)] == ["Q2.urp"]
+    assert len(control.of(ProgramPlay)) == 1
 
 
 PLAYING, STOPPING, STOPPED = 2, 0, 1
@@ -309,7 +310,7 @@ def test_what_was_stopped_rests_when_that_is_answered(client, control, desk, ask
 def test_what_others_move_is_stopped_too(client, control, desk):
     moved_to(desk, runtime_state=PLAYING)
     assert client.send("stop\n") == []
-    assert control.commands == [c.Stop()]
+    assert control.commands == [ProgramStop()]
     client.session.sample(at(101, runtime_state=STOPPED))
     assert client.heard() == ["Stopped"]
 
@@ -324,7 +325,7 @@ def test_what_does_not_come_to_rest_has_not_been_stopped(client, desk):
     assert client.ask("robotmode") == "Robotmode: RUNNING"
 
 
-def test_a_program_ends_with_the_power_and_not_with_a_power_off_that_was_refused(client, control):
+def test_a_program_ends_with_the_power_and_not_with_a_power_off_that_was_refused(client, control, desk):
     client.ask("load wait_program.urp")
     client.ask("play")
     control.refuse("no_control")
@@ -332,6 +333,7 @@ def test_a_program_ends_with_the_power_and_not_with_a_power_off_that_was_refused
     assert client.ask("running") == "Program running: true"
     control.reply = Done()
     client.ask("power off")
+    desk.programs.io(io(program="wait_program.urp"))
     assert client.ask("programState") == "STOPPED wait_program.urp"
 
 

@@ -84,19 +84,17 @@ class House(Sink):
 
     def io(self, io):
         self.latest_io = io
+        self.robot.programs.io(io)
 
     def event(self, event):
         self.robot.programs.event(event)
         for client in self.clients:
             client.session.event(event)
 
-    def journal(self, entry): ...
-
     def tick(self):
         self.answer()
         self.host.tick()
         snapshot = self.robot.latest = self.instruments.snapshot(self.latest, self.latest_io)
-        self.robot.programs.watch(snapshot)
         for client in self.clients:
             client.sampled = client.session.sample(snapshot)
         return snapshot

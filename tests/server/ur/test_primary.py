@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from tests.server.robots import UR5E, cut
 
 from tvist_protocol import commands as c
+from tvist_protocol.programs import ProgramStop
 from tvist_protocol.replies import Refused
 from tvist_protocol.stream import Event
 from tvist_server.gateways.ur import version
@@ -403,8 +404,8 @@ def test_nothing_that_comes_raises(pieces):
         ("power off", c.PowerOff(token="the-token")),
         ("set robotmode run", c.PowerOn(token="the-token")),
         ("set unlock protective stop", c.UnlockProtectiveStop(token="the-token")),
-        ("stop program", c.Stop()),
-        ("  stop   program  # now", c.Stop()),
+        ("stop program", ProgramStop()),
+        ("  stop   program  # now", ProgramStop()),
     ],
 )
 def test_commands_that_are_no_urscript_act(robot, control, sent, text, command):
@@ -416,7 +417,7 @@ def test_commands_that_are_no_urscript_act(robot, control, sent, text, command):
 
 def test_two_commands_in_one_segment(robot, control, sent):
     session(robot, control, sent.append).receive(b"stop program\nset robotmode run\n")
-    assert [type(command) for command in control.commands] == [c.Stop, c.PowerOn]
+    assert [type(command) for command in control.commands] == [ProgramStop, c.PowerOn]
 
 
 @pytest.mark.parametrize("text", ["set sim", "set real"])

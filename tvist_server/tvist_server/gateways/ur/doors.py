@@ -117,6 +117,8 @@ class UrDoors(Gateway):
         self._loop = asyncio.get_running_loop()
         places = Places[Connection](self._loop.time, self._coming_and_going.tell)
         self._connections = places.taken
+        if self._io is not None:
+            self.robot.programs.io(self._io)
         while self._early:
             self._see(self._early.popleft())
         for door, bound in self._sockets.items():
@@ -149,7 +151,7 @@ class UrDoors(Gateway):
             else:
                 self.dropped += 1
         elif isinstance(message, Io):
-            self._soon(lambda: setattr(self, "_io", message))
+            self._soon(lambda: self._on_io(message))
         elif isinstance(message, Event):
             self._soon(lambda: self._on_event(message))
 
@@ -192,9 +194,12 @@ class UrDoors(Gateway):
                 # What was made of the last tick knows it: without this both would wait for the collector.
                 self.robot.latest.shared.clear()
             snapshot = self.robot.latest = self._instruments.snapshot(state, self._io)
-            self.robot.programs.watch(snapshot)
             for connection in tuple(self._connections):
                 connection.sample(snapshot)
+
+    def _on_io(self, io: Io) -> None:
+        self._io = io
+        self.robot.programs.io(io)
 
     def _on_event(self, event: Event) -> None:
         self.robot.programs.event(event)

@@ -33,15 +33,9 @@ def release_brakes(robot: UrRobot, control: Control, outcome: Outcome) -> None:
     )
 
 
-def power_off(robot: UrRobot, control: Control, outcome: Outcome) -> None:
+def power_off(control: Control, outcome: Outcome) -> None:
     """Take the arm's power, once it stands; no program survives it."""
-
-    def off(refused: Refused | None) -> None:
-        if refused is None:
-            robot.programs.interrupt()
-        outcome(refused)
-
-    _change(control, lambda token: PowerOff(token=token), off, lambda: False)
+    _change(control, lambda token: PowerOff(token=token), outcome, lambda: False)
 
 
 def restart_safety(robot: UrRobot, control: Control, outcome: Outcome) -> None:
@@ -50,7 +44,7 @@ def restart_safety(robot: UrRobot, control: Control, outcome: Outcome) -> None:
     if latest is not None and latest.safety_mode in (SafetyMode.VIOLATION, SafetyMode.FAULT):
         _change(control, lambda token: RestartSafety(token=token), outcome, lambda: False)
     else:
-        power_off(robot, control, outcome)
+        power_off(control, outcome)
 
 
 def unlock(robot: UrRobot, control: Control, outcome: Outcome) -> None:

@@ -7,6 +7,7 @@ from tvist_plant.description import RobotDescription
 from tvist_server.gateways.ur.programs import Programs
 from tvist_server.gateways.ur.rtde.owners import InputOwners
 from tvist_server.instruments.snapshot import Snapshot
+from tvist_server.programs.built_in import built_in
 
 NO_MODE = "NONE"
 """Operational mode while nobody has set one."""
@@ -38,7 +39,7 @@ class UrRobot:
         self.operational_mode = NO_MODE
         """As the dashboard sets it."""
         self.inputs = InputOwners()
-        self.programs = Programs(self)
+        self.programs = Programs(self, built_in(description))
         self._tell = tell
         self._report = report
 

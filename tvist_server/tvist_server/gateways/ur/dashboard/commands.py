@@ -77,7 +77,7 @@ def _brake_release(request: Request) -> None:
 
 
 def _power_off(request: Request) -> None:
-    power.power_off(request.robot, request.control, request.unless_refused("Powering off"))
+    power.power_off(request.control, request.unless_refused("Powering off"))
 
 
 def _restart_safety(request: Request) -> None:
@@ -85,7 +85,7 @@ def _restart_safety(request: Request) -> None:
 
 
 def _shutdown(request: Request) -> None:
-    power.power_off(request.robot, request.control, request.unless_refused("Shutting down"))
+    power.power_off(request.control, request.unless_refused("Shutting down"))
 
 
 def _unlock(request: Request) -> None:
@@ -123,7 +123,7 @@ def _safety(number: int | None) -> str:
 
 def _load(request: Request) -> None:
     path, programs = request.argument, request.robot.programs
-    moves = not programs.standing
+    moves = programs.moves
     failed = f"Error while loading program: {path}"
 
     def heard(found: bool) -> None:
@@ -158,7 +158,7 @@ def _pause(request: Request) -> None:
 
 
 def _stop(request: Request) -> None:
-    moves, stopped = not request.robot.programs.standing, request.if_done("Stopped")
+    moves, stopped = request.robot.programs.moves, request.if_done("Stopped")
 
     def heard(well: bool) -> None:
         if well:

@@ -51,7 +51,7 @@ class Orders:
             case "power on":
                 power.power_on(robot, control, outcome)
             case "power off":
-                power.power_off(robot, control, outcome)
+                power.power_off(control, outcome)
             case "set robotmode run":
                 power.release_brakes(robot, control, outcome)
             case "set unlock protective stop":

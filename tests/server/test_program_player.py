@@ -1,0 +1,319 @@
+"""Programs: the controller carries them out by itself, line by line, with the authority of whoever played them."""
+
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tvist_protocol import commands as c
+from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramStop
+from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_server.programs.built_in import built_in
+
+from .robots import Q1, Q2, Q3, UR5E, Robot
+
+LONG = 3000
+"""Ticks that are enough for a line."""
+
+
+@pytest.fixture
+def robot():
+    return Robot(shaper="zv")
+
+
+def play(robot, name):
+    assert robot.send(ProgramLoad, name=name) == Done()
+    assert robot.send(ProgramPlay) == Done()
+
+
+def state(robot):
+    io = robot.controller.io()
+    return io.program, io.program_state, io.program_line
+
+
+def until(robot, wanted, ticks=30_000):
+    for _ in range(ticks):
+        robot.tick()
+        if wanted():
+            return
+    raise AssertionError("it never was so")
+
+
+def stopped(robot):
+    return lambda: state(robot)[1] == "STOPPED"
+
+
+def reached(robot):
+    """Where motions ended, by their targets."""
+    ends = {event.tick for event in robot.events if event.kind == "motion_done"}
+    return [pytest.approx(state.target_q, abs=1e-6) for state in robot.states if state.tick in ends]
+
+
+def test_there_is_a_program_for_each_pose_and_one_through_all_of_them_and_back():
+    known = built_in(UR5E)
+    assert set(known) == {"wait_program.urp", "paper.urp", "Q1.urp", "Q2.urp", "Q3.urp"}
+    assert [move.q for move in known["paper.urp"]] == [tuple(q) for q in (Q1, Q2, Q3, Q2, Q1)]
+    assert [move.q for move in known["Q2.urp"]] == [tuple(Q2)]
+
+
+def test_an_arm_without_poses_can_only_wait():
+    assert set(built_in(SimpleNamespace(poses={}))) == {"wait_program.urp"}
+
+
+def test_a_program_makes_its_moves_in_order_and_then_stops(robot):
+    play(robot, "paper.urp")
+    assert state(robot) == ("paper.urp", "PLAYING", 1)
+    until(robot, stopped(robot))
+    assert reached(robot) == [q.tolist() for q in (Q1, Q2, Q3, Q2, Q1)]
+    assert state(robot) == ("paper.urp", "STOPPED", 0)
+
+
+def test_a_line_begins_in_the_tick_after_the_one_before_has_ended(robot):
+    play(robot, "paper.urp")
+    until(robot, stopped(robot))
+    done = [event.tick for event in robot.events if event.kind == "motion_done"]
+    started = [event.tick for event in robot.events if event.kind == "motion_started"]
+    assert started == [1, *(tick + 1 for tick in done[:-1])]
+
+
+def test_what_it_does_is_told_in_io_before_the_tick_in_which_it_is_so(robot):
+    robot.controller.changed_io()
+    play(robot, "Q2.urp")
+    assert robot.controller.changed_io().program_state == "PLAYING"
+    until(robot, stopped(robot))
+    assert robot.controller.changed_io().program_state == "STOPPED"
+
+
+def test_it_can_be_played_again(robot):
+    for _ in range(2):
+        play(robot, "Q2.urp")
+        until(robot, stopped(robot))
+    assert len(reached(robot)) == 2
+
+
+def test_two_controllers_play_a_program_to_the_same_bits():
+    runs = []
+    for _ in range(2):
+        robot = Robot(shaper="ei3", q=tuple(Q2))
+        play(robot, "paper.urp")
+        robot.tick(700)
+        robot.send(ProgramPause)
+        robot.tick(500)
+        robot.send(ProgramPlay)
+        until(robot, stopped(robot))
+        runs.append(robot.states)
+    assert runs[0] == runs[1]
+
+
+@pytest.mark.parametrize(
+    ("mode", "code"), [("POWER_OFF", "wrong_mode"), ("IDLE", "wrong_mode"), ("RUNNING", None)]
+)
+def test_it_starts_where_the_arm_may_move(mode, code):
+    robot = Robot(mode=mode)
+    robot.send(ProgramLoad, name="wait_program.urp")
+    reply = robot.send(ProgramPlay)
+    assert reply == Done() if code is None else reply.code == code
+
+
+def test_what_was_not_loaded_cannot_play_and_what_is_not_there_cannot_be_loaded(robot):
+    assert robot.send(ProgramPlay).code == "wrong_mode"
+    refused = robot.send(ProgramLoad, name="nothing.urp")
+    assert (refused.code, refused.where) == ("out_of_range", "name")
+    assert "paper.urp" in refused.why
+    assert state(robot) == (None, "STOPPED", 0)
+
+
+def test_loading_and_stopping_are_for_anyone_and_playing_and_pausing_are_not(robot):
+    receive = robot.controller.receive
+    assert receive(ProgramLoad(name="Q2.urp")) == Done()
+    assert receive(ProgramPlay(token="x")).code == "stale_token"
+    robot.send(ProgramPlay)
+    assert receive(ProgramPause(token="x")).code == "stale_token"
+    assert receive(ProgramStop(token="x")).code == "stale_token"
+    robot.tick(100)
+    assert receive(ProgramStop()) == Done()
+    assert state(robot)[1] == "STOPPED"
+    robot.tick(LONG)
+    assert [event.kind for event in robot.events][-1] == "motion_stopped"
+    assert robot.controller.cycle.at_rest
+
+
+def test_a_move_that_cannot_be_made_ends_it_with_its_line(robot):
+    programs = robot.controller.programs
+    lines = programs.known["paper.urp"]
+    programs.known["bad.urp"] = (lines[1], SimpleNamespace(pose="floor", q=(0.0, 0.9, 0.0, 0.0, 0.0, 0.0)))
+    play(robot, "bad.urp")
+    until(robot, stopped(robot))
+    warning = robot.events[-1]
+    assert (warning.kind, warning.code, warning.line) == ("warning", "collision", 2)
+    assert warning.why.startswith("move to floor was refused: ")
+    robot.tick(LONG)
+    assert len(reached(robot)) == 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "fields"),
+    [(c.Stop, {}), (c.PowerOff, {}), (c.ReleaseControl, {}), (c.SimulationReset, {"q": tuple(Q1)})]
+    + [(c.SimulationInject, {"fault": fault}) for fault in ("emergency_stop", "power_loss", "violation")],
+)
+def test_what_ends_a_motion_for_good_ends_the_program(robot, kind, fields):
+    play(robot, "paper.urp")
+    robot.tick(700)
+    robot.send(kind, **fields)
+    robot.tick(LONG)
+    assert state(robot)[1] == "STOPPED"
+    started = sum(event.kind == "motion_started" for event in robot.events)
+    ended = sum(event.kind in {"motion_done", "motion_stopped"} for event in robot.events)
+    assert started == ended
+
+
+@pytest.mark.parametrize(
+    ("kind", "fields"),
+    [(c.PowerOff, {}), (c.ReleaseControl, {}), (c.SimulationReset, {}), (ProgramStop, {})],
+)
+def test_a_program_that_waits_ends_with_power_and_control_too(robot, kind, fields):
+    play(robot, "wait_program.urp")
+    robot.tick(10)
+    assert state(robot)[1] == "PLAYING"
+    robot.send(kind, **fields)
+    robot.tick(10)
+    assert state(robot)[1] == "STOPPED"
+
+
+def test_a_program_ends_with_the_client_that_has_control():
+    robot = Robot(clock="realtime", lease_s=0.5)
+    play(robot, "paper.urp")
+    robot.tick(400)
+    assert state(robot)[1] == "STOPPED"
+    assert any(event.kind == "lease_lost" for event in robot.events)
+
+
+def test_a_program_goes_on_for_the_client_that_control_is_handed_to(robot):
+    play(robot, "paper.urp")
+    robot.tick(100)
+    robot.send(c.HandOver, client="b")
+    until(robot, stopped(robot))
+    assert len(reached(robot)) == 5
+
+
+def test_a_protective_stop_pauses_it_and_playing_goes_on_with_the_line_that_was_stopped(robot):
+    play(robot, "paper.urp")
+    until(robot, lambda: len(reached(robot)) == 1)
+    robot.tick(300)
+    robot.send(c.SimulationInject, fault="protective_stop")
+    robot.tick(LONG)
+    assert state(robot) == ("paper.urp", "PAUSED", 2)
+    refused = robot.send(ProgramPlay)
+    assert "unlock_protective_stop" in refused.why
+    assert robot.send(c.UnlockProtectiveStop) == Done()
+    robot.tick(LONG)
+    assert state(robot) == ("paper.urp", "PAUSED", 2)
+    assert robot.send(ProgramPlay) == Done()
+    until(robot, stopped(robot))
+    assert reached(robot) == [q.tolist() for q in (Q1, Q2, Q3, Q2, Q1)]
+
+
+def test_pause_holds_the_motion_and_play_goes_on_with_it(robot):
+    play(robot, "Q2.urp")
+    robot.tick(300)
+    assert robot.send(ProgramPause) == Done()
+    robot.tick(1000)
+    held = robot.states[-1]
+    robot.tick(100)
+    assert robot.states[-1].target_q == pytest.approx(held.target_q)
+    assert state(robot) == ("Q2.urp", "PAUSED", 1)
+    assert robot.send(ProgramPause).code == "wrong_mode"
+    assert robot.send(ProgramPlay) == Done()
+    assert robot.send(ProgramPlay).code == "busy"
+    until(robot, stopped(robot))
+    assert reached(robot) == [Q2.tolist()]
+
+
+def test_a_motion_that_ends_while_it_is_paused_leaves_the_next_line_to_play(robot):
+    play(robot, "paper.urp")
+    until(robot, lambda: len(reached(robot)) == 1)
+    until(robot, lambda: robot.events[-1].kind == "motion_started")
+    robot.tick(440)  # it brakes: a pause would not end it sooner
+    robot.send(ProgramPause)
+    robot.tick(LONG)
+    _, now, line = state(robot)
+    assert now == "PAUSED"
+    robot.send(ProgramPlay)
+    until(robot, stopped(robot))
+    assert line in {2, 3}
+    assert reached(robot) == [q.tolist() for q in (Q1, Q2, Q3, Q2, Q1)]
+
+
+def test_a_safeguard_holds_the_motion_and_the_program_waits_with_it(robot):
+    play(robot, "Q2.urp")
+    robot.tick(200)
+    robot.send(c.SimulationInject, fault="safeguard_stop")
+    robot.tick(1000)
+    assert state(robot)[1] == "PLAYING"
+    robot.send(c.SimulationInject, fault="normal")
+    until(robot, stopped(robot))
+    assert reached(robot) == [Q2.tolist()]
+
+
+def test_loading_another_stops_the_one_that_runs(robot):
+    play(robot, "paper.urp")
+    robot.tick(700)
+    robot.send(ProgramLoad, name="Q3.urp")
+    assert state(robot) == ("Q3.urp", "STOPPED", 0)
+    robot.tick(LONG)
+    assert [event.kind for event in robot.events][-1] == "motion_stopped"
+
+
+COMMANDS = {
+    "load": (ProgramLoad, {"name": "paper.urp"}),
+    "wait": (ProgramLoad, {"name": "wait_program.urp"}),
+    "play": (ProgramPlay, {}),
+    "pause": (ProgramPause, {}),
+    "stop": (ProgramStop, {}),
+    "motion pause": (c.Pause, {}),
+    "motion resume": (c.Resume, {}),
+    "motion stop": (c.Stop, {}),
+    "move": (c.MoveJ, {"q": tuple(Q2)}),
+    "protective": (c.SimulationInject, {"fault": "protective_stop"}),
+    "safeguard": (c.SimulationInject, {"fault": "safeguard_stop"}),
+    "normal": (c.SimulationInject, {"fault": "normal"}),
+    "unlock": (c.UnlockProtectiveStop, {}),
+    "power off": (c.PowerOff, {}),
+    "power on": (c.PowerOn, {}),
+    "release": (c.ReleaseControl, {}),
+    "take": (c.TakeControl, {"client": "a"}),
+}
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.tuples(st.sampled_from(sorted(COMMANDS)), st.sampled_from([0, 1, 3, 100, 600])), max_size=25)
+)
+def test_whatever_happens_every_motion_ends_once_and_only_a_playing_program_begins_one(steps):
+    robot = Robot(shaper="ei3")
+    ours, wanted = set(), set()
+    for name, ticks in steps:
+        kind, fields = COMMANDS[name]
+        reply = robot.send(kind, **fields)
+        if isinstance(reply, Accepted) and reply.token is not None:
+            robot.token = reply.token
+        if isinstance(reply, Accepted) and reply.id is not None:
+            ours.add(reply.id)
+        for _ in range(ticks):
+            playing = state(robot)[1] == "PLAYING"
+            known = len(robot.events)
+            robot.tick()
+            begun = {event.id for event in robot.events[known:] if event.kind == "motion_started"} - ours
+            assert playing or not begun
+            wanted |= begun
+            if robot.controller.session.lease is None:
+                assert state(robot)[1] == "STOPPED"
+            if robot.states[-1].robot_mode != 7:
+                assert state(robot)[1] == "STOPPED" or playing
+    robot.send(ProgramStop)
+    if isinstance(robot.send(c.SimulationReset), Refused):
+        robot.controller.receive(c.Stop())
+    robot.tick(LONG)
+    ended = [event.id for event in robot.events if event.kind in {"motion_done", "motion_stopped"}]
+    assert sorted(ended) == sorted(ours | wanted)
