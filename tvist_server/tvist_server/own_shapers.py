@@ -14,6 +14,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from msgspec import Struct
+
 from tvist_plant.user_file import read_bytes
 from tvist_shaping.errors import ShaperFailureError, ShapingError
 from tvist_shaping.fir_shaper import FirShaper
@@ -26,6 +28,19 @@ _FILE = re.compile(r"(?P<file>.*\.py)(?::(?P<attribute>.*))?", re.DOTALL)
 
 class OwnShaperError(ValueError):
     """A file holds no such shaper; the sentence names file and name, and says why."""
+
+
+class RecordedShaper(Struct, frozen=True):
+    """What a recording says of a shaper from a file."""
+
+    name: str
+    """What it is called on the wire and in tables."""
+    file: str
+    """Path, as it was given."""
+    attribute: str
+    """Name in the file."""
+    sha256: str
+    """Of the file, in hexadecimal."""
 
 
 @dataclass(frozen=True)
@@ -51,9 +66,10 @@ class OwnShaper:
         """FILE.py:NAME."""
         return f"{self.file}:{self.attribute}"
 
-    def to_builtins(self) -> dict[str, str]:
+    @property
+    def recorded(self) -> RecordedShaper:
         """What a recording says of it."""
-        return {"name": self.name, "file": self.file, "attribute": self.attribute, "sha256": self.sha256}
+        return RecordedShaper(self.name, self.file, self.attribute, self.sha256)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel to another process as the file's name: a function cannot."""
@@ -77,7 +93,11 @@ def load_own(place: str) -> OwnShaper:
         UserFileError: It is no file with a text of at most 4 MiB.
     """
     named = _FILE.fullmatch(place)
-    file, attribute = (named["file"], named["attribute"]) if named is not None else (place, None)
+    if named is None:
+        raise OwnShaperError(
+            f"shaper is {place!r}: must be FILE.py:NAME, a Python file and the name of a shaper in it"
+        )
+    file, attribute = named["file"], named["attribute"]
     if not attribute:
         raise OwnShaperError(f"shaper {place}: the name of a shaper in the file is missing: give {file}:NAME")
     try:

@@ -98,7 +98,7 @@ class Setup:
             "seed": self.seed,
             "clock": self.clock,
             "truth": self.truth,
-            "own_shapers": [own.to_builtins() for own in self.own_shapers],
+            "own_shapers": [msgspec.to_builtins(own.recorded) for own in self.own_shapers],
         }
 
     @classmethod
