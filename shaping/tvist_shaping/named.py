@@ -40,17 +40,19 @@ DESIGNS: Mapping[str, Callable[[], Design]] = MappingProxyType(
 """Designs of constant mean delay against an arm's four lowest modes: one that leaves less, one that is shorter, and one
 that knows where a motion will end."""
 
+PERIOD = 0.002
+"""Tick of every filter that is made by its name [s]."""
 _NAME = re.compile(r"[a-z0-9][a-z0-9_.,()-]{0,63}")
 
 
 class Registry:
-    """Filters by name: those of this package, and shapers of one's own beside them. It never changes.
+    """Filters by name for references of 500 Hz: those of this package, and shapers of one's own. It never changes.
 
     Args:
         own: Shapers of one's own, `Shaper` or `FirShaper`.
 
     Raises:
-        DesignError: A name cannot be one, or is another shaper's.
+        DesignError: A name cannot be one, or is another shaper's; or a `FirShaper` is for another period.
     """
 
     own: Mapping[str, AnyShaper]
@@ -63,6 +65,8 @@ class Registry:
                 raise DesignError("name", shaper.name, limit)
             if shaper.name in SHAPERS or shaper.name in DESIGNS or shaper.name in found:
                 raise DesignError("name", shaper.name, "another: there is a shaper of that name already")
+            if isinstance(shaper, FirShaper) and shaper.period != PERIOD:
+                raise DesignError("period", shaper.period, f"{PERIOD:g} s, as that of all filters by name")
             found[shaper.name] = shaper
         self.own = MappingProxyType(found)
 
@@ -137,7 +141,7 @@ def make_filter(shaper: str | AnyShaper, estimator: Estimator, *, joints: int) -
 
     Raises:
         UnknownShaperError: There is no shaper of that name.
-        DesignError: The name of the own shaper cannot be one, or is another's.
+        DesignError: The name of the own shaper cannot be one, or is another's; or it is for another period.
         FilterError: Shaper and estimator do not go together.
         ShaperFailureError: The function of the own shaper fails for the modes at q = 0.
     """

@@ -240,6 +240,10 @@ class TestRegistry:
         with pytest.raises(DesignError, match="name is "):
             Registry([mean(name=name)])
 
+    def test_a_filter_for_another_period_is_refused(self):
+        with pytest.raises(DesignError, match=r"period is 0\.004"):
+            Registry([FirShaper("mine", "", lambda _f_d, _zeta: [1.0], taps=1, period=0.004)])
+
     def test_two_of_one_name_are_refused(self):
         with pytest.raises(DesignError, match="there is a shaper of that name already"):
             Registry([mean(), custom("mean", [1.0], [0.0])])

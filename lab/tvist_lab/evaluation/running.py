@@ -62,7 +62,7 @@ def sound(tvist: Filter) -> Callable[[Floats], Floats]:
     def step(q: Floats) -> Floats:
         shaped = tvist.filter(q)
         if tvist.fault is not None:
-            raise ShaperFaultError(f"{tvist.fault}")
+            raise ShaperFaultError(tvist.fault)
         return shaped
 
     return step

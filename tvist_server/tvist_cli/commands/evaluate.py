@@ -87,15 +87,18 @@ def evaluate(
         Job(plant, move, recipe, others, seed=_arm_seed(seed, place)) for place, move in enumerate(chosen)
     ]
     judged: list[Judged] = []
-    with told(OSError, ShaperFaultError):
+    with told(OSError):
         if save_moves is not None:
             from tvist_lab.evaluation.moves import write_moves
 
             write_moves(save_moves, chosen)
         with progress(sum(job.motions for job in jobs), "motions") as bar:
-            for job, one in zip(jobs, run(jobs), strict=True):
-                judged.append(one)
-                bar(job.motions, None)
+            try:
+                for job, one in zip(jobs, run(jobs), strict=True):
+                    judged.append(one)
+                    bar(job.motions, None)
+            except ShaperFaultError as fault:
+                raise Failure(f"shaper {shaper} {fault}") from fault
         if figures is not None:
             _draw(jobs, judged, figures)
     from tvist_lab.evaluation.moves import collisions
