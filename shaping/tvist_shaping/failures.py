@@ -3,15 +3,12 @@
 from typing import Final
 
 from tvist_shaping._types import Floats
+from tvist_shaping.errors import ShaperFailureError
 
 FAILURES: Final = (Exception, SystemExit)
 """What a function that somebody else wrote may raise. Control+C is not its doing."""
 ROUNDING: Final = 1e-6
 """Share by which a figure may be beyond what its shaper declares [-]."""
-
-
-class FailedError(Exception):
-    """A function gave something else than it should; the words go on after the shaper's name."""
 
 
 def failure(error: BaseException, f_d: Floats, zeta: Floats) -> str:
@@ -28,8 +25,8 @@ def failure(error: BaseException, f_d: Floats, zeta: Floats) -> str:
 
 def words(error: BaseException) -> str:
     """What goes on after a shaper's name: `raises ValueError: …`, or what it gives that is wrong."""
+    if isinstance(error, ShaperFailureError):
+        return error.why
     said = " ".join(str(error).split())[:200]
-    if isinstance(error, FailedError):
-        return said
     name = type(error).__name__
     return f"raises {name}: {said}" if said else f"raises {name}"

@@ -4,9 +4,9 @@ import math
 
 from tvist_shaping._types import Floats
 from tvist_shaping.base import Filter
-from tvist_shaping.errors import FilterError
+from tvist_shaping.errors import FilterError, ShaperFailureError
 from tvist_shaping.estimators.base import Estimator
-from tvist_shaping.failures import FAILURES, ROUNDING, FailedError, failure
+from tvist_shaping.failures import FAILURES, ROUNDING, failure
 from tvist_shaping.impulses import UNSHAPED, Impulses, product
 from tvist_shaping.shaper import Shaper
 
@@ -169,7 +169,9 @@ class TvistFilter(Filter):
         trains = [give(f, z) for f, z in zip(self.f_d.tolist(), self.zeta.tolist(), strict=True)]
         impulses = trains[0] if len(trains) == 1 else product(trains)
         if impulses.duration > self._longest * (1.0 + ROUNDING):
-            raise FailedError(f"gives impulses that last {impulses.duration:g} s, beyond {self._longest:g} s")
+            raise ShaperFailureError(
+                self.name, f"gives impulses that last {impulses.duration:g} s, beyond {self._longest:g} s"
+            )
         return impulses
 
     def _weigh(self) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tvist_shaping._types import Floats
-from tvist_shaping.errors import DesignError
-from tvist_shaping.failures import ROUNDING, FailedError
+from tvist_shaping.errors import DesignError, ShaperFailureError
+from tvist_shaping.failures import ROUNDING
 from tvist_shaping.impulses import Impulses
 from tvist_shaping.steady import Design
 
@@ -66,18 +66,22 @@ class FirShaper:
 
         Raises:
             Exception: Whatever the function raises.
-            FailedError: It gives no taps of sum 1, or others than are declared.
+            ShaperFailureError: It gives no taps of sum 1, or others than are declared.
         """
         given = np.array(self.function(f_d.copy(), zeta.copy()), dtype=float)
         if given.ndim != 1 or not 1 <= given.size <= self.taps:
-            raise FailedError(f"gives taps of shape {given.shape}, but must give 1 to {self.taps}")
+            raise ShaperFailureError(
+                self.name, f"gives taps of shape {given.shape}, but must give 1 to {self.taps}"
+            )
         if not np.isfinite(given).all():
-            raise FailedError("gives taps that are not finite")
+            raise ShaperFailureError(self.name, "gives taps that are not finite")
         if abs(given.sum() - 1.0) >= 1e-9:
-            raise FailedError(f"gives taps that sum to {float(given.sum())!r}, but must sum to 1 within 1e-9")
+            raise ShaperFailureError(
+                self.name, f"gives taps that sum to {float(given.sum())!r}, but must sum to 1 within 1e-9"
+            )
         if (most := float(np.abs(given).sum())) > self.peak * (1.0 + ROUNDING):
-            raise FailedError(
-                f"gives taps whose magnitudes sum to {most:g}, beyond its peak of {self.peak:g}"
+            raise ShaperFailureError(
+                self.name, f"gives taps whose magnitudes sum to {most:g}, beyond its peak of {self.peak:g}"
             )
         return np.pad(given, (0, self.taps - given.size))
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tvist_shaping.failures import FailedError
+from tvist_shaping.errors import ShaperFailureError
 from tvist_shaping.impulses import Impulses
 from tvist_shaping.sensitivity import band
 
@@ -38,11 +38,11 @@ class Shaper:
 
         Raises:
             Exception: Whatever the function raises.
-            FailedError: It gives something else.
+            ShaperFailureError: It gives something else.
         """
         impulses = self.function(f_d, zeta)
         if not isinstance(impulses, Impulses):
-            raise FailedError(f"gives {type(impulses).__name__} where Impulses are wanted")
+            raise ShaperFailureError(self.name, f"gives {type(impulses).__name__} where Impulses are wanted")
         return impulses
 
     def band(self, V: float = 0.05, zeta: float = 0.0) -> tuple[float, float]:
