@@ -13,12 +13,14 @@ from tvist_protocol import commands as c
 from tvist_protocol.journal import entry_of
 from tvist_protocol.modes import SafetyMode
 from tvist_protocol.replies import Done, Refused
+from tvist_protocol.values import Frequency
 from tvist_server.about import info_of
 from tvist_server.config import ConfigError, from_mapping, read_toml
 from tvist_server.own_shapers import OwnShaper, OwnShaperError, is_file, load_own
 from tvist_server.planning.planner import Planner
 from tvist_server.setup import Setup
 from tvist_shaping import FirShaper, Impulses, Shaper, zv
+from tvist_shaping.own import TRIED_F_D
 
 from .robots import PAPER, Q1, Q2, Q3, H, Robot, calibration, setup
 
@@ -119,6 +121,11 @@ class TestLoading:
         file.write_text(MINE)
         with pytest.raises(OwnShaperError, match="has changed"):
             pickle.loads(other)  # noqa: S301  likewise
+
+
+def test_it_is_tried_out_for_every_frequency_that_a_client_may_tell():
+    bounds = Frequency.__metadata__[0]
+    assert (bounds.ge, bounds.le) == TRIED_F_D
 
 
 class TestStart:
