@@ -15,6 +15,11 @@ TRIED_F_D = (0.1, 200.0)
 _F_D = np.geomspace(*TRIED_F_D, 23)
 _SHARES = np.array([*np.linspace(0.0, 1.0, 24, endpoint=False), 0.99])
 """Of the highest damping ratio that a shaper is made for [-]."""
+_DECLARED = (
+    ("duration_periods", 0.0, 1e6, "a number from 0 to 1e6"),
+    ("zeta_max", 1e-6, 1.0, "a number from 1e-6 to 1"),
+    ("peak", 1.0, 1e6, "a number from 1 to 1e6"),
+)
 _APART = 1.7
 """Ratio of a mode's frequency to that of the one below it, where a FIR filter is tried out."""
 
@@ -44,7 +49,7 @@ def shaper_of(
     if not 0.0 < zeta_max <= 1.0:
         raise DesignError("zeta_max", zeta_max, "above 0 and at most 1")
     called = name or getattr(function, "__name__", "own")
-    lines = (function.__doc__ or "").strip().splitlines()
+    lines = str(function.__doc__ or "").strip().splitlines()
     what = description or (lines[0] if lines else "a shaper of your own")
     trial = Shaper(called, what, function, np.inf, zeta_max, np.inf)
     duration, peak = _tried(trial)
@@ -55,9 +60,14 @@ def check_shaper(shaper: Shaper | FirShaper) -> None:
     """Try a shaper out: over modes of 0.1 to 200 Hz, and damping ratios up to the highest it is made for.
 
     Raises:
+        DesignError: What it declares cannot be.
         ShaperFailureError: Its function raises, gives no weights of sum 1, or gives others than the shaper declares.
     """
     if isinstance(shaper, Shaper):
+        for field, low, high, limit in _DECLARED:
+            value = getattr(shaper, field)
+            if not (isinstance(value, int | float) and low <= value <= high):
+                raise DesignError(field, value, limit)
         _tried(shaper)
         return
     ratios = _APART ** np.arange(shaper.modes)

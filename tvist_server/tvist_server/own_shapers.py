@@ -106,12 +106,11 @@ def load_own(place: str) -> OwnShaper:
         raise OwnShaperError(f"shaper {place}: {file} cannot be read: {error.strerror}") from error
     sha256 = hashlib.sha256(content).hexdigest()
     module = _run(content, place, file, sha256)
-    try:
-        found = getattr(module, attribute)
-    except AttributeError:
+    if attribute not in vars(module):
         there = ", ".join(name for name, value in vars(module).items() if _may_be_one(value, module.__name__))
         known = f"it has {there}" if there else "nothing in it is a shaper"
-        raise OwnShaperError(f"shaper {place}: {file} has no {attribute}; {known}") from None
+        raise OwnShaperError(f"shaper {place}: {file} has no {attribute}; {known}")
+    found = vars(module)[attribute]
     try:
         shaper = _shaper(found, attribute, place)
         Registry([shaper])
