@@ -54,6 +54,7 @@ lock:
 
 schemas: setup
 	$(BIN)/python -m tvist_protocol.generate
+	$(BIN)/python -m tvist_shaping.reference
 
 clean:
 	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache

@@ -3,13 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from tvist_lab.mcap_file import RecordingFile
 from tvist_protocol.commands import HandOver, Setpoint, TakeControl
-from tvist_protocol.errors import TvistError
+from tvist_protocol.content import checked
+from tvist_protocol.errors import ProtocolError, TvistError
 from tvist_protocol.journal import Entry, message_of
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.controller import Controller
+from tvist_server.own_shapers import OwnShaper, RecordedShaper
 from tvist_server.presence import Presence
 from tvist_server.recording import Recorder
 from tvist_server.setup import Setup
@@ -28,6 +31,8 @@ class Replay:
     truths: list[Truth] = field(default_factory=list)
     first_difference: str | None = None
     """Where it leaves the first run; None: nowhere."""
+    notes: list[str] = field(default_factory=list)
+    """What a person should know of it."""
 
 
 def replay(setup: Setup, journal: Sequence[Entry], states: Sequence[State]) -> Replay:
@@ -54,15 +59,20 @@ def replay(setup: Setup, journal: Sequence[Entry], states: Sequence[State]) -> R
     return done
 
 
-def replay_file(content: RecordingFile, output: Path | None = None) -> Replay:
+def replay_file(
+    content: RecordingFile, output: Path | None = None, own_shapers: Sequence[OwnShaper] = ()
+) -> Replay:
     """Replay a recording from its own start.
 
     Args:
         content: The recording, from the server's first tick on.
         output: MCAP file for the second run.
+        own_shapers: Shapers from files that the robot was served with, loaded again. Where a file has changed since, a
+            note says so.
 
     Raises:
-        ReplayError: The recording does not say how its robot started, or begins too late.
+        ReplayError: The recording does not say how its robot started, or begins too late; or a shaper from a file is
+            missing, or is one too many.
         ValueError: What it says of the start is wrong.
     """
     if not content.start:  # a recording made from outside has an empty one
@@ -73,10 +83,40 @@ def replay_file(content: RecordingFile, output: Path | None = None) -> Replay:
         raise ReplayError(
             "the recorder dropped messages of its journal: no equal run can be made of what is left"
         )
-    done = replay(setup := Setup.from_builtins(content.start), content.journal, content.states)
+    used, notes = _used(content.start, own_shapers)
+    setup = Setup.from_builtins(content.start, used)
+    done = replay(setup, content.journal, content.states)
+    done.notes = notes
     if output is not None:
         _write(setup, content, done, output)
     return done
+
+
+def _used(start: dict[str, Any], given: Sequence[OwnShaper]) -> tuple[list[OwnShaper], list[str]]:
+    """The shapers from files in the order in which they were loaded, and a note for each file that has changed."""
+    try:
+        recorded = checked(start.get("own_shapers", []), list[RecordedShaper])
+    except ProtocolError as error:
+        raise ReplayError(f"own_shapers of the recording's start: {error.why}") from error
+    by_name = {own.name: own for own in given}
+    used, notes = [], []
+    for one in recorded:
+        place = f"{one.file}:{one.attribute}"
+        own = by_name.pop(one.name, None)
+        if own is None:
+            raise ReplayError(
+                f"the robot was served with the shaper {one.name} of {place}, which a recording does not hold: "
+                f"give --shaper {place}, or where the file is now"
+            )
+        used.append(own)
+        if own.sha256 != one.sha256:
+            notes.append(
+                f"{own.file} has changed since the recording was made: states may differ for that reason"
+            )
+    if by_name:
+        name, own = next(iter(by_name.items()))
+        raise ReplayError(f"the robot was served without the shaper {name} of {own.place}: leave it out")
+    return used, notes
 
 
 def _write(setup: Setup, content: RecordingFile, done: Replay, output: Path) -> None:

@@ -80,7 +80,8 @@ HAPPENINGS: dict[str, str] = {
     "at_rest": "the shaped reference has come to rest",
     "interruption": "motion must end: the lease did, a set-point failed to come for 250 ms, something would meet",
     "brakes": "the power is gone, by a fault or the safety system: the brakes close at once",
-    "protective_stop": "a drive's torque was beyond its limit for more than 10 ms, or the fault was injected",
+    "protective_stop": "a drive's torque was beyond its limit for more than 10 ms, a shaper of one's own failed, or "
+    "the fault was injected",
     "plant_failure": "the simulated arm's state was no longer finite: it was put at rest where its reference was",
     "lease_end": "nobody renewed the lease, or its client's liveliness token went",
 }

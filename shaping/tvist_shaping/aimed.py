@@ -30,9 +30,7 @@ class AimedFilter(SteadyFilter):
         if q is None:
             self._start()
             return
-        self.f_d, self.zeta = self.estimator.settle(np.asarray(q, dtype=float))
-        done = self.design.start(self.f_d, self.zeta, self._designed)
-        self.clipped = not done or self.estimator.clipped
+        self._ask(self.estimator.settle(np.asarray(q, dtype=float)), None)
         self._taps[:] = self._designed
         self._aimed = True
 

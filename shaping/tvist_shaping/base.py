@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from tvist_shaping._types import Floats
 from tvist_shaping.delay_line import DelayLine
-from tvist_shaping.errors import FilterError
+from tvist_shaping.errors import FilterError, ShaperFailureError
 from tvist_shaping.estimators.base import Estimator
 
 
@@ -27,6 +27,8 @@ class Filter(ABC):
             small: who makes the reference can stay that much below a limit [-].
         clipped: Whether it could not do what it should at the last tick: a delay was beyond what it holds, or a mode
             beyond what its estimator believes.
+        fault: Why the shaper's function failed when it was asked last; None: it did not. A filter in the middle of a
+            motion cannot stop dead, so it goes on with the last weights it had, and somebody should stop the motion.
     """
 
     name: str
@@ -37,6 +39,7 @@ class Filter(ABC):
     zeta: Floats
     excess: float
     clipped: bool
+    fault: str | None
 
     def __init__(self, name: str, estimator: Estimator, joints: int, period: float, capacity: int) -> None:
         """The parts that all filters have; a filter of its own kind then calls `reset`.
@@ -57,7 +60,7 @@ class Filter(ABC):
             raise FilterError("period", period, "a finite number of seconds above 0")
         self.name, self.estimator = name, estimator
         self.joints, self.period = joints, period
-        self.excess, self.clipped = 0.0, False
+        self.excess, self.clipped, self.fault = 0.0, False, None
         self._line = DelayLine(joints, capacity)
         self._reach = capacity
         """How many of the newest samples any weights may read."""
@@ -169,6 +172,15 @@ class Filter(ABC):
         if self.settled:
             return self.estimator.settle(self._q_star)
         return self.estimator.estimate(self._q_star)
+
+    def _check_made(self) -> None:
+        """Refuse a shaper that fails at once: there are no weights yet to go on with.
+
+        Raises:
+            ShaperFailureError: It fails.
+        """
+        if self.fault is not None:
+            raise ShaperFailureError(self.name, self.fault)
 
     def take_over(self, other: "Filter") -> None:
         """Go on where another filter is: with the reference it was given, from the shaped one it gave.

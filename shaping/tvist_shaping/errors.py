@@ -7,6 +7,7 @@ ShapingError
 │   ├── DesignError       a parameter of a shaper's design is wrong
 │   └── EstimatorError    an estimator's parameter is wrong
 ├── UnknownShaperError    a name that is not in the catalogue
+├── ShaperFailureError    a shaper's function fails, or breaks what its shaper declares
 ├── ConvergenceError      a design has no solution
 ├── DelayError            a delay the line does not hold
 └── FilterError           shaper, estimator and delay line do not fit each other
@@ -68,6 +69,20 @@ class UnknownShaperError(ShapingError):
 
 class DesignError(ParameterError):
     """A parameter of a shaper's design is wrong."""
+
+
+class ShaperFailureError(ShapingError):
+    """A shaper's function raises, gives no weights, or gives others than its shaper declares.
+
+    Attributes:
+        name: The shaper's name.
+        why: What is wrong, and for which modes.
+    """
+
+    def __init__(self, name: str, why: str) -> None:
+        super().__init__(f"shaper {name!r} {why}")
+        self.name = name
+        self.why = why
 
 
 class ConvergenceError(ShapingError):

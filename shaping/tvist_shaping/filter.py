@@ -4,9 +4,10 @@ import math
 
 from tvist_shaping._types import Floats
 from tvist_shaping.base import Filter
-from tvist_shaping.errors import FilterError
+from tvist_shaping.errors import FilterError, ShaperFailureError
 from tvist_shaping.estimators.base import Estimator
-from tvist_shaping.impulses import Impulses, product
+from tvist_shaping.failures import FAILURES, ROUNDING, failure
+from tvist_shaping.impulses import UNSHAPED, Impulses, product
 from tvist_shaping.shaper import Shaper
 
 
@@ -65,6 +66,7 @@ class TvistFilter(Filter):
             FilterError: A number is out of range; or the shaper would last longer than max_delay at the
                 estimator's lowest frequency; or the estimator's highest damping is beyond the shaper's.
             EstimatorError: The estimator needs more joints.
+            ShaperFailureError: The shaper's function fails for the modes at q = 0.
         """
         if not 0.0 < period < math.inf:
             raise FilterError("period", period, "a finite number of seconds above 0")
@@ -90,9 +92,12 @@ class TvistFilter(Filter):
         # One tick more than max_delay, against rounding of τ/h; the rest is what interpolation wants.
         super().__init__(shaper.name, estimator, joints, period, math.ceil(max_delay / period) + 5)
         self._reach = math.ceil(longest / period) + 3  # the last three are interpolation's
+        self._longest = longest
         self.shaper = shaper
         self.max_delay = max_delay
+        self.impulses = UNSHAPED
         self.reset(self._q_star)
+        self._check_made()
 
     def __repr__(self) -> str:
         return (
@@ -151,10 +156,23 @@ class TvistFilter(Filter):
         """Impulses for these modes."""
         self.f_d, self.zeta = modes
         self.clipped = self.estimator.clipped
-        trains = [
-            self.shaper.function(f, z) for f, z in zip(self.f_d.tolist(), self.zeta.tolist(), strict=True)
-        ]
-        self.impulses = trains[0] if len(trains) == 1 else product(trains)
+        try:
+            self.impulses = self._train()
+        except FAILURES as error:
+            self.fault = failure(error, self.f_d, self.zeta)
+        else:
+            self.fault = None
+
+    def _train(self) -> Impulses:
+        """What the shaper gives for the present modes."""
+        give = self.shaper.impulses
+        trains = [give(f, z) for f, z in zip(self.f_d.tolist(), self.zeta.tolist(), strict=True)]
+        impulses = trains[0] if len(trains) == 1 else product(trains)
+        if impulses.duration > self._longest * (1.0 + ROUNDING):
+            raise ShaperFailureError(
+                self.name, f"gives impulses that last {impulses.duration:g} s, beyond {self._longest:g} s"
+            )
+        return impulses
 
     def _weigh(self) -> None:
         """Impulses of this tick, for the modes at the last shaped reference: the z⁻¹ of Figure 8; what they gather."""

@@ -78,6 +78,10 @@ class Impulses:
         return float(self.A @ self.tau)
 
 
+UNSHAPED = Impulses(np.ones(1), np.zeros(1))
+"""The single impulse that changes nothing."""
+
+
 def check_mode(f_d: float, zeta: float, zeta_max: float = 1.0, instead: str = "") -> None:
     """Refuse a mode that a shaper is not made for.
 

@@ -1,17 +1,24 @@
-"""Filters by name: every shaper of the catalogue, and the designs of constant mean delay."""
+"""Filters by name: every shaper of the catalogue, the designs of constant mean delay, and shapers of one's own."""
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from types import MappingProxyType
+from typing import TypeAlias
 
 from tvist_shaping.aimed import AimedFilter
 from tvist_shaping.base import Filter
-from tvist_shaping.catalogue import SHAPERS, shaper
-from tvist_shaping.errors import UnknownShaperError
+from tvist_shaping.catalogue import SHAPERS
+from tvist_shaping.errors import DesignError, UnknownShaperError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.filter import TvistFilter
 from tvist_shaping.fir import FirDesign
+from tvist_shaping.fir_shaper import FirShaper
+from tvist_shaping.shaper import Shaper
 from tvist_shaping.steady import Design, ShortDesign, SteadyFilter
+
+AnyShaper: TypeAlias = Shaper | FirShaper
+"""What a person's own shaper may be."""
 
 
 def _auto() -> Design:
@@ -33,51 +40,113 @@ DESIGNS: Mapping[str, Callable[[], Design]] = MappingProxyType(
 """Designs of constant mean delay against an arm's four lowest modes: one that leaves less, one that is shorter, and one
 that knows where a motion will end."""
 
-
-def names() -> tuple[str, ...]:
-    """Of every filter there is."""
-    return (*SHAPERS, *DESIGNS)
-
-
-def check_name(name: str) -> None:
-    """Check that there is a filter of a name.
-
-    Raises:
-        UnknownShaperError: There is none; it lists those there are and the nearest.
-    """
-    if name not in DESIGNS and name not in SHAPERS:
-        near = get_close_matches(name, names(), n=1)
-        raise UnknownShaperError(name, names(), near[0] if near else None)
+PERIOD = 0.002
+"""Tick of every filter that is made by its name [s]."""
+_NAME = re.compile(r"[a-z0-9][a-z0-9_.,()-]{0,63}")
 
 
-def modes_of(name: str, modes: int = 1) -> int:
-    """How many modes the filter of a name wants to know: a shaper as many as it is to suppress.
+class Registry:
+    """Filters by name for references of 500 Hz: those of this package, and shapers of one's own. It never changes.
 
     Args:
-        name: Of the filter.
-        modes: How many a shaper is to suppress; a design has its own number.
+        own: Shapers of one's own, `Shaper` or `FirShaper`.
 
     Raises:
-        UnknownShaperError: There is none of that name.
+        DesignError: A name cannot be one, or is another shaper's; or a `FirShaper` is for another period.
     """
-    check_name(name)
-    return DESIGNS[name]().modes if name in DESIGNS else modes
+
+    own: Mapping[str, AnyShaper]
+
+    def __init__(self, own: Iterable[AnyShaper] = ()) -> None:
+        found: dict[str, AnyShaper] = {}
+        for shaper in own:
+            if not (isinstance(shaper.name, str) and _NAME.fullmatch(shaper.name)):
+                limit = "1 to 64 of a-z 0-9 _ - . , ( ), the first a letter or a digit"
+                raise DesignError("name", shaper.name, limit)
+            if shaper.name in SHAPERS or shaper.name in DESIGNS or shaper.name in found:
+                raise DesignError("name", shaper.name, "another: there is a shaper of that name already")
+            if isinstance(shaper, FirShaper) and shaper.period != PERIOD:
+                raise DesignError("period", shaper.period, f"{PERIOD:g} s, as that of all filters by name")
+            found[shaper.name] = shaper
+        self.own = MappingProxyType(found)
+
+    def names(self) -> tuple[str, ...]:
+        """Of every filter there is."""
+        return (*SHAPERS, *DESIGNS, *self.own)
+
+    def check(self, name: str) -> None:
+        """Check that there is a filter of a name.
+
+        Raises:
+            UnknownShaperError: There is none; it lists those there are and the nearest.
+        """
+        if name not in DESIGNS and name not in SHAPERS and name not in self.own:
+            near = get_close_matches(name, self.names(), n=1)
+            raise UnknownShaperError(name, self.names(), near[0] if near else None)
+
+    def modes_of(self, name: str, modes: int = 1) -> int:
+        """How many modes the filter of a name wants to know.
+
+        Args:
+            name: Of the filter.
+            modes: How many a shaper of impulses is to suppress; a design or a FIR filter has its own number.
+
+        Raises:
+            UnknownShaperError: There is none of that name.
+        """
+        self.check(name)
+        shaper = self.own.get(name)
+        if isinstance(shaper, FirShaper):
+            return shaper.modes
+        return DESIGNS[name]().modes if name in DESIGNS else modes
+
+    def make_filter(self, name: str, estimator: Estimator, *, joints: int) -> Filter:
+        """A filter by its name.
+
+        Args:
+            name: One of `names()`.
+            estimator: Gives as many modes as `modes_of` says.
+            joints: Entries of a sample.
+
+        Raises:
+            UnknownShaperError: There is none of that name.
+            FilterError: Filter and estimator do not go together.
+            ShaperFailureError: The function of an own shaper fails at once.
+        """
+        self.check(name)
+        if name in DESIGNS:
+            kind = AimedFilter if name == AIMED else SteadyFilter
+            return kind(DESIGNS[name](), estimator, joints=joints)
+        shaper = self.own[name] if name in self.own else SHAPERS[name]
+        if isinstance(shaper, FirShaper):
+            return SteadyFilter(shaper.design(), estimator, joints=joints)
+        return TvistFilter(shaper, estimator, joints=joints)
 
 
-def make_filter(name: str, estimator: Estimator, *, joints: int) -> Filter:
-    """A filter by its name.
+BUILT_IN = Registry()
+"""The filters of this package alone."""
+
+
+def make_filter(shaper: str | AnyShaper, estimator: Estimator, *, joints: int) -> Filter:
+    """A filter for a sampled reference of 500 Hz.
 
     Args:
-        name: One of `names()`.
-        estimator: Gives as many modes as `modes_of` says.
-        joints: Entries of a sample.
+        shaper: Name of a shaper of this package, as `BUILT_IN.names()` lists them, or a shaper of your own.
+        estimator: The modes as functions of q: four for `auto`, `short` and `auto-target`, as many as it says for a
+            `FirShaper`, and for others as many as are to be suppressed.
+        joints: Entries of a sample, >= 1.
+
+    Returns:
+        The filter, at rest at q = 0: `reset` puts it where the arm is.
 
     Raises:
-        UnknownShaperError: There is none of that name.
-        FilterError: Filter and estimator do not go together.
+        UnknownShaperError: There is no shaper of that name.
+        DesignError: The name of the own shaper cannot be one, or is another's; or it is for another period.
+        FilterError: Shaper and estimator do not go together.
+        ShaperFailureError: The function of the own shaper fails for the modes at q = 0.
     """
-    check_name(name)
-    if name in DESIGNS:
-        kind = AimedFilter if name == AIMED else SteadyFilter
-        return kind(DESIGNS[name](), estimator, joints=joints)
-    return TvistFilter(shaper(name), estimator, joints=joints)
+    if isinstance(shaper, str):
+        return BUILT_IN.make_filter(shaper, estimator, joints=joints)
+    if SHAPERS.get(shaper.name) is shaper:
+        return BUILT_IN.make_filter(shaper.name, estimator, joints=joints)
+    return Registry([shaper]).make_filter(shaper.name, estimator, joints=joints)

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from tvist_shaping.errors import ShaperFailureError
 from tvist_shaping.impulses import Impulses
 from tvist_shaping.sensitivity import band
 
@@ -27,6 +28,22 @@ class Shaper:
     duration_periods: float
     zeta_max: float = 1.0
     peak: float = 1.0
+
+    def impulses(self, f_d: float, zeta: float) -> Impulses:
+        """What `function` gives, checked to be impulses: the function may be anybody's.
+
+        Args:
+            f_d: Damped frequency of the mode [Hz].
+            zeta: Damping ratio of the mode [-].
+
+        Raises:
+            Exception: Whatever the function raises.
+            ShaperFailureError: It gives something else.
+        """
+        impulses = self.function(f_d, zeta)
+        if not isinstance(impulses, Impulses):
+            raise ShaperFailureError(self.name, f"gives {type(impulses).__name__} where Impulses are wanted")
+        return impulses
 
     def band(self, V: float = 0.05, zeta: float = 0.0) -> tuple[float, float]:
         """How wrong the frequency may be: the span of true over assumed frequency in which at most V is left.

@@ -20,6 +20,7 @@ from tvist_shaping._types import Floats
 from tvist_shaping.base import Filter
 from tvist_shaping.errors import FilterError
 from tvist_shaping.estimators.base import Estimator
+from tvist_shaping.failures import FAILURES, failure
 from tvist_shaping.fir import EDGE, GAIN, QUICKEST, FirDesign, solve
 from tvist_shaping.taps import average, length, product_taps
 
@@ -38,12 +39,12 @@ class Design(ABC):
     """What the filter is called."""
     modes: int
     """Modes it wants to know."""
-    mean_delay: float
-    """Mean delay of what it gives [s]."""
     taps: int
     """How many it gives."""
     period: float
     """Tick [s]."""
+    peak: float = 1.0
+    """Sum of the taps' magnitudes at the most, 1 where none is negative [-]."""
 
     @abstractmethod
     def copy(self) -> "Design":
@@ -231,6 +232,7 @@ class SteadyFilter(Filter):
 
         Raises:
             FilterError: A number is out of range, or the estimator has another number of modes.
+            ShaperFailureError: The design fails for the modes at q = 0.
         """
         if smooth < 1:
             raise FilterError("smooth", smooth, "at least 1 tick")
@@ -248,6 +250,7 @@ class SteadyFilter(Filter):
         self._past, self._sums = np.zeros((3, smooth, design.taps)), np.zeros((3, design.taps))
         self._row, self._tick = 0, 0
         self.reset(self._q_star)
+        self._check_made()
 
     def __repr__(self) -> str:
         return f"SteadyFilter({self.design!r}, {self.estimator!r}, joints={self.joints})"
@@ -262,6 +265,11 @@ class SteadyFilter(Filter):
         """Of the taps of the last tick [s]."""
         return float(self._taps @ self._delays) * self.period
 
+    @property
+    def peak(self) -> float:
+        """See `Filter.peak`: the design's own."""
+        return self.design.peak
+
     def with_estimator(self, estimator: Estimator) -> Self:
         """The same design for other modes; see `Filter.with_estimator`."""
         other = type(self)(self.design.copy(), estimator, joints=self.joints, smooth=self._smooth)
@@ -275,9 +283,7 @@ class SteadyFilter(Filter):
         self._past, self._sums = self._past.copy(), self._sums.copy()
 
     def _start(self) -> None:
-        self.f_d, self.zeta = self.estimator.settle(self._q_star)
-        done = self.design.start(self.f_d, self.zeta, self._designed)
-        self.clipped = not done or self.estimator.clipped
+        self._ask(self.estimator.settle(self._q_star), None)
         self._past[:] = self._designed
         self._sums[:] = self._designed * self._smooth
         self._taps[:] = self._designed
@@ -285,13 +291,25 @@ class SteadyFilter(Filter):
 
     def _weigh(self) -> None:
         if self._tick % EVERY == 0:
-            self.f_d, self.zeta = self._modes()
-            done = self.design.go_on(self.f_d, self.zeta, EVERY * self.period, self._designed)
-            self.clipped = not done or self.estimator.clipped
+            self._ask(self._modes(), EVERY * self.period)
         self._tick += 1
         average(self._designed, self._past, self._sums, self._row, self._taps)
         self._row = (self._row + 1) % self._smooth
         self._line.gather(self._taps, self._delays, self._q_star)
+
+    def _ask(self, modes: tuple[Floats, Floats], seconds: float | None) -> None:
+        """Have taps designed for these modes, some time after the last; None: from rest."""
+        self.f_d, self.zeta = modes
+        try:
+            if seconds is None:
+                done = self.design.start(self.f_d, self.zeta, self._designed)
+            else:
+                done = self.design.go_on(self.f_d, self.zeta, seconds, self._designed)
+        except FAILURES as error:
+            self.fault, done = failure(error, self.f_d, self.zeta), False
+        else:
+            self.fault = None
+        self.clipped = not done or self.estimator.clipped
 
 
 def _check_times(mean_delay: float, longest: float, period: float) -> None:

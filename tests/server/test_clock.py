@@ -75,10 +75,11 @@ def test_a_job_that_posts_another_does_not_keep_the_tick_waiting():
     served([robot])
 
 
-def test_a_tick_that_fails_ends_all_robots_of_the_thread_and_says_so(caplog):
+@pytest.mark.parametrize("error", [ArithmeticError, KeyboardInterrupt, GeneratorExit])
+def test_a_tick_that_fails_ends_all_robots_of_the_thread_and_says_so(caplog, error):
     class Failing(FakeHost):
         def tick(self):
-            raise ArithmeticError("on purpose")
+            raise error("on purpose")
 
     robots = [Driven(FakeHost()), Driven(Failing())]
     clock = Realtime(robots, lambda: None, PERIOD)

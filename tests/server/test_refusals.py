@@ -7,9 +7,10 @@ import pytest
 
 from tvist_protocol.commands import SetEstimator
 from tvist_protocol.values import Payload
-from tvist_server.choices import choose_filter, choose_source, make_estimator, shapers, wanted_modes
+from tvist_server.choices import choose_filter, choose_source, make_estimator, wanted_modes
 from tvist_server.refusal import RefusalError, check_body, check_joints, check_motion
 from tvist_server.setup import paper_payload
+from tvist_shaping import BUILT_IN
 from tvist_shaping.estimators.fixed import Fixed
 
 from .robots import POLYNOMIAL, UR5E, calibration, setup
@@ -109,7 +110,7 @@ def test_an_unknown_shaper_is_answered_with_the_nearest():
     assert "did you mean 'zvddd'?" in reply.why
 
 
-@pytest.mark.parametrize("name", shapers())
+@pytest.mark.parametrize("name", BUILT_IN.names())
 def test_every_shaper_that_is_named_can_be_chosen(name):
     modes = wanted_modes(name, 1, "name")
     f_d, zeta = [10.0, 20.0, 40.0, 80.0], [0.1, 0.1, 0.08, 0.08]

@@ -162,7 +162,7 @@ class TestShaperBench:
     @pytest.mark.parametrize(
         ("arguments", "words"),
         [
-            ({"shaper": Path("none.py")}, ("none.py",)),
+            ({"shaper": "none.py"}, ("none.py",)),
             ({"against": ["zz"]}, ("zz", "auto")),
             ({"moves": 0}, ("moves is 0",)),
             ({"calibration": "ur5e_5kg"}, ("ur5e_5kg", "modal")),

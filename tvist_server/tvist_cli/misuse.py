@@ -31,8 +31,8 @@ def readable(arguments: Iterable[str]) -> list[str]:
 
 
 def lower(name: str | None) -> str | None:
-    """A name that a person may type in any case."""
-    return None if name is None else name.lower()
+    """A name that a person may type in any case; FILE.py:NAME stays as it is."""
+    return name if name is None or ".py:" in name or name.endswith(".py") else name.lower()
 
 
 def check_whole(_app: Any, _commands: Any, arguments: "ArgumentCollection") -> None:

@@ -6,7 +6,6 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.info import CalibrationInfo, Info, Limits
 from tvist_protocol.values import PROTOCOL_VERSION
 from tvist_server.calibrations import available, fits
-from tvist_server.choices import shapers
 from tvist_server.controller import Controller
 from tvist_server.stopping import stopping
 
@@ -51,7 +50,7 @@ def info_of(controller: Controller) -> Info:
         modes=tvist.estimator.modes,
         estimator=controller.filters.source.name,
         calibrations=sorted({*available(), *own}),
-        shapers=shapers(),
+        shapers=list(setup.registry.names()),
         control=None if lease is None else lease.client,
         tick=controller.tick_number,
         stopping=list(stopping(setup.description)),

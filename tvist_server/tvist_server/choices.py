@@ -12,24 +12,25 @@ from tvist_shaping.base import Filter
 from tvist_shaping.errors import EstimatorError, ShapingError, UnknownShaperError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.fixed import Fixed
-from tvist_shaping.named import make_filter, modes_of, names
+from tvist_shaping.named import BUILT_IN, Registry
 
 ESTIMATORS = ("fixed", "polynomial", "modal")
 
 
-def shapers() -> list[str]:
-    """Names of the shapers, and of the filters that go by a name as they do."""
-    return list(names())
-
-
-def wanted_modes(name: str, modes: int, where: str) -> int:
+def wanted_modes(name: str, modes: int, where: str, known: Registry = BUILT_IN) -> int:
     """How many modes a filter wants to know.
+
+    Args:
+        name: Of the filter.
+        modes: How many it shall suppress.
+        where: Field that the name comes from.
+        known: The filters there are.
 
     Raises:
         RefusalError: There is no such filter, or it has a number of its own.
     """
     try:
-        own = modes_of(name, modes)
+        own = known.modes_of(name, modes)
     except UnknownShaperError as error:
         raise RefusalError("unknown_shaper", where, str(error)) from error
     if modes not in {1, own}:
@@ -50,14 +51,23 @@ def make_estimator(source: ModeSource, modes: int, payload: Payload, where: str)
         raise RefusalError("out_of_range", where, str(error), source.most) from error
 
 
-def choose_filter(name: str, estimator: Estimator, joints: int, *, where: str = "shaper") -> Filter:
+def choose_filter(
+    name: str, estimator: Estimator, joints: int, *, where: str = "shaper", known: Registry = BUILT_IN
+) -> Filter:
     """A filter with a shaper.
+
+    Args:
+        name: Of the filter.
+        estimator: The modes as functions of q.
+        joints: Of the arm.
+        where: Field that the name comes from.
+        known: The filters there are.
 
     Raises:
         RefusalError: There is no such shaper, or it does not go with the estimator.
     """
     try:
-        return make_filter(name, estimator, joints=joints)
+        return known.make_filter(name, estimator, joints=joints)
     except UnknownShaperError as error:
         raise RefusalError("unknown_shaper", where, str(error)) from error
     except ShapingError as error:

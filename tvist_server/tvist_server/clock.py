@@ -87,7 +87,9 @@ class Clock(ABC):
     def _guarded(self) -> None:
         try:
             self._run()
-        except Exception:
+        except (
+            BaseException
+        ):  # whatever somebody's shaper raises: a thread that ends without a word would be worse
             log.exception("the controller's thread ended")
             for robot in self._robots:
                 robot.host.failure = "the controller's thread ended by an error: see the log"

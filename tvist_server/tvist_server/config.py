@@ -17,7 +17,7 @@ from tvist_protocol.info import Clock
 from tvist_protocol.values import RobotName, Seed
 from tvist_server import calibrations
 from tvist_server.fleet import members
-from tvist_server.initial import read_state
+from tvist_server.initial import read_state, shaped_by
 from tvist_server.setup import Setup, check_rating, paper_payload
 from tvist_server.ur_ports import Door, UrPorts
 
@@ -54,7 +54,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     overload: bool = False
     """Start even where the payload declared is above the robot's rating."""
     shaper: str = "zv"
-    """Shaper to start with."""
+    """Shaper to start with: its name, or FILE.py:NAME for one of your own."""
     calibration: str | None = calibrations.DEFAULT
     """Calibration that comes with the package, or path of one; "none": a robot still to be identified."""
     clock: Clock = "realtime"
@@ -160,11 +160,11 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 payload=paper_payload(description, self.payload),
                 calibration=calibration,
                 name=self.name,
-                shaper=self.shaper,
                 seed=self.seed,
                 clock=self.clock,
                 truth=self.truth,
             )
+            setup = shaped_by(setup, self.shaper)
             if self.state is not None:
                 setup = read_state(self.state).on(setup)
             if self.quiet:

@@ -3,15 +3,18 @@
 import tomllib
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from tvist_plant.user_file import read_bytes, read_toml
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
-from tvist_protocol.values import Joints, Name, Payload, ResetMode, Seed
+from tvist_protocol.values import Joints, Payload, ResetMode, Seed
+from tvist_server.own_shapers import is_file, load_own
 from tvist_server.setup import Setup
+
+ShaperChoice = Annotated[str, Meta(min_length=1, max_length=4096)]
 
 
 class InitialState(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -25,19 +28,43 @@ class InitialState(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """What the arm carries, whatever is declared."""
     mode: ResetMode | None = None
     """Robot mode."""
-    shaper: Name | None = None
-    """Shaper."""
+    shaper: ShaperChoice | None = None
+    """Shaper: its name, or FILE.py:NAME."""
 
     def on(self, setup: Setup) -> Setup:
-        """A start with this state instead of its own, where there is something."""
+        """A start with this state instead of its own, where there is something.
+
+        Raises:
+            OwnShaperError: There is no such shaper in the file it names.
+            UserFileError: It names something that is no file of that size.
+        """
+        if self.shaper is not None:
+            setup = shaped_by(setup, self.shaper)
         given: dict[str, Any] = {
             "q": self.q,
             "seed": self.seed,
             "carried": self.payload,
             "mode": self.mode,
-            "shaper": self.shaper,
         }
         return replace(setup, **{name: value for name, value in given.items() if value is not None})
+
+
+def shaped_by(setup: Setup, shaper: str) -> Setup:
+    """A start with another shaper.
+
+    Args:
+        setup: The start.
+        shaper: Name of a shaper, or FILE.py:NAME, which is then loaded.
+
+    Raises:
+        OwnShaperError: There is no such shaper in the file.
+        UserFileError: It is no file of that size.
+    """
+    if not is_file(shaper):
+        return replace(setup, shaper=shaper)
+    own = load_own(shaper)
+    known = setup.own_shapers if own in setup.own_shapers else (*setup.own_shapers, own)
+    return replace(setup, shaper=own.name, own_shapers=known)
 
 
 class InitialStateError(ValueError):

@@ -40,6 +40,13 @@ class LineFilter:
         return self._fade is None and (self.tvist.peak == 1.0 or self.tvist.settled)
 
     @property
+    def fault(self) -> str | None:
+        """Why a shaper could give no weights at the last tick, with its name; None: each could."""
+        fade = self._fade
+        filters = (self.tvist,) if fade is None else (self.tvist, fade.old, fade.new)
+        return next((f"shaper {one.name} {one.fault}" for one in filters if one.fault is not None), None)
+
+    @property
     def peak(self) -> float:
         """By what factor the shaped acceleration may exceed the reference's, see `Filter.peak`."""
         fade = self._fade

@@ -430,6 +430,7 @@ class MotionControl:
             self._arrive()
         if self.activity.robot_mode is RobotMode.RUNNING:
             self._watch_torque(sample)
+            self._watch_shaper()
         return sample
 
     def _arrive(self) -> None:
@@ -449,6 +450,12 @@ class MotionControl:
             moment = sample.measured.moment[joint]
             why = f"torque of joint {name} is {moment:.0f} N m; beyond its {limit:g} for more than 10 ms"
             self.protect(why, "limit_torque")
+
+    def _watch_shaper(self) -> None:
+        """Protect an arm whose filter only goes on with old weights, because its shaper's function fails."""
+        fault = self.cycle.line_filter.fault
+        if fault is not None:
+            self.protect(fault)
 
     def _end_motion(self, why: str, code: Code | None, **told: Unpack[Told]) -> None:
         if self._move is not None:

@@ -1,6 +1,8 @@
 """How a controller starts: everything that decides what it will do, besides what clients send."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import msgspec
@@ -13,8 +15,9 @@ from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Clock
 from tvist_protocol.values import Payload, ResetMode
 from tvist_server.mode_source import ModeSource, first_source
+from tvist_server.own_shapers import OwnShaper
 from tvist_shaping.estimators.base import Estimator
-from tvist_shaping.named import check_name
+from tvist_shaping.named import Registry
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,17 @@ class Setup:
     """Robot mode to start in."""
     truth: bool = False
     """Whether to tell what no robot can know."""
+    own_shapers: tuple[OwnShaper, ...] = ()
+    """Shapers from files, which go by their names beside those that come with the package."""
+
+    @cached_property
+    def registry(self) -> Registry:
+        """The shapers that this robot can use.
+
+        Raises:
+            DesignError: Two go by one name.
+        """
+        return Registry(own.shaper for own in self.own_shapers)
 
     def check(self) -> None:
         """Check what types cannot.
@@ -60,7 +74,7 @@ class Setup:
         if self.carried is not None and not is_real_body(self.carried.inertia):
             inertia = list(self.carried.inertia)
             raise ValueError(f"payload.inertia is {inertia}: no body has these moments of inertia")
-        check_name(self.shaper)
+        self.registry.check(self.shaper)
 
     def source(self) -> ModeSource:
         """Where modes come from to begin with."""
@@ -84,11 +98,16 @@ class Setup:
             "seed": self.seed,
             "clock": self.clock,
             "truth": self.truth,
+            "own_shapers": [msgspec.to_builtins(own.recorded) for own in self.own_shapers],
         }
 
     @classmethod
-    def from_builtins(cls, content: dict[str, Any]) -> "Setup":
+    def from_builtins(cls, content: dict[str, Any], own_shapers: Sequence[OwnShaper] = ()) -> "Setup":
         """From a recording.
+
+        Args:
+            content: What `to_builtins` gave.
+            own_shapers: The shapers from files that it names, loaded again.
 
         Raises:
             ValueError: A part is missing or wrong.
@@ -103,6 +122,7 @@ class Setup:
                     carried=None if content["carried"] is None else checked(content["carried"], Payload),
                     mode=msgspec.convert(content["mode"], ResetMode),
                     calibration=None if calibration is None else calibration_of(calibration),
+                    own_shapers=tuple(own_shapers),
                 ),
                 **{key: content[key] for key in ("name", "shaper", "seed", "clock", "truth")},
             )

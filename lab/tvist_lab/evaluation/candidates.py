@@ -10,7 +10,7 @@ from tvist_lab.evaluation.baselines import Baseline
 from tvist_lab.evaluation.line import PAPER, lengthened
 from tvist_lab.evaluation.moves import Move
 from tvist_lab.evaluation.recipes import Recipe
-from tvist_lab.evaluation.running import Shaped, Stepper, run
+from tvist_lab.evaluation.running import Shaped, Stepper, run, sound
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
@@ -121,7 +121,7 @@ def _from_rest(tvist: Filter, task: Task) -> "Filtering":
     """A filter at rest where a move starts, told where it ends as the robot tells it."""
     tvist.reset(task.move.start)
     tvist.aim(task.move.target)
-    return Filtering(tvist.filter, lambda: tvist.delay)
+    return Filtering(sound(tvist), lambda: tvist.delay)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from tvist_lab.evaluation.baselines import Baseline
 from tvist_lab.evaluation.line import PAPER, control_line, point_to_point, shape, simulate
 from tvist_lab.evaluation.moves import Move
 from tvist_lab.evaluation.recipes import Recipe, spared
+from tvist_lab.evaluation.running import sound
 from tvist_lab.evaluation.workers import spread
 from tvist_lab.metrics import (
     NotMeasurableError,
@@ -139,7 +140,7 @@ def _record(job: Job) -> tuple[Recording, Recording, dict[str, Recording]]:
     tvist = recipe.make(description, move.mass)
     tvist.reset(start)
     tvist.aim(target)  # as the robot does before a move
-    shaped = follow(shape(tvist.filter, point_to_point(start, target, spared(PAPER, tvist)))[0])
+    shaped = follow(shape(sound(tvist), point_to_point(start, target, spared(PAPER, tvist)))[0])
     ticks = round(motions(shaped)[0].shaped_duration(shaped) / PERIOD)
     others = {
         baseline.name: follow(baseline.shaped(recipe, description, move, reference, ticks))

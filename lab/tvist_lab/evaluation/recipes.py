@@ -7,11 +7,13 @@ from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration
 from tvist_server.choices import choose_filter, wanted_modes
 from tvist_server.mode_source import ModeSource
+from tvist_server.own_shapers import OwnShaper
 from tvist_server.setup import paper_payload
 from tvist_server.trajectory import Limits
 from tvist_shaping.base import Filter
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.fixed import Fixed
+from tvist_shaping.named import Registry
 
 
 class RecipeError(ValueError):
@@ -76,6 +78,8 @@ class Recipe:
     """Share by which every frequency is too high [-]."""
     modes: int = 1
     """That a shaper of the catalogue suppresses; more than one takes a modal calibration."""
+    own: tuple[OwnShaper, ...] = ()
+    """Shapers from files, which may be named beside those that come with the package."""
 
     def make(self, description: RobotDescription, mass: float) -> Filter:
         """The filter for a payload that is believed to be the paper's disc, of another mass.
@@ -88,10 +92,12 @@ class Recipe:
             RecipeError: The calibration is of another arm, or does not know the modes that the filter wants.
             RefusalError: There is no such filter, or its parts do not go together.
         """
-        modes = wanted_modes(self.shaper, self.modes, "shaper")
+        known = Registry(own.shaper for own in self.own)
+        modes = wanted_modes(self.shaper, self.modes, "shaper", known)
         if self.shaper == "none":
             return choose_filter(self.shaper, Fixed([10.0], [0.1]), description.joints)
-        return choose_filter(self.shaper, self.estimator(description, mass, modes), description.joints)
+        estimator = self.estimator(description, mass, modes)
+        return choose_filter(self.shaper, estimator, description.joints, known=known)
 
     def estimator(self, description: RobotDescription, mass: float, modes: int) -> Estimator:
         """What the filter learns the modes from.

@@ -1,6 +1,7 @@
 """A shaper on one reference: run to its end, and watched for what it hides."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -10,6 +11,7 @@ from tvist_lab.evaluation.line import LONGEST
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
 from tvist_server.cycle import STILL
+from tvist_shaping.base import Filter
 
 WATCHED = 0.5
 """Time for which a shaped reference that has ended is watched for a tail [s]."""
@@ -48,6 +50,22 @@ class Stepper(Protocol):
     @property
     def delay(self) -> float | None:
         """By which its last output is spread over the past [s]; None where it does not say."""
+
+
+def sound(tvist: Filter) -> Callable[[Floats], Floats]:
+    """Shape by a filter for as long as its shaper's function gives weights: no figure may come from old ones.
+
+    Returns:
+        Sample to shaped sample; raises `ShaperFaultError` where the function fails.
+    """
+
+    def step(q: Floats) -> Floats:
+        shaped = tvist.filter(q)
+        if tvist.fault is not None:
+            raise ShaperFaultError(tvist.fault)
+        return shaped
+
+    return step
 
 
 def run(stepper: Stepper, reference: Floats) -> Shaped:

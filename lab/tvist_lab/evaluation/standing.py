@@ -9,6 +9,7 @@ from tvist_lab.evaluation.recipes import Recipe
 from tvist_lab.evaluation.shaperbench import PAYLOAD_ERRORS
 from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration
+from tvist_server.own_shapers import OwnShaper
 
 OWN = (
     ("zv", 1, "TVIST-ZV, lowest mode"),
@@ -27,7 +28,7 @@ PRODUCT_MODES = 3
 def candidates(
     description: RobotDescription,
     calibration: Calibration,
-    file: str | None,
+    mine: str | OwnShaper | None,
     against: Sequence[str] | None,
 ) -> list[Candidate]:
     """Who stands on the bench.
@@ -35,7 +36,7 @@ def candidates(
     Args:
         description: The robot.
         calibration: With a modal model; all estimates are its.
-        file: Path of a person's own shaper.
+        mine: A person's own shaper: path of a file with a class that has `step`, or one that was loaded.
         against: Names of those to run beside waiting, which all are compared with; None: all.
 
     Raises:
@@ -57,8 +58,10 @@ def candidates(
     if against is not None:
         by_name = {one.name: one for one in every}
         every = [waiting, *(by_name[name] for name in against if name != waiting.name)]
-    if file is not None:
-        every.append(FromFile(file, recipe, "file", file))
+    if isinstance(mine, OwnShaper):
+        every.append(Named(Recipe(mine.name, calibration, own=(mine,)), mine.name, mine.place))
+    elif mine is not None:
+        every.append(FromFile(mine, recipe, "file", mine))
     return every
 
 

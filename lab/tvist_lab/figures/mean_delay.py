@@ -11,8 +11,8 @@ from tvist_server import calibrations
 from tvist_server.calibrations.modal import modal_estimator
 from tvist_server.setup import paper_payload
 from tvist_server.trajectory import DoubleS, Limits
+from tvist_shaping import BUILT_IN
 from tvist_shaping.base import Filter
-from tvist_shaping.named import make_filter, modes_of
 
 LIMITS = Limits(1.5, 2.0, 100.0)
 MODES = 3
@@ -31,8 +31,10 @@ def mean_delay_figure() -> Figure:
     payload, calibration = paper_payload(description), calibrations.load("ur5e_modal")
     joints = description.joints
     filters = [
-        make_filter(
-            name, modal_estimator(calibration, description, payload, modes_of(name, MODES)), joints=joints
+        BUILT_IN.make_filter(
+            name,
+            modal_estimator(calibration, description, payload, BUILT_IN.modes_of(name, MODES)),
+            joints=joints,
         )
         for name in ("zv", "auto")
     ]

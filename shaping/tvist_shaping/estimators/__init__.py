@@ -3,6 +3,7 @@
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.basis import terms
 from tvist_shaping.estimators.fixed import Fixed
+from tvist_shaping.estimators.modal import Drivetrain, Modal
 from tvist_shaping.estimators.polynomial import Polynomial
 
-__all__ = ["Estimator", "Fixed", "Polynomial", "terms"]
+__all__ = ["Drivetrain", "Estimator", "Fixed", "Modal", "Polynomial", "terms"]

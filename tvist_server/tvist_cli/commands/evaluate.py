@@ -8,12 +8,14 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import err, number, out, print_json, progress, say, table
+from tvist_cli.shapers_of import loaded
 
 if TYPE_CHECKING:
     from tvist_lab.evaluation.evaluate import Job, Judged
     from tvist_lab.evaluation.moves import Move
     from tvist_plant.description import RobotDescription
     from tvist_protocol.calibration import Calibration
+    from tvist_server.own_shapers import OwnShaper
 
 UNIFORM = "uniform"
 """A payload of its own for each move, up to what the arm is rated for."""
@@ -52,8 +54,8 @@ def evaluate(
             of collision.
         payload: Mass of the paper's disc in kg, carried and declared; uniform: another one for each move, 0 to what the
             arm is rated for [5].
-        shaper: Name of a shaper, or of a filter for several modes: auto, short, or auto-target, which is told the
-            target of each move.
+        shaper: Name of a shaper; or of a filter for several modes: auto, short, or auto-target, which is told the
+            target of each move; or FILE.py:NAME, which runs that file, for one of your own.
         modes: That a shaper of the catalogue acts on; more than one takes a modal calibration.
         calibration: Calibration that comes with the package, or path of one.
         robot: Robot that comes with the package, or path of a robot file.
@@ -69,17 +71,18 @@ def evaluate(
     """
     from tvist_lab.evaluation.evaluate import Job, report
     from tvist_lab.evaluation.evaluate import evaluate as run
+    from tvist_lab.evaluation.running import ShaperFaultError
     from tvist_plant.description import DescriptionError, load
 
     _check(moves, random, seed, modes, frequency_error, wrists=wrists)
-    shaper = shaper.lower()
     with told(DescriptionError, code=2):
         description = load(robot)
     masses = _masses(payload, description)
-    known = _calibration(calibration, shaper, modes, description)
+    shaper, own = loaded(shaper)
+    known = _calibration(calibration, shaper, own, modes, description)
     chosen, share = _moves(moves, random, seed, masses, description, wrists=wrists)
     plant, kept = _disturbed(description, disturbances, clean=clean)
-    recipe, others = _recipe(shaper, modes, known, plant, frequency_error, masses, baselines=baselines)
+    recipe, others = _recipe(shaper, own, modes, known, plant, frequency_error, masses, baselines=baselines)
     jobs = [
         Job(plant, move, recipe, others, seed=_arm_seed(seed, place)) for place, move in enumerate(chosen)
     ]
@@ -90,9 +93,12 @@ def evaluate(
 
             write_moves(save_moves, chosen)
         with progress(sum(job.motions for job in jobs), "motions") as bar:
-            for job, one in zip(jobs, run(jobs), strict=True):
-                judged.append(one)
-                bar(job.motions, None)
+            try:
+                for job, one in zip(jobs, run(jobs), strict=True):
+                    judged.append(one)
+                    bar(job.motions, None)
+            except ShaperFaultError as fault:
+                raise Failure(f"shaper {shaper} {fault}") from fault
         if figures is not None:
             _draw(jobs, judged, figures)
     from tvist_lab.evaluation.moves import collisions
@@ -173,7 +179,11 @@ def _masses(payload: str | None, description: "RobotDescription") -> tuple[float
 
 
 def _calibration(
-    name: str | None, shaper: str, modes: int, description: "RobotDescription"
+    name: str | None,
+    shaper: str,
+    own: "tuple[OwnShaper, ...]",
+    modes: int,
+    description: "RobotDescription",
 ) -> "Calibration | None":
     """The one that was named; else the paper's, or for several modes one that comes with the package."""
     from tvist_protocol.calibration import CalibrationError
@@ -181,16 +191,18 @@ def _calibration(
     from tvist_server.choices import wanted_modes
     from tvist_server.mode_source import modal_source
     from tvist_server.refusal import RefusalError
+    from tvist_shaping import Registry
 
     with told(CalibrationError, RefusalError, code=2):
-        several = wanted_modes(shaper, modes, "shaper") > 1
+        known = Registry(one.shaper for one in own)
+        several = wanted_modes(shaper, modes, "shaper", known) > 1
         if name is not None:
             return load(name)
-        own = load(DEFAULT)
-        if own.robot != description.robot.model:
+        paper = load(DEFAULT)
+        if paper.robot != description.robot.model:
             return None
-        found = modal_source(description, own) if several else None
-        return own if found is None else found.calibration
+        found = modal_source(description, paper) if several else None
+        return paper if found is None else found.calibration
 
 
 def _moves(
@@ -218,6 +230,7 @@ def _moves(
 
 def _recipe(
     shaper: str,
+    own: "tuple[OwnShaper, ...]",
     modes: int,
     known: "Calibration | None",
     description: "RobotDescription",
@@ -232,7 +245,7 @@ def _recipe(
     from tvist_server.refusal import RefusalError
     from tvist_shaping.errors import ShapingError
 
-    recipe = Recipe(shaper, known, 0.01 * frequency_error, modes)
+    recipe = Recipe(shaper, known, 0.01 * frequency_error, modes, own)
     with told(RecipeError, RefusalError, ShapingError, code=2):
         recipe.make(description, masses[1])
         # Where nothing is known of an arm, there is nothing to design a baseline for.

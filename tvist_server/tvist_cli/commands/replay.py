@@ -3,15 +3,20 @@
 from pathlib import Path
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import out, print_json
+from tvist_cli.output import out, print_json, say
+from tvist_cli.shapers_of import load_given
 
 
-def replay(file: Path, output: Path | None = None, *, json: bool = False) -> None:
+def replay(
+    file: Path, output: Path | None = None, *, shaper: list[str] | None = None, json: bool = False
+) -> None:
     """Give a new robot the recorded messages at their ticks, free of any clock, and compare bit by bit.
 
     Args:
         file: MCAP file that `tvist serve --record` wrote.
         output: MCAP file to write the second run to.
+        shaper: FILE.py:NAME, repeatable: the shaper of your own that the robot was served with. A recording names it
+            but does not make anybody run it.
         json: Print one JSON object.
     """
     from tvist_lab.mcap_file import read
@@ -19,9 +24,12 @@ def replay(file: Path, output: Path | None = None, *, json: bool = False) -> Non
     from tvist_lab.replay import ReplayError, replay_file
     from tvist_server.recording import RecordingError as WritingError
 
+    own = [load_given(place) for place in shaper or []]
     with told(RecordingError, ReplayError, WritingError, ValueError):
         content = read(file)
-        again = replay_file(content, output)
+        again = replay_file(content, output, own)
+    for note in again.notes:
+        say(note)
     if json:
         print_json(
             {"file": str(file), "ticks": len(again.states), "equal": again.first_difference is None,

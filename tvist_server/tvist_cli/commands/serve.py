@@ -53,7 +53,8 @@ def serve(
         payload: Mass of the paper's disc on the flange in kg, declared and carried [5].
         overload: Start even where that is above the robot's rating: the drives may give out, and the robot then makes
             a protective stop.
-        shaper: Any that tvist shapers lists, such as none, zv or ei3 [zv].
+        shaper: Any that tvist shapers lists, such as none, zv or ei3; or auto, short or auto-target; or FILE.py:NAME,
+            which runs that file and adds the shaper of your own to those that clients can choose [zv].
         calibration: Calibration that comes with the package, or path of one; none for a robot to be identified.
         clock: realtime, or lockstep: a client lets time pass [realtime].
         speed: Of the robot's time against the clock's [1].

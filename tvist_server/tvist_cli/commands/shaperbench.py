@@ -7,10 +7,12 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import err, number, out, print_json, progress, say, table
+from tvist_cli.shapers_of import load_given
 
 if TYPE_CHECKING:
     from tvist_lab.evaluation.candidates import Candidate
     from tvist_protocol.calibration import Calibration
+    from tvist_server.own_shapers import OwnShaper
 
 MOVES = 100
 QUICK = 3
@@ -19,7 +21,7 @@ QUICK = 3
 
 def shaperbench(
     *,
-    shaper: Path | None = None,
+    shaper: str | None = None,
     quick: bool = False,
     moves: int | None = None,
     against: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
@@ -38,7 +40,7 @@ def shaperbench(
 
     Args:
         shaper: Python file with a class that has step(q_ref, info) -> q_star, and may have reset(q) and delay in s; or
-            with a function step.
+            with a function step. Or FILE.py:NAME, as tvist serve takes it.
         quick: A few moves, with one payload error each.
         moves: How many; 100, or 3 with --quick.
         against: Names of the shapers and baselines to run, beside waiting; default: all.
@@ -62,7 +64,8 @@ def shaperbench(
     description = load("ur5e")
     known = _calibration(calibration)
     against = None if against is None else [name.lower() for name in against]
-    standing = _candidates(shaper, against, known)
+    mine = None if shaper is None else _mine(shaper)
+    standing = _candidates(mine, against, known)
     drawn = bench.draw(description, count, seed)
     faults = [bench.inspect(one, description, drawn) for one in standing]
     sound = [one for one, fault in zip(standing, faults, strict=True) if fault is None]
@@ -92,7 +95,8 @@ def shaperbench(
         print_json(result)
     else:
         _print(result)
-    unranked = next((row for row in result["shapers"] if row["name"] == "file" and not row["ranked"]), None)
+    called = getattr(mine, "name", "file")
+    unranked = next((row for row in result["shapers"] if row["name"] == called and not row["ranked"]), None)
     if unranked is not None:
         raise Failure(f"shaper {shaper} is not ranked: it {unranked['fault']}")
 
@@ -115,25 +119,34 @@ def _calibration(name: str | None) -> "Calibration":
     return known
 
 
-def _candidates(shaper: Path | None, against: list[str] | None, known: "Calibration") -> "list[Candidate]":
+def _mine(shaper: str) -> "str | OwnShaper":
+    """A person's own shaper: path of a file with a class that has a method step, or what FILE.py:NAME names."""
+    if ".py:" in shaper:
+        return load_given(shaper)
     from tvist_lab.evaluation.foreign import CandidateError, load_shaper
+
+    with told(CandidateError, code=2):
+        load_shaper(Path(shaper))
+    return shaper
+
+
+def _candidates(
+    mine: "str | OwnShaper | None", against: list[str] | None, known: "Calibration"
+) -> "list[Candidate]":
     from tvist_lab.evaluation.recipes import RecipeError
     from tvist_lab.evaluation.standing import candidates
     from tvist_plant.description import load
 
-    with told(CandidateError, RecipeError, code=2):
-        if shaper is not None:
-            load_shaper(shaper)
-        file = None if shaper is None else str(shaper)
+    with told(RecipeError, code=2):
         every = {one.name for one in candidates(load("ur5e"), known, None, None)}
         for name in against or []:
             if name not in every:
                 raise Failure(f"against is {name!r}: must be one of {', '.join(sorted(every))}", code=2)
-        return candidates(load("ur5e"), known, file, against)
+        return candidates(load("ur5e"), known, mine, against)
 
 
 def _command(
-    shaper: Path | None,
+    shaper: str | None,
     against: list[str] | None,
     count: int,
     seed: int,

@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import told
 from tvist_cli.output import err, out, print_json, table
+from tvist_cli.shapers_of import load_given
 
 if TYPE_CHECKING:
-    from tvist_shaping import Impulses, Shaper
+    from tvist_shaping import Impulses
+    from tvist_shaping.named import AnyShaper
 
 BANDS = {"5": 0.05, "10": 0.1}
 """Percent to residual vibration."""
@@ -20,6 +22,7 @@ def shapers(
     *,
     f_d: float = 10.0,
     zeta: float = 0.0,
+    shaper: list[str] | None = None,
     figures: Path | None = None,
     json: bool = False,
 ) -> None:
@@ -28,19 +31,24 @@ def shapers(
     Args:
         f_d: Damped frequency of the mode in Hz.
         zeta: Its damping ratio.
+        shaper: FILE.py:NAME, repeatable: list a shaper of your own, too, which runs that file.
         figures: Folder for figures: what each leaves when the frequency is wrong; why the mean delay must not change.
         json: Print one JSON object.
     """
-    from tvist_shaping import SHAPERS, ShapingError
+    from tvist_shaping import SHAPERS, Registry, Shaper, ShapingError
 
     with told(ShapingError, code=2):
         SHAPERS["none"].function(f_d, zeta)
-    found = [_about(shaper, f_d, zeta) for shaper in SHAPERS.values()]
+    with told(ShapingError, code=2):
+        own = Registry(load_given(place).shaper for place in shaper or []).own
+    listed: list[AnyShaper] = [*SHAPERS.values(), *own.values()]
+    found = [_about(one, f_d, zeta) for one in listed]
     if figures is not None:
         from tvist_lab.figures import catalogue_figure, mean_delay_figure, save
 
         with told(OSError):
-            err.print(str(save(catalogue_figure(SHAPERS.values(), zeta), figures / "shapers.png")))
+            of_impulses = [one for one in listed if isinstance(one, Shaper)]
+            err.print(str(save(catalogue_figure(of_impulses, zeta), figures / "shapers.png")))
             err.print(str(save(mean_delay_figure(), figures / "mean_delay.png")))
     if json:
         print_json({"f_d_hz": f_d, "zeta": zeta, "shapers": found})
@@ -50,9 +58,9 @@ def shapers(
         ("shaper", "impulses", "ms", "mean ms", "5 % band", "10 % band", "ζ below", "peak"),
         [_row(about) for about in found],
     )
-    width = max(len(shaper.name) for shaper in SHAPERS.values())
-    for shaper in SHAPERS.values():
-        out.print(f"{shaper.name:{width}}  {shaper.description}", markup=False)
+    width = max(len(one.name) for one in listed)
+    for one in listed:
+        out.print(f"{one.name:{width}}  {one.description}", markup=False)
     out.print(
         "\nms: how much later a motion ends; mean ms: how far it trails a motion of constant velocity;\n"
         "band: true over assumed frequency where at most that much of the vibration is left;\n"
@@ -61,37 +69,40 @@ def shapers(
     )
 
 
-def _about(shaper: "Shaper", f_d: float, zeta: float) -> dict[str, Any]:
-    """What there is to say of a shaper; where it is not for this damping, that."""
-    from tvist_shaping import ShaperRangeError
+def _about(shaper: "AnyShaper", f_d: float, zeta: float) -> dict[str, Any]:
+    """What there is to say of a shaper; where it is not for this mode, that."""
+    from tvist_shaping import ShapingError
+    from tvist_shaping.failures import FAILURES, words
+    from tvist_shaping.impulses import check_mode
 
     said: dict[str, Any] = {
         "name": shaper.name,
         "description": shaper.description,
-        "duration_periods": shaper.duration_periods,
-        "zeta_max": shaper.zeta_max,
+        "duration_periods": getattr(shaper, "duration_periods", None),
+        "zeta_max": getattr(shaper, "zeta_max", 1.0),
         "peak": shaper.peak,
     }
     try:
-        impulses = shaper.function(f_d, zeta)
-    except ShaperRangeError as error:
+        impulses = shaper.impulses(f_d, zeta)
+        check_mode(f_d, zeta, said["zeta_max"])
+    except ShapingError as error:
         return said | {"not_for_this_mode": str(error)}
-    return said | _figures(shaper, impulses, zeta)
-
-
-def _figures(shaper: "Shaper", impulses: "Impulses", zeta: float) -> dict[str, Any]:
-    return {
+    except FAILURES as error:
+        return said | {"not_for_this_mode": f"it {words(error)}"}
+    return said | {
         "amplitudes": impulses.A.tolist(),
         "times_s": impulses.tau.tolist(),
         "duration_ms": 1000.0 * impulses.duration,
         "mean_delay_ms": 1000.0 * impulses.mean_delay,
-        **{f"band_{percent}_percent": _band(shaper, V, zeta) for percent, V in BANDS.items()},
+        **{f"band_{percent}_percent": _band(impulses, f_d, V, zeta) for percent, V in BANDS.items()},
     }
 
 
-def _band(shaper: "Shaper", V: float, zeta: float) -> list[float | None] | None:
+def _band(impulses: "Impulses", f_d: float, V: float, zeta: float) -> list[float | None] | None:
     """Lowest and highest ratio; None where even the assumed frequency is not in it, or where there is no end."""
-    low, high = shaper.band(V * TOUCHING, zeta)
+    from tvist_shaping import band
+
+    low, high = (f / f_d for f in band(impulses, f_d, zeta, V * TOUCHING))
     return None if math.isnan(low) else [low, high if math.isfinite(high) else None]
 
 

@@ -10,6 +10,7 @@ from tvist_server.planning.basis import FilterBasis
 from tvist_server.refusal import RefusalError
 from tvist_server.setup import Setup
 from tvist_shaping.base import Filter
+from tvist_shaping.estimators.base import Estimator
 
 PlannedFilter = tuple[ModeSource, Filter]
 """Where its modes come from, and the filter."""
@@ -23,7 +24,7 @@ class FilterPlanner:
     """
 
     def __init__(self, setup: Setup) -> None:
-        self._setup = setup
+        self._setup, self._known = setup, setup.registry
         self._modal = modal_source(setup.description, setup.calibration)
 
     def first(self) -> PlannedFilter:
@@ -59,11 +60,11 @@ class FilterPlanner:
         Raises:
             RefusalError: There is none for this robot.
         """
-        wanted = wanted_modes(name, modes, where)
+        wanted = wanted_modes(name, modes, where, self._known)
         if wanted > source.most and self._modal is not None:
             source = self._modal
         estimator = make_estimator(source, wanted, declared, "modes" if modes > 1 else where)
-        return source, choose_filter(name, estimator, self._setup.description.joints, where=where)
+        return source, self._make(name, estimator, where)
 
     def estimate(self, command: SetEstimator, basis: FilterBasis) -> PlannedFilter:
         """The present filter with modes from elsewhere.
@@ -85,4 +86,8 @@ class FilterPlanner:
 
     def _again(self, basis: FilterBasis, source: ModeSource, declared: Payload, where: str) -> Filter:
         estimator = make_estimator(source, basis.modes, declared, where)
-        return choose_filter(basis.name, estimator, self._setup.description.joints, where=where)
+        return self._make(basis.name, estimator, where)
+
+    def _make(self, name: str, estimator: Estimator, where: str) -> Filter:
+        joints = self._setup.description.joints
+        return choose_filter(name, estimator, joints, where=where, known=self._known)

@@ -1,0 +1,107 @@
+"""Shapers of one's own: made of a function, and tried out before anything moves by them."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tvist_shaping.errors import DesignError, ShaperFailureError
+from tvist_shaping.failures import FAILURES, ROUNDING, failure
+from tvist_shaping.fir_shaper import FirShaper
+from tvist_shaping.impulses import Impulses
+from tvist_shaping.shaper import Shaper
+
+TRIED_F_D = (0.1, 200.0)
+"""Damped frequencies for which a shaper is tried out [Hz]: all that a client may tell a robot."""
+_F_D = np.geomspace(*TRIED_F_D, 23)
+_SHARES = np.array([*np.linspace(0.0, 1.0, 24, endpoint=False), 0.99])
+"""Of the highest damping ratio that a shaper is made for [-]."""
+_DECLARED = (
+    ("duration_periods", 0.0, 1e6, "a number from 0 to 1e6"),
+    ("zeta_max", 1e-6, 1.0, "a number from 1e-6 to 1"),
+    ("peak", 1.0, 1e6, "a number from 1 to 1e6"),
+)
+_APART = 1.7
+"""Ratio of a mode's frequency to that of the one below it, where a FIR filter is tried out."""
+
+
+def shaper_of(
+    function: Callable[[float, float], Impulses],
+    *,
+    name: str = "",
+    description: str = "",
+    zeta_max: float = 1.0,
+) -> Shaper:
+    """A shaper of your own function, whose duration and peak are found by trying it out.
+
+    Args:
+        function: (f_d [Hz], ζ [-]) -> impulses of one mode. It is asked for every tick and in more than one thread, so
+            it must give the same for the same mode, and soon. Times go with 1/f_d; what has times of its own, whatever
+            the frequency, is a `FirShaper`.
+        name: What to call it; "" for the function's name.
+        description: What to say of it; "" for the first line of the function's docstring.
+        zeta_max: Damping ratios must stay below this [-], above 0 and at most 1.
+
+    Raises:
+        DesignError: zeta_max is out of range.
+        ShaperFailureError: The function raises, or gives something other than impulses, for a mode of 0.1 to 200 Hz and
+            a damping ratio below zeta_max.
+    """
+    if not 0.0 < zeta_max <= 1.0:
+        raise DesignError("zeta_max", zeta_max, "above 0 and at most 1")
+    called = name or getattr(function, "__name__", "own")
+    lines = str(function.__doc__ or "").strip().splitlines()
+    what = description or (lines[0] if lines else "a shaper of your own")
+    trial = Shaper(called, what, function, np.inf, zeta_max, np.inf)
+    duration, peak = _tried(trial)
+    return Shaper(called, what, function, duration, zeta_max, peak if peak > 1.0 + ROUNDING else 1.0)
+
+
+def check_shaper(shaper: Shaper | FirShaper) -> None:
+    """Try a shaper out: over modes of 0.1 to 200 Hz, and damping ratios up to the highest it is made for.
+
+    Raises:
+        DesignError: What it declares cannot be.
+        ShaperFailureError: Its function raises, gives no weights of sum 1, or gives others than the shaper declares.
+    """
+    if isinstance(shaper, Shaper):
+        for field, low, high, limit in _DECLARED:
+            value = getattr(shaper, field)
+            if not (isinstance(value, int | float) and low <= value <= high):
+                raise DesignError(field, value, limit)
+        _tried(shaper)
+        return
+    ratios = _APART ** np.arange(shaper.modes)
+    for f_d in _F_D:
+        for share in _SHARES:
+            modes = f_d * ratios, np.full(shaper.modes, share)
+            try:
+                shaper.weights(*modes)
+            except FAILURES as error:
+                raise ShaperFailureError(shaper.name, failure(error, *modes)) from error
+
+
+def _tried(shaper: Shaper) -> tuple[float, float]:
+    """Longest duration in damped periods, and largest sum of magnitudes.
+
+    Raises:
+        ShaperFailureError: Its function fails, or either is beyond what it declares.
+    """
+    longest, most = 0.0, 0.0
+    for f_d in _F_D.tolist():
+        for zeta in (shaper.zeta_max * _SHARES).tolist():
+            try:
+                impulses = shaper.impulses(f_d, zeta)
+            except FAILURES as error:
+                why = failure(error, np.array([f_d]), np.array([zeta]))
+                raise ShaperFailureError(shaper.name, why) from error
+            longest = max(longest, impulses.duration * f_d)
+            most = max(most, float(np.abs(impulses.A).sum()))
+    for what, found, declared in (
+        ("duration_periods", longest, shaper.duration_periods),
+        ("peak", most, shaper.peak),
+    ):
+        if found > declared * (1.0 + ROUNDING):
+            raise ShaperFailureError(
+                shaper.name, f"has a {what} of {found:g}, beyond the {declared:g} it declares"
+            )
+    return longest, most

@@ -1,0 +1,395 @@
+"""Shapers from files: loaded, chosen by their names, recorded, and stopped when they fail."""
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+
+from tvist_lab.mcap_file import RecordingFile
+from tvist_lab.replay import ReplayError, replay_file
+from tvist_plant.user_file import UserFileError
+from tvist_protocol import commands as c
+from tvist_protocol.journal import entry_of
+from tvist_protocol.modes import SafetyMode
+from tvist_protocol.replies import Done, Refused
+from tvist_protocol.values import Frequency
+from tvist_server.about import info_of
+from tvist_server.config import ConfigError, from_mapping, read_toml
+from tvist_server.own_shapers import OwnShaper, OwnShaperError, is_file, load_own
+from tvist_server.planning.planner import Planner
+from tvist_server.setup import Setup
+from tvist_shaping import FirShaper, Impulses, Shaper, zv
+from tvist_shaping.own import TRIED_F_D
+
+from .robots import PAPER, Q1, Q2, Q3, H, Robot, calibration, setup
+
+MINE = '''
+import numpy as np
+from dataclasses import dataclass
+from tvist_shaping import FirShaper, Impulses, custom, zv
+
+def mine(f_d, zeta):
+    """Zero vibration."""
+    return zv(f_d, zeta)
+
+@dataclass
+class Thirds:
+    share: float
+    def __call__(self, f_d, zeta):
+        return Impulses([self.share] * 3, [0.0, 1 / 3 / f_d, 2 / 3 / f_d])
+
+thirds = Thirds(1 / 3)
+MEAN = FirShaper("mean", "the mean of 40 ms", lambda f_d, zeta: np.full(20, 0.05), taps=20)
+TWO = FirShaper("two", "of two modes", lambda f_d, zeta: np.full(20, 0.05), taps=20, modes=2)
+zvd = custom("zvd", [0.5, 0.5], [0.0, 0.5])
+LONG = custom("long", [0.5, 0.5], [0.0, 9.0])
+NUMBER = 3
+class Step:
+    def step(self, q_ref, info): return q_ref
+def raises(f_d, zeta): raise RuntimeError("not today")
+def somewhere(f_d, zeta): return zv(f_d, zeta) if f_d < 100 else None
+'''
+WRONG_NAMES = {
+    "nobody": "mine.py has no nobody; it has mine, thirds, MEAN",
+    "NUMBER": "NUMBER is of type int; it must be a function (f_d, zeta) -> Impulses",
+    "Step": "Step is a class",
+    "raises": "mine.py:raises raises RuntimeError: not today for f_d = 0.1 Hz and ζ = 0; it must serve 0.1 to 200 Hz",
+    "somewhere": "gives NoneType where Impulses are wanted for f_d = 100.2",
+    "zvd": "name is 'zvd', but must be another: there is a shaper of that name already",
+    "": "the name of a shaper in the file is missing",
+}
+WRONG_FILES = {
+    "1 / 0\n": "raises ZeroDivisionError: division by zero in line 1",
+    "\n\ndef f(:\n": "raises SyntaxError: invalid syntax in line 3",
+    "import nothing_of_that_name\n": "raises ModuleNotFoundError: No module named 'nothing_of_that_name' in line 1",
+    "raise SystemExit(2)\n": "raises SystemExit: 2",
+    "": "has no mine; nothing in it is a shaper",
+}
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(MINE, encoding="utf-8")
+    return path
+
+
+class TestLoading:
+    @pytest.mark.parametrize(("name", "called"), [("mine", "mine"), ("thirds", "thirds"), ("MEAN", "mean")])
+    def test_a_function_an_object_and_a_filter_go_by_their_own_names(self, file, name, called):
+        own = load_own(f"{file}:{name}")
+        assert (own.name, own.file, own.attribute) == (called, str(file), name)
+
+    @pytest.mark.parametrize("name", list(WRONG_NAMES))
+    def test_a_name_that_is_no_shaper_is_said_with_its_file(self, file, name):
+        with pytest.raises(OwnShaperError, match=r"^shaper ") as error:
+            load_own(f"{file}:{name}")
+        assert WRONG_NAMES[name] in str(error.value)
+        assert str(file) in str(error.value)
+        assert "\n" not in str(error.value)
+
+    @pytest.mark.parametrize("content", list(WRONG_FILES))
+    def test_a_file_that_does_not_run_is_said_with_the_line(self, file, content):
+        file.write_text(content)
+        with pytest.raises(OwnShaperError) as error:
+            load_own(f"{file}:mine")
+        assert WRONG_FILES[content] in str(error.value)
+        assert "\n" not in str(error.value)
+
+    def test_a_file_that_is_none(self, tmp_path):
+        with pytest.raises(OwnShaperError, match=r"no\.py cannot be read: No such file"):
+            load_own(f"{tmp_path}/no.py:mine")
+        (tmp_path / "folder.py").mkdir()
+        with pytest.raises(UserFileError, match="is a directory"):
+            load_own(f"{tmp_path}/folder.py:mine")
+        with pytest.raises(OwnShaperError, match=r"must be FILE\.py:NAME"):
+            load_own("zv")
+
+    @pytest.mark.parametrize(
+        ("text", "file"), [("zv", False), ("a.py:b", True), ("a.py", True), ("ei(2,0.1)", False)]
+    )
+    def test_what_names_a_file(self, text, file):
+        assert is_file(text) is file
+
+    def test_it_travels_to_another_process_as_a_file_that_must_not_have_changed(self, file):
+        own = load_own(f"{file}:mine")
+        data = pickle.dumps(own)
+        assert pickle.loads(data) == own  # noqa: S301  it is ours
+        file.write_text(MINE + "# another\n")
+        other = pickle.dumps(load_own(f"{file}:thirds"))
+        file.write_text(MINE)
+        with pytest.raises(OwnShaperError, match="has changed"):
+            pickle.loads(other)  # noqa: S301  likewise
+
+
+def test_it_is_tried_out_for_every_frequency_that_a_client_may_tell():
+    bounds = Frequency.__metadata__[0]
+    assert (bounds.ge, bounds.le) == TRIED_F_D
+
+
+class TestStart:
+    def test_a_configuration_takes_it(self, file, tmp_path):
+        path = tmp_path / "robot.toml"
+        path.write_text(f'shaper = "{file}:thirds"\n')
+        made = from_mapping(read_toml(str(path)), "configuration").setup()
+        assert made.shaper == "thirds"
+        assert made.registry.names()[-1] == "thirds"
+
+    @pytest.mark.parametrize("ending", ["toml", "json"])
+    def test_a_state_file_takes_it_beside_another(self, file, tmp_path, ending):
+        path = tmp_path / f"state.{ending}"
+        place = f"{file}:MEAN"
+        path.write_text(json.dumps({"shaper": place}) if ending == "json" else f'shaper = "{place}"\n')
+        config = from_mapping({"shaper": f"{file}:mine", "state": str(path)}, "configuration")
+        made = config.setup()
+        assert made.shaper == "mean"
+        assert [own.name for own in made.own_shapers] == ["mine", "mean"]
+
+    def test_the_same_named_twice_is_one(self, file, tmp_path):
+        path = tmp_path / "state.toml"
+        path.write_text(f'shaper = "{file}:mine"\n')
+        config = from_mapping({"shaper": f"{file}:mine", "state": str(path)}, "configuration")
+        assert len(config.setup().own_shapers) == 1
+
+    def test_every_robot_of_several_has_it(self, file):
+        config = from_mapping({"shaper": f"{file}:mine", "robots": "ur5e*3"}, "configuration")
+        assert [(one.shaper, one.registry.names()[-1]) for one in config.setups()] == [("mine", "mine")] * 3
+
+    def test_two_files_with_one_name_are_refused(self, file, tmp_path):
+        (tmp_path / "other.py").write_text(MINE + "# other\n")
+        path = tmp_path / "state.toml"
+        path.write_text(f'shaper = "{tmp_path}/other.py:mine"\n')
+        with pytest.raises(ConfigError, match="there is a shaper of that name already"):
+            from_mapping({"shaper": f"{file}:mine", "state": str(path)}, "configuration").setup()
+
+    def test_one_that_cannot_be_loaded_is_a_wrong_configuration(self, file):
+        with pytest.raises(ConfigError, match="has no nobody"):
+            from_mapping({"shaper": f"{file}:nobody"}, "configuration").setup()
+
+    def test_one_that_lasts_too_long_for_this_robot_does_not_start(self, file):
+        with pytest.raises(ValueError, match=r"at most max_delay = 1 s; shaper 'long' lasts 9 periods"):
+            Robot(calibration=calibration(), shaper="long", own_shapers=(load_own(f"{file}:LONG"),))
+
+    def test_a_setup_survives_its_recording_where_the_shaper_is_loaded_again(self, file):
+        own = load_own(f"{file}:mine")
+        made = setup(shaper="mine", own_shapers=(own,))
+        content = made.to_builtins()
+        assert Setup.from_builtins(json.loads(json.dumps(content)), [load_own(f"{file}:mine")]) == made
+        (said,) = content["own_shapers"]
+        assert said == {"name": "mine", "file": str(file), "attribute": "mine", "sha256": own.sha256}
+
+    def test_the_start_of_an_older_recording_has_none(self):
+        content = setup().to_builtins()
+        del content["own_shapers"]
+        assert Setup.from_builtins(content) == setup()
+
+
+def own(shaper):
+    return OwnShaper("mine.py", "mine", "0" * 64, shaper)
+
+
+def robot(mine, **changes):
+    """A robot with a shaper of its own beside those that there are."""
+    given = own(mine)
+    return Robot(**({"calibration": calibration(), "shaper": given.name, "own_shapers": (given,)} | changes))
+
+
+LIKE_ZV = Shaper("mine", "as zv", zv, 0.5)
+
+
+class TestOnARobot:
+    def test_states_are_those_of_the_shaper_it_imitates_to_the_last_bit(self):
+        mine, built_in = robot(LIKE_ZV), Robot(calibration=calibration(), shaper="zv")
+        for one in (mine, built_in):
+            one.send(c.MoveJ, q=tuple(Q2))
+            one.until_rest()
+        assert mine.states == built_in.states
+        assert info_of(mine.controller).shaper == "mine"
+
+    def test_a_client_chooses_it_by_its_name_and_names_no_file(self, file):
+        place = f"{file}:thirds"
+        one = Robot(calibration=calibration(), own_shapers=(load_own(place),))
+        assert info_of(one.controller).shapers[-1] == "thirds"
+        assert one.send(c.SetShaper, name="thirds") == Done()
+        assert one.controller.cycle.tvist.name == "thirds"
+        for name in (f"{file}:mine"[-64:], "mine.py:mine", "mine"):
+            for refused in (one.send(c.SetShaper, name=name), one.send(c.SimulationReset, shaper=name)):
+                assert isinstance(refused, Refused)
+                assert refused.code == "unknown_shaper"
+        assert one.send(c.SimulationReset, shaper="thirds") == Done(tick=0)
+
+    def test_it_takes_another_payload_and_estimator_and_fades_in_motion(self):
+        one = robot(FirShaper("mean", "", lambda _f_d, _zeta: np.full(20, 0.05), taps=20), shaper="zv")
+        one.send(c.MoveJ, q=tuple(Q3))
+        one.tick(200)
+        assert one.send(c.SetShaper, name="mean") == Done()
+        one.tick(50)
+        assert one.send(c.SetEstimator, name="fixed", f_d=(8.0,), zeta=(0.1,)) == Done()
+        one.until_rest()
+        assert one.kinds()[-1] == "motion_done"
+        assert np.abs(one.column("target_qdd")).max() < 1.1 * PAPER.acceleration
+
+    def test_a_filter_of_two_modes_is_refused_where_one_is_known(self, file):
+        one = Robot(calibration=None, own_shapers=(load_own(f"{file}:TWO"),))
+        refused = one.send(c.SetShaper, name="two")
+        assert (refused.code, refused.where) == ("out_of_range", "name")
+
+    def test_robots_beside_each_other_know_their_own_alone(self):
+        assert "mine" in info_of(robot(LIKE_ZV).controller).shapers
+        assert "mine" not in info_of(Robot().controller).shapers
+
+
+def exits(_f_d, _zeta):
+    raise SystemExit(1)
+
+
+def divides(_f_d, _zeta):
+    return 1 / 0
+
+
+FAILING = {
+    "raises": (divides, "raises ZeroDivisionError"),
+    "exits": (exits, "raises SystemExit"),
+    "NaN": (lambda _f_d, _zeta: Impulses(np.array([np.nan]), np.array([0.0])), "must be finite"),
+    "nothing": (lambda _f_d, _zeta: None, "gives NoneType"),
+    "sum": (lambda _f_d, _zeta: Impulses(np.array([2.0]), np.array([0.0])), "must sum to 1"),
+    "too long": (lambda f_d, zeta: zv(1e-3 * f_d, zeta), "beyond"),
+}
+
+
+class Turning:
+    """A function that is right until it is told otherwise."""
+
+    def __init__(self, wrong):
+        self.wrong, self.failing = wrong, False
+
+    def __call__(self, f_d, zeta):
+        return (self.wrong if self.failing else zv)(f_d, zeta)
+
+
+@pytest.fixture(params=list(FAILING))
+def failing(request):
+    """A robot whose shaper can be told to fail, that shaper's function, and words of the error."""
+    wrong, words = FAILING[request.param]
+    turning = Turning(wrong)
+    return robot(Shaper("mine", "", turning, 0.5)), turning, words
+
+
+def move(one):
+    one.send(c.MoveJ, q=tuple(Q3))
+
+
+def stream(one):
+    assert one.send(c.ServoStart) == Done()
+    for k in range(150):
+        one.setpoint(k, Q1 + 0.1 * (1 - np.cos(3.0 * k * H)))
+        one.tick()
+
+
+def fade(one):
+    one.send(c.MoveJ, q=tuple(Q3))
+    one.tick(100)
+    assert one.send(c.SetShaper, name="ei") == Done()
+
+
+def rest(one):
+    one.tick(10)
+
+
+class TestOneThatFails:
+    @pytest.mark.parametrize("activity", [move, stream, fade, rest])
+    def test_the_robot_makes_a_protective_stop_that_names_it_and_goes_on_with_another(
+        self, failing, activity
+    ):
+        one, turning, words = failing
+        activity(one)
+        one.tick(100 if activity in {move, fade} else 0)
+        before = len(one.states)
+        turning.failing = True
+        one.tick(1)
+        (event,) = [event for event in one.events if event.kind == "protective_stop"]
+        assert event.tick == before + 1
+        assert event.why.startswith("shaper mine ")
+        assert words in event.why
+        assert "Hz and ζ = " in event.why
+        one.until_rest()
+        assert one.tick().safety_mode == SafetyMode.PROTECTIVE_STOP
+        assert np.abs(one.column("target_qdd")).max() < 50.0  # a stop at the torque limits, and no jump
+        assert np.abs(np.diff(one.column("target_q"), axis=0)).max() < 1.1 * PAPER.velocity * H
+        assert one.send(c.SetShaper, name="ei") == Done()
+        assert one.send(c.UnlockProtectiveStop) == Done()
+        one.send(c.MoveJ, q=tuple(Q2))
+        one.until_rest()
+        assert one.kinds()[-1] == "motion_done"
+
+    def test_unlocked_without_another_shaper_it_stops_again(self, failing):
+        one, turning, _ = failing
+        turning.failing = True
+        one.tick()
+        assert one.send(c.UnlockProtectiveStop) == Done()
+        assert one.tick().safety_mode == SafetyMode.PROTECTIVE_STOP
+
+    def test_it_cannot_be_chosen_again_and_says_why(self, failing):
+        one, turning, words = failing
+        assert one.send(c.SetShaper, name="zv") == Done()
+        turning.failing = True
+        refused = one.send(c.SetShaper, name="mine")
+        assert (refused.code, refused.where) == ("out_of_range", "name")
+        assert words in refused.why or "last" in refused.why
+
+    def test_what_plans_beside_the_tick_refuses_in_words_and_does_not_end(self, failing):
+        one, turning, words = failing
+        turning.failing = True
+        plan = Planner(one.controller.setup).plan(
+            c.SetShaper(token=one.token, name="mine"), one.controller.basis
+        )
+        assert words in plan.found.reply.why
+
+
+class TestReplay:
+    @pytest.fixture
+    def recorded(self, file):
+        """A recording of a motion with a shaper of one's own."""
+        made = setup(calibration=calibration(), shaper="mine", own_shapers=(load_own(f"{file}:mine"),))
+        one = Robot(calibration=calibration(), shaper="mine", own_shapers=made.own_shapers)
+        lease = one.controller.session.lease
+        journal = [
+            entry_of(1, c.TakeControl(client="a", lease_s=30.0)),
+            entry_of(1, c.MoveJ(token=lease.token, q=tuple(Q2.tolist()))),
+        ]
+        one.send(c.MoveJ, q=tuple(Q2.tolist()))
+        one.tick(300)
+        return RecordingFile(
+            robot="ur5e", info=None, start=json.loads(json.dumps(made.to_builtins())), states=tuple(one.states),
+            events=(), truths=(), journal=tuple(journal), complete=True, dropped=None, note=None,
+        )  # fmt: skip
+
+    def test_it_is_equal_with_the_file_and_has_no_note(self, recorded, file):
+        done = replay_file(recorded, None, [load_own(f"{file}:mine")])
+        assert (done.first_difference, done.notes) == (None, [])
+
+    def test_it_is_equal_with_the_file_elsewhere(self, recorded, file, tmp_path):
+        moved = file.rename(tmp_path / "moved.py")
+        assert replay_file(recorded, None, [load_own(f"{moved}:mine")]).notes == []
+
+    def test_without_the_file_it_says_which_is_missing_and_runs_nothing(self, recorded, file):
+        file.write_text("raise SystemExit('it was run')")
+        with pytest.raises(ReplayError, match=r"shaper mine of .*mine\.py:mine, .*give --shaper"):
+            replay_file(recorded)
+
+    def test_a_file_that_has_changed_is_noted(self, recorded, file):
+        file.write_text(MINE + "# a comment\n")
+        done = replay_file(recorded, None, [load_own(f"{file}:mine")])
+        assert done.first_difference is None
+        assert "mine.py has changed since" in done.notes[0]
+
+    def test_a_shaper_that_was_not_there_is_one_too_many(self, recorded, file):
+        with pytest.raises(ReplayError, match="without the shaper mean"):
+            replay_file(recorded, None, [load_own(f"{file}:{name}") for name in ("mine", "MEAN")])
+
+    @pytest.mark.parametrize("said", [3, [3], [{"name": "mine"}], {"a": 1}, None])
+    def test_a_start_that_holds_nonsense_is_said(self, recorded, said):
+        recorded.start["own_shapers"] = said
+        with pytest.raises(ReplayError, match="own_shapers"):
+            replay_file(recorded)

@@ -1,0 +1,276 @@
+"""Shapers of one's own: run as the built-in ones do, are tried out, and do no harm when they fail."""
+
+import numpy as np
+import pytest
+
+from tvist_shaping import (
+    BUILT_IN,
+    SHAPERS,
+    DesignError,
+    Filter,
+    FirShaper,
+    Fixed,
+    Impulses,
+    Registry,
+    Shaper,
+    ShaperFailureError,
+    SteadyFilter,
+    TvistFilter,
+    UnknownShaperError,
+    check_shaper,
+    custom,
+    make_filter,
+    shaper,
+    shaper_of,
+    zv,
+)
+
+REFERENCE = 1.0 - np.cos(np.pi * np.clip(np.arange(0.0, 1.2, 0.002), 0.0, 1.0))
+
+
+def mean(taps=20, name="mean"):
+    return FirShaper(name, "a mean", lambda _f_d, _zeta: np.full(taps, 1.0 / taps), taps=taps)
+
+
+def shaped(tvist, reference=REFERENCE):
+    return np.array([tvist.filter([q])[0] for q in reference])
+
+
+def exits(f_d, zeta):
+    raise SystemExit(3)
+
+
+def fails(f_d, zeta):
+    return 1 / 0
+
+
+def bare(A, tau):
+    """Impulses that nobody has checked, as a careless function could make them."""
+    return lambda _f_d, _zeta: Impulses(np.array(A), np.array(tau))
+
+
+WRONG = {
+    "raises": (fails, "raises ZeroDivisionError"),
+    "exits": (exits, "raises SystemExit: 3"),
+    "NaN": (bare([np.nan, 1.0], [0.0, 0.1]), "must be finite"),
+    "sum": (bare([0.5, 0.4], [0.0, 0.1]), "must sum to 1"),
+    "shapes": (bare([1.0], [0.0, 0.1]), "must be (N,)"),
+    "times": (bare([0.5, 0.5], [0.1, 0.2]), "must ascend from 0"),
+    "list": (lambda _f_d, _zeta: [0.5, 0.5], "gives list where Impulses are wanted"),
+    "nothing": (lambda _f_d, _zeta: None, "gives NoneType"),
+}
+WRONG_TAPS = {
+    "raises": (fails, "raises ZeroDivisionError"),
+    "NaN": (lambda _f_d, _zeta: [np.nan, 1.0], "not finite"),
+    "sum": (lambda _f_d, _zeta: [0.5, 0.4], "sum to 0.9"),
+    "shape": (lambda _f_d, _zeta: [[1.0]], "shape (1, 1)"),
+    "many": (lambda _f_d, _zeta: np.full(21, 1 / 21), "must give 1 to 20"),
+    "none": (lambda _f_d, _zeta: [], "shape (0,)"),
+    "peak": (lambda _f_d, _zeta: [2.0, -1.0], "sum to 3, beyond its peak of 1"),
+    "words": (lambda _f_d, _zeta: "taps", "raises ValueError"),
+}
+
+
+class Turning:
+    """A function that is right until it is told otherwise."""
+
+    def __init__(self, right, wrong):
+        self.right, self.wrong, self.failing = right, wrong, False
+
+    def __call__(self, f_d, zeta):
+        return (self.wrong if self.failing else self.right)(f_d, zeta)
+
+
+def test_a_function_gives_the_bits_of_the_built_in_shaper_that_it_imitates():
+    fixed = Fixed([7.0], [0.1])
+    own, built_in = (make_filter(one, fixed, joints=1) for one in (shaper_of(zv, name="mine"), "zv"))
+    assert isinstance(own, TvistFilter)
+    assert own.name == "mine"
+    np.testing.assert_array_equal(shaped(own), shaped(built_in))
+
+
+def test_a_fir_filter_is_the_convolution_with_its_taps():
+    random = np.random.default_rng(1)
+    taps = random.random(30)
+    taps /= taps.sum()
+    tvist = make_filter(
+        FirShaper("mine", "", lambda _f_d, _zeta: taps, taps=40), Fixed([7.0], [0.1]), joints=1
+    )
+    assert isinstance(tvist, SteadyFilter)
+    assert isinstance(tvist, Filter)
+    expected = np.convolve(REFERENCE, taps)[: len(REFERENCE)]
+    np.testing.assert_allclose(shaped(tvist), expected, atol=1e-12)
+    assert tvist.delay == pytest.approx(29 * 0.002)
+    assert tvist.mean_delay == pytest.approx(0.002 * taps @ np.arange(30))
+
+
+def test_duration_and_peak_are_found_by_trying_out():
+    made = shaper_of(
+        lambda f_d, _zeta: Impulses(np.array([1.2, -0.2]), np.array([0.0, 0.7 / f_d])), name="mine"
+    )
+    assert made.duration_periods == pytest.approx(0.7)
+    assert made.peak == pytest.approx(1.4)
+    assert shaper_of(zv).name == "zv"
+    assert shaper_of(zv).peak == 1.0
+    assert shaper_of(SHAPERS["ei_exact"].function, name="mine", zeta_max=0.5).zeta_max == 0.5
+
+
+@pytest.mark.parametrize("name", list(SHAPERS))
+def test_every_shaper_of_the_catalogue_passes_the_trial(name):
+    check_shaper(SHAPERS[name])
+
+
+@pytest.mark.parametrize("name", list(WRONG))
+def test_a_function_that_is_wrong_is_refused_with_the_mode(name):
+    function, words = WRONG[name]
+    with pytest.raises(ShaperFailureError, match=r"'mine'.* for f_d = 0\.1 Hz and ζ = 0") as error:
+        shaper_of(function, name="mine")
+    assert words in str(error.value)
+    assert error.value.name == "mine"
+
+
+@pytest.mark.parametrize("name", list(WRONG_TAPS))
+def test_taps_that_are_wrong_are_refused_with_the_mode(name):
+    function, words = WRONG_TAPS[name]
+    with pytest.raises(ShaperFailureError, match=r"'mine'.* for f_d = 0\.1 Hz and ζ = 0") as error:
+        check_shaper(FirShaper("mine", "", function, taps=20))
+    assert words in str(error.value)
+
+
+def test_a_function_that_is_wrong_somewhere_only_is_refused_too():
+    with pytest.raises(ShaperFailureError, match="for f_d = 200 Hz"):
+        shaper_of(lambda f_d, zeta: zv(f_d, zeta) if f_d < 190.0 else None, name="mine")
+    with pytest.raises(ShaperFailureError, match=r"ζ = 0\.99"):
+        shaper_of(lambda f_d, zeta: zv(f_d, zeta) if zeta < 0.97 else None, name="mine")
+
+
+@pytest.mark.parametrize(("field", "declared"), [("duration_periods", 0.4), ("peak", 2.0)])
+def test_a_shaper_that_declares_less_than_it_does_is_refused(field, declared):
+    values = {"duration_periods": 0.5, "peak": 3.0} | {field: declared}
+    mine = Shaper(
+        "mine", "", lambda f_d, _zeta: Impulses(np.array([2.0, -1.0]), np.array([0.0, 0.5 / f_d])), **values
+    )
+    with pytest.raises(ShaperFailureError, match=field):
+        check_shaper(mine)
+
+
+@pytest.mark.parametrize(
+    "changes", [{"taps": 0}, {"taps": 501}, {"modes": 0}, {"peak": 0.5}, {"period": 0.0}]
+)
+def test_a_fir_shaper_checks_what_it_declares(changes):
+    with pytest.raises(DesignError, match=next(iter(changes))):
+        FirShaper(**({"name": "mine", "description": "", "function": zv, "taps": 20} | changes))
+
+
+@pytest.mark.parametrize(
+    ("field", "declared"),
+    [
+        ("duration_periods", "0.5"),
+        ("duration_periods", np.nan),
+        ("zeta_max", 1.5),
+        ("zeta_max", 0),
+        ("peak", 0.5),
+    ],
+)
+def test_a_shaper_that_declares_what_cannot_be_is_refused(field, declared):
+    values = {"name": "mine", "description": "", "function": zv, "duration_periods": 0.5} | {field: declared}
+    with pytest.raises(DesignError, match=field):
+        check_shaper(Shaper(**values))
+
+
+def turned(kind, name):
+    """A filter whose function can be told to fail, and that function."""
+    if kind == "taps":
+        turning = Turning(lambda _f_d, _zeta: np.full(20, 0.05), WRONG_TAPS[name][0])
+        return turning, FirShaper("mine", "", turning, taps=20)
+    turning = Turning(zv, WRONG[name][0])
+    return turning, Shaper("mine", "", turning, 0.5)
+
+
+FAILURES = [*(("impulses", name) for name in WRONG), *(("taps", name) for name in WRONG_TAPS)]
+
+
+@pytest.mark.parametrize(("kind", "name"), FAILURES)
+def test_a_filter_in_motion_goes_on_with_its_last_weights_and_says_why(kind, name):
+    turning, mine = turned(kind, name)
+    tvist, other = (make_filter(mine, Fixed([7.0], [0.1]), joints=1) for _ in range(2))
+    right = shaped(other)
+    first = shaped(tvist, REFERENCE[:200])
+    assert tvist.fault is None
+    turning.failing = True
+    rest = shaped(tvist, REFERENCE[200:])
+    np.testing.assert_array_equal(
+        np.concatenate([first, rest]), right
+    )  # modes that do not change: same weights
+    assert (WRONG_TAPS if kind == "taps" else WRONG)[name][1] in tvist.fault
+    assert "f_d = 7 Hz and ζ = 0.1" in tvist.fault
+    turning.failing = False
+    tvist.reset([0.0])
+    assert tvist.fault is None
+    np.testing.assert_array_equal(shaped(tvist), right)
+
+
+@pytest.mark.parametrize("kind", ["impulses", "taps"])
+def test_a_filter_that_fails_at_once_is_not_made(kind):
+    turning, mine = turned(kind, "raises")
+    turning.failing = True
+    with pytest.raises(ShaperFailureError, match="shaper 'mine' raises ZeroDivisionError"):
+        make_filter(mine, Fixed([7.0], [0.1]), joints=1)
+
+
+def test_impulses_that_last_longer_than_was_declared_are_not_used():
+    turning = Turning(zv, lambda f_d, zeta: zv(0.5 * f_d, zeta))
+    tvist = make_filter(Shaper("mine", "", turning, 0.5), Fixed([7.0], [0.1]), joints=1)
+    turning.failing = True
+    shaped(tvist)
+    assert "last 0.142857 s, beyond 0.0714286 s" in tvist.fault
+    assert tvist.impulses.duration == pytest.approx(0.5 / 7.0)
+
+
+def test_what_fails_in_a_copy_that_runs_ahead_leaves_the_filter_as_it_is():
+    turning, mine = turned("impulses", "raises")
+    tvist = make_filter(mine, Fixed([7.0], [0.1]), joints=1)
+    ahead = tvist.fork()
+    turning.failing = True
+    shaped(ahead)
+    assert ahead.fault is not None
+    assert tvist.fault is None
+
+
+class TestRegistry:
+    def test_own_shapers_stand_behind_the_others_and_go_by_their_names(self):
+        registry = Registry([shaper_of(zv, name="mine"), mean()])
+        assert registry.names() == (*BUILT_IN.names(), "mine", "mean")
+        assert registry.make_filter("mean", Fixed([7.0], [0.1]), joints=2).name == "mean"
+        assert "mine" not in BUILT_IN.names()
+
+    def test_how_many_modes_each_wants(self):
+        two = FirShaper("two", "", lambda _f_d, _zeta: [1.0], taps=1, modes=2)
+        registry = Registry([shaper_of(zv, name="mine"), two])
+        assert [registry.modes_of(name, 3) for name in ("zv", "mine", "two", "auto")] == [3, 3, 2, 4]
+
+    @pytest.mark.parametrize(
+        "name", ["zv", "auto", "", "Mine", "mine.py:mine", "a b", "ζ", "x" * 65, None, 3]
+    )
+    def test_a_name_that_cannot_be_one_or_is_taken_is_refused(self, name):
+        with pytest.raises(DesignError, match="name is "):
+            Registry([mean(name=name)])
+
+    def test_a_filter_for_another_period_is_refused(self):
+        with pytest.raises(DesignError, match=r"period is 0\.004"):
+            Registry([FirShaper("mine", "", lambda _f_d, _zeta: [1.0], taps=1, period=0.004)])
+
+    def test_two_of_one_name_are_refused(self):
+        with pytest.raises(DesignError, match="there is a shaper of that name already"):
+            Registry([mean(), custom("mean", [1.0], [0.0])])
+
+    def test_an_unknown_name_lists_the_own_ones_too(self):
+        with pytest.raises(UnknownShaperError, match=r"did you mean 'mean'.* auto-target, mean"):
+            Registry([mean()]).check("meen")
+
+    def test_it_cannot_be_changed(self):
+        with pytest.raises(TypeError):
+            Registry([mean()]).own["other"] = mean()
+
+    def test_a_shaper_of_the_catalogue_is_taken_as_it_is(self):
+        assert make_filter(shaper("ei"), Fixed([7.0], [0.1]), joints=1).name == "ei"

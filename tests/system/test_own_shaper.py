@@ -1,0 +1,126 @@
+"""A shaper of one's own from a shell: served, evaluated, refused in a sentence, and stopped when it fails."""
+
+import pytest
+from tests.conformance.served import Served, refused_to_start
+from tests.conformance.wire import Wire
+from tests.system.test_command_line import tvist
+
+MINE = '''
+from pathlib import Path
+
+import numpy as np
+
+from tvist_shaping import FirShaper, Impulses, custom, zv
+
+
+def mine(f_d, zeta):
+    """Zero vibration, as long as there is no file called stop."""
+    if Path(__file__).with_name("stop").exists():
+        raise RuntimeError("there is a file called stop")
+    return zv(f_d, zeta)
+
+
+def unequal(f_d, zeta):
+    return Impulses(np.array([0.5, 0.4]), np.array([0.0, 0.5 / f_d]))
+
+
+LONG = custom("long", [0.5, 0.5], [0.0, 9.0])
+MEAN = FirShaper("mean", "the mean of 40 ms", lambda f_d, zeta: np.full(20, 0.05), taps=20)
+'''
+WRONG = {
+    "mine.py": "the name of a shaper in the file is missing",
+    "mine.py:nobody": "mine.py has no nobody; it has mine, unequal, LONG, MEAN",
+    "mine.py:unequal": "mine.py:unequal raises ImpulseError: A sums to 0.9, but must sum to 1 within 1e-9",
+    "mine.py:np": "np is of type module",
+    "other.py:mine": "other.py cannot be read: No such file or directory",
+}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "mine.py").write_text(MINE, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.mark.parametrize("place", list(WRONG))
+def test_one_that_cannot_be_loaded_does_not_start_a_server(folder, place, monkeypatch):
+    monkeypatch.chdir(folder)
+    code, said = refused_to_start("--shaper", place)
+    assert (code, WRONG[place] in said) == (2, True), said
+
+
+def test_one_that_lasts_too_long_does_not_start_a_server(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    code, said = refused_to_start("--shaper", "mine.py:LONG")
+    assert code == 2
+    assert "at most max_delay = 1 s; shaper 'long' lasts 9 periods" in said
+
+
+@pytest.mark.parametrize("command", [("shapers",), ("evaluate", "--random", 1), ("shaperbench", "--quick")])
+@pytest.mark.parametrize("place", ["mine.py:nobody", "mine.py:unequal"])
+def test_every_command_refuses_it_alike(folder, command, place):
+    tvist(*command, "--shaper", place, cwd=folder).assert_failed(2, WRONG[place])
+
+
+def test_a_replay_takes_a_file_alone(folder):
+    tvist("replay", "none.mcap", "--shaper", "zv", cwd=folder).assert_failed(2, "must be FILE.py:NAME")
+
+
+def test_it_stands_in_the_table_and_the_json_of_shapers(folder):
+    places = ("--shaper", "mine.py:mine", "--shaper", "mine.py:MEAN")
+    listed = tvist("shapers", "--json", *places, cwd=folder).assert_done().json["shapers"]
+    zv, mine, mean = (next(one for one in listed if one["name"] == name) for name in ("zv", "mine", "mean"))
+    same = {"name", "description"}
+    assert {k: v for k, v in mine.items() if k not in same} == {k: v for k, v in zv.items() if k not in same}
+    assert mine["description"] == "Zero vibration, as long as there is no file called stop."
+    assert (len(mean["amplitudes"]), mean["mean_delay_ms"]) == (20, pytest.approx(19.0))
+
+
+@pytest.mark.slow
+def test_processes_that_share_the_work_load_it_again(folder):
+    """Ten motions and more are shared among processes; the shaper travels there as its file."""
+    same = ("--random", 10, "--no-baselines", "--clean", "--json")
+    mine = tvist("evaluate", "--shaper", "mine.py:mine", *same, cwd=folder).assert_done().json
+    assert mine["shaper"] == "mine"
+    assert mine["moves"] == tvist("evaluate", "--shaper", "zv", *same).assert_done().json["moves"]
+
+
+def test_an_evaluation_never_counts_old_weights(folder):
+    """A function that fails between what is tried out and the motion ends the command in a sentence."""
+    later = """
+calls = []
+def later(f_d, zeta):
+    calls.append(f_d)
+    return zv(f_d, zeta) if len(calls) < 700 else None
+"""
+    (folder / "mine.py").write_text(MINE + later, encoding="utf-8")
+    ended = tvist("evaluate", "--random", 1, "--no-baselines", "--shaper", "mine.py:later", cwd=folder)
+    ended.assert_failed(1, "shaper later gives NoneType where Impulses are wanted for f_d = ")
+
+
+class TestServed:
+    def test_a_client_names_it_and_no_file(self, folder, monkeypatch):
+        monkeypatch.chdir(folder)
+        how = ("--clock", "lockstep", "--shaper", "mine.py:mine")
+        with Served(*how) as served, Wire(served.endpoint) as wire, wire.control() as token:
+            info = wire.info()
+            assert info["shaper"] == "mine"
+            assert "mean" not in info["shapers"]
+            for name in ("mine.py:MEAN", "mean", "./mine.py:mine"):
+                refused = wire.command("set_shaper", token=token, name=name)
+                assert (refused["type"], refused["code"]) == ("refused", "unknown_shaper")
+            for name in ("zv", "mine"):
+                assert wire.command("set_shaper", token=token, name=name)["type"] == "done"
+
+    def test_one_that_fails_stops_the_arm_and_leaves_the_server(self, folder, monkeypatch):
+        monkeypatch.chdir(folder)
+        with Served("--shaper", "mine.py:mine", "--record", "mine.mcap") as served:
+            at = ("--endpoint", served.endpoint)
+            assert "moved to Q2" in tvist("move", "Q2", *at).assert_done().out
+            (folder / "stop").touch()
+            served.wait_until_said("shaper mine raises RuntimeError: there is a file called stop for f_d = ")
+            tvist("move", "Q1", *at).assert_failed(1, "PROTECTIVE_STOP")
+            with Wire(served.endpoint) as wire, wire.control() as token:
+                assert wire.command("set_shaper", token=token, name="zv")["type"] == "done"
+            tvist("unlock", *at).assert_done()
+            assert "moved to Q2" in tvist("move", "Q2", *at).assert_done().out

@@ -1,0 +1,171 @@
+"""Shapers from a person's own file, named FILE.py:NAME.
+
+Only the command line, a configuration and a state file name files: a client on the network chooses among the names of
+what is loaded, and a recording never makes anybody run a file.
+"""
+
+import hashlib
+import re
+import sys
+import traceback
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from msgspec import Struct
+
+from tvist_plant.user_file import read_bytes
+from tvist_shaping.errors import ShaperFailureError, ShapingError
+from tvist_shaping.fir_shaper import FirShaper
+from tvist_shaping.named import AnyShaper, Registry
+from tvist_shaping.own import TRIED_F_D, check_shaper, shaper_of
+from tvist_shaping.shaper import Shaper
+
+_FILE = re.compile(r"(?P<file>.*\.py)(?::(?P<attribute>.*))?", re.DOTALL)
+
+
+class OwnShaperError(ValueError):
+    """A file holds no such shaper; the sentence names file and name, and says why."""
+
+
+class RecordedShaper(Struct, frozen=True):
+    """What a recording says of a shaper from a file."""
+
+    name: str
+    """What it is called on the wire and in tables."""
+    file: str
+    """Path, as it was given."""
+    attribute: str
+    """Name in the file."""
+    sha256: str
+    """Of the file, in hexadecimal."""
+
+
+@dataclass(frozen=True)
+class OwnShaper:
+    """A shaper that was loaded from a file."""
+
+    file: str
+    """Path, as it was given."""
+    attribute: str
+    """Name in the file."""
+    sha256: str
+    """Of the file's bytes that were run, in hexadecimal. What the file imports is not in it."""
+    shaper: AnyShaper = field(compare=False)
+    """Tried out over every mode that a client may tell a robot."""
+
+    @property
+    def name(self) -> str:
+        """What it is called on the wire and in tables."""
+        return self.shaper.name
+
+    @property
+    def place(self) -> str:
+        """FILE.py:NAME."""
+        return f"{self.file}:{self.attribute}"
+
+    @property
+    def recorded(self) -> RecordedShaper:
+        """What a recording says of it."""
+        return RecordedShaper(self.name, self.file, self.attribute, self.sha256)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel to another process as the file's name: a function cannot."""
+        return _load_again, (self.place, self.sha256)
+
+
+def is_file(shaper: str) -> bool:
+    """Whether a shaper is named by a file, FILE.py:NAME, rather than by its name."""
+    return _FILE.fullmatch(shaper) is not None
+
+
+def load_own(place: str) -> OwnShaper:
+    """Run a file, and try out the shaper of a name in it.
+
+    Args:
+        place: FILE.py:NAME. NAME is a function (f_d [Hz], ζ [-]) -> `Impulses`, a `Shaper` or a `FirShaper`.
+
+    Raises:
+        OwnShaperError: There is no such file or name, running the file raises, what the name stands for is no shaper,
+            or that fails for a mode.
+        UserFileError: It is no file with a text of at most 4 MiB.
+    """
+    named = _FILE.fullmatch(place)
+    if named is None:
+        raise OwnShaperError(
+            f"shaper is {place!r}: must be FILE.py:NAME, a Python file and the name of a shaper in it"
+        )
+    file, attribute = named["file"], named["attribute"]
+    if not attribute:
+        raise OwnShaperError(f"shaper {place}: the name of a shaper in the file is missing: give {file}:NAME")
+    try:
+        content = read_bytes(file, "shaper")
+    except OSError as error:
+        raise OwnShaperError(f"shaper {place}: {file} cannot be read: {error.strerror}") from error
+    sha256 = hashlib.sha256(content).hexdigest()
+    module = _run(content, place, file, sha256)
+    if attribute not in vars(module):
+        there = ", ".join(name for name, value in vars(module).items() if _may_be_one(value, module.__name__))
+        known = f"it has {there}" if there else "nothing in it is a shaper"
+        raise OwnShaperError(f"shaper {place}: {file} has no {attribute}; {known}")
+    found = vars(module)[attribute]
+    try:
+        shaper = _shaper(found, attribute, place)
+        Registry([shaper])
+    except ShaperFailureError as error:
+        limits = f"{TRIED_F_D[0]:g} to {TRIED_F_D[1]:g} Hz and any damping ratio below its zeta_max"
+        raise OwnShaperError(f"shaper {place} {error.why}; it must serve {limits}") from error
+    except ShapingError as error:
+        raise OwnShaperError(f"shaper {place}: {error}") from error
+    return OwnShaper(file, attribute, sha256, shaper)
+
+
+def _run(content: bytes, place: str, file: str, sha256: str) -> ModuleType:
+    module = ModuleType(f"tvist_own_shaper_{sha256[:16]}")
+    module.__file__ = str(Path(file).resolve())
+    sys.modules[module.__name__] = module  # dataclasses and others look their own module up there
+    try:
+        exec(compile(content, module.__file__, "exec"), module.__dict__)  # noqa: S102  it is what the user asked for
+    except (Exception, SystemExit) as error:
+        frames = [
+            frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == module.__file__
+        ]
+        line = error.lineno if isinstance(error, SyntaxError) else frames[-1].lineno if frames else None
+        where = "" if line is None else f" in line {line}"
+        said = " ".join(str(error.msg if isinstance(error, SyntaxError) else error).split())
+        words = f"{type(error).__name__}: {said}" if said else type(error).__name__
+        raise OwnShaperError(f"shaper {place}: running {file} raises {words}{where}") from error
+    return module
+
+
+def _shaper(found: object, attribute: str, place: str) -> AnyShaper:
+    if isinstance(found, Shaper | FirShaper):
+        check_shaper(found)
+        return found
+    if not callable(found) or isinstance(found, type):
+        kind = "a class" if isinstance(found, type) else f"of type {type(found).__name__}"
+        raise OwnShaperError(
+            f"shaper {place}: {attribute} is {kind}; it must be a function (f_d, zeta) -> Impulses, a Shaper or a "
+            "FirShaper of tvist_shaping"
+        )
+    return shaper_of(found, name=attribute)
+
+
+def _may_be_one(value: object, module: str) -> bool:
+    own = callable(value) and not isinstance(value, type) and getattr(value, "__module__", None) == module
+    return own or isinstance(value, Shaper | FirShaper)
+
+
+@lru_cache(maxsize=8)
+def _load_again(place: str, sha256: str) -> OwnShaper:
+    """Load a shaper in a process that works for the one that loaded it first.
+
+    Raises:
+        OwnShaperError: The file has changed since, or cannot be loaded.
+    """
+    found = load_own(place)
+    if found.sha256 != sha256:
+        raise OwnShaperError(f"shaper {place}: the file has changed since it was loaded first")
+    return found
