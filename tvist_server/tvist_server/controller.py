@@ -25,6 +25,7 @@ from tvist_server.declared_payload import DeclaredPayload
 from tvist_server.events import Fields
 from tvist_server.faults import Faults
 from tvist_server.filters import Filters
+from tvist_server.instruments.wrench import ToolWrench
 from tvist_server.motion import MotionControl
 from tvist_server.motion_commands import MotionCommands
 from tvist_server.peripherals import Peripherals
@@ -81,6 +82,7 @@ class Controller:
         )
         self._seed = setup.seed
         self._reporter = Reporter(setup.description)
+        self._wrench = ToolWrench(setup.description)
         collisions = CollisionModel(setup.description, body(setup.payload))
         self.motion = MotionControl(self.cycle, collisions, self._emit, setup.mode)
         self.session = Session(timeouts=setup.clock == "realtime")
@@ -233,8 +235,15 @@ class Controller:
     def io(self) -> Io:
         """Inputs, outputs and registers as they are for the next tick."""
         return self.peripherals.io(
-            self.tick_number + 1, self.declared, self.motion.wanted_speed, self.programs
+            self.tick_number + 1, self.declared, self.motion.wanted_speed, self.programs, self.wrench()
         )
+
+    def wrench(self) -> list[float]:
+        """What pushes the tool in the last tick: force and torque at its centre point, base frame [N, N m].
+
+        It is computed when it is asked for.
+        """
+        return self._wrench.of(self.latest, self.peripherals.tcp_offset)
 
     def changed_io(self) -> Io | None:
         """Inputs, outputs and registers where they changed since this was asked last, before a tick; else None."""

@@ -133,7 +133,9 @@ class Peripherals:
         else:
             self._doubles[bank][first:last] = [_double(k, value, bank) for k, value in enumerate(values)]
 
-    def io(self, tick: int, payload: Payload, speed: float, program: LoadedProgram) -> Io:
+    def io(
+        self, tick: int, payload: Payload, speed: float, program: LoadedProgram, wrench: list[float]
+    ) -> Io:
         """What is told of all that.
 
         Args:
@@ -141,6 +143,7 @@ class Peripherals:
             payload: Declared.
             speed: The speed slider [-].
             program: The one that is loaded.
+            wrench: At the tool centre point in the last tick, base frame [N, N m].
         """
         return Io(
             tick=tick,
@@ -162,6 +165,7 @@ class Peripherals:
             program=program.name,
             program_state=program.state,
             program_line=program.line,
+            actual_TCP_force=wrench,
         )
 
     def _analog_output(self, number: int) -> float:

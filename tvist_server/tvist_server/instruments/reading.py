@@ -8,6 +8,7 @@ from tvist_protocol.stream import State
 from tvist_server.instruments.meters import Meters
 from tvist_server.instruments.ratings import JointRating
 from tvist_server.instruments.rigid_body import RigidBody
+from tvist_server.instruments.wrench import ToolWrench
 
 POWERED = frozenset(range(RobotMode.POWER_ON, RobotMode.RUNNING + 1))
 """Robot modes in which the arm has power."""
@@ -25,6 +26,7 @@ class Reading:
         state: The tick.
         io: Terminals and registers in force.
         rigid: The arm's mechanics, shared by all ticks.
+        wrench: What pushes its tool, shared likewise.
         ratings: Of its joints.
         current: Of its motors [A].
         meters: Temperatures and energies at this tick.
@@ -36,6 +38,7 @@ class Reading:
         state: State,
         io: Io,
         rigid: RigidBody,
+        wrench: ToolWrench,
         ratings: list[JointRating],
         current: list[float],
         meters: Meters,
@@ -52,7 +55,7 @@ class Reading:
         self._current = current
         self._temperatures = meters.temperatures
         self._power, self._consumed, self._dissipated = meters.power, meters.consumed, meters.dissipated
-        self._rigid = rigid
+        self._rigid, self._wrench = rigid, wrench
         self._ratings = ratings
 
     @property

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import hypot, sqrt
+from math import hypot
 
 import numpy as np
 import pinocchio as pin
@@ -14,10 +14,6 @@ from tvist_protocol.values import Payload
 
 ELBOW = 2
 """The joint whose axis is the elbow."""
-NEAR_SINGULAR = 0.01
-"""Manipulability √det(J Jᵀ) below which forces are damped; a UR5e has up to 0.11 [m³ with six joints]."""
-DAMPING = 0.08
-"""λ where the posture is singular [m, or -]."""
 
 
 @dataclass(frozen=True)
@@ -69,10 +65,6 @@ class RigidBody:
         self._bare = self._model.inertias[self._last].copy()
         self._payload: Payload | None = None
         self._elbow = ELBOW + 1 if description.joints > ELBOW else 0
-        drives = description.drives
-        self._rotor = np.array(drives.rotor_inertia)
-        self._friction = np.array(drives.coulomb_friction)
-        self._width, self._linear = drives.friction_width, drives.linear_friction
 
     def tool(self, q: list[float], qd: list[float], qdd: list[float], offset: list[float]) -> Tool:
         """Motion of the tool centre point.
@@ -130,40 +122,6 @@ class RigidBody:
         pin.rnea(self._model, self._data, np.array(q), np.array(qd), np.array(qdd))
         wrench = -self._data.oMi[1].act(self._data.f[1]).vector
         return [float(value) for value in wrench]
-
-    def expected(self, moment: list[float], qd: list[float], qdd: list[float]) -> Floats:
-        """What drives that follow their target give: the rigid arm's torque, rotors and friction, shape (n,) [N m]."""
-        velocity = np.array(qd) / self._width
-        friction = self._friction * (velocity if self._linear else np.tanh(velocity))
-        expected: Floats = np.array(moment) + self._rotor * np.array(qdd) + friction
-        return expected
-
-    def wrench(self, q: list[float], torque: Floats, offset: list[float]) -> Floats:
-        """Force at the tool centre point that pushes the joints with such torques, shape (6,) [N, N m].
-
-        F with Jᵀ F = τ by damped least squares, F = J (Jᵀ J + λ² 1)⁻¹ τ, with λ = λ₀ (1 - w/w₀) where the
-        manipulability w is below w₀ (Nakamura and Hanafusa, 1986). What no joint feels is zero.
-
-        Args:
-            q: Joint positions [rad].
-            torque: Of the surroundings on the joints, shape (n,) [N m].
-            offset: Of the tool centre point in the flange frame.
-        """
-        jacobian = pin.computeFrameJacobian(
-            self._model, self._data, np.array(q), self._flange, pin.LOCAL_WORLD_ALIGNED
-        ).reshape(6, -1)  # of an arm with one joint pinocchio makes a plain vector
-        rotation = self._data.oMf[self._flange].rotation
-        if any(offset[:3]):
-            jacobian[:3] -= pin.skew(rotation @ np.array(offset[:3])) @ jacobian[3:]
-        tall = jacobian.shape[1] <= jacobian.shape[0]
-        square = jacobian.T @ jacobian if tall else jacobian @ jacobian.T
-        manipulability = sqrt(max(float(np.linalg.det(square)), 0.0))
-        if manipulability < NEAR_SINGULAR:
-            damping = DAMPING * (1.0 - manipulability / NEAR_SINGULAR)
-            square.flat[:: len(square) + 1] += damping * damping
-        if tall:
-            return np.array(jacobian @ np.linalg.solve(square, torque))
-        return np.array(np.linalg.solve(square, jacobian @ torque))
 
     def _load(self, payload: Payload) -> None:
         """Let the last link carry this payload."""

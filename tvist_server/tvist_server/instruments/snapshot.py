@@ -13,6 +13,7 @@ from tvist_server.instruments.rigid_body import RigidBody
 from tvist_server.instruments.status import StatusValues
 from tvist_server.instruments.terminals import TerminalValues
 from tvist_server.instruments.tool import ToolValues
+from tvist_server.instruments.wrench import ToolWrench
 
 
 class Snapshot(StatusValues, JointValues, ToolValues, TerminalValues):
@@ -27,7 +28,7 @@ class Instruments:
     """
 
     def __init__(self, description: RobotDescription) -> None:
-        self._rigid = RigidBody(description)
+        self._rigid, self._wrench = RigidBody(description), ToolWrench(description)
         self._ratings = joint_ratings(description)
         self._constants = [rating.torque_constant for rating in self._ratings]
         self._idle = [0.0] * description.joints
@@ -47,4 +48,6 @@ class Instruments:
             current = [m / constant for m, constant in zip(moment, self._constants, strict=True)]
             mechanical = sum([m * v for m, v in zip(moment, state.actual_qd, strict=True)])
         self._meters.update(state.tick, current, mechanical, powered=mode in POWERED)
-        return Snapshot(state, io, self._rigid, self._ratings, current, self._meters, self._kept)
+        return Snapshot(
+            state, io, self._rigid, self._wrench, self._ratings, current, self._meters, self._kept
+        )

@@ -175,14 +175,10 @@ class ToolValues(Reading):
     @cached_property
     def _felt(self) -> Floats:
         """Torque of the surroundings on the joints: expected less measured, shape (n,) [N m]."""
-        state = self.state
-        if not self.driven:
-            return np.zeros(len(state.actual_q))
-        expected = self._rigid.expected(state.target_moment, state.target_qd, state.target_qdd)
-        return np.array(expected - np.array(state.actual_moment))
+        return self._wrench.felt(self.state)
 
     @cached_property
     def _force(self) -> Floats:
         if not self.driven:
             return np.zeros(6)
-        return self._rigid.wrench(self.state.actual_q, self._felt, self.io.tcp_offset)
+        return self._wrench.at_tool(self.state.actual_q, self._felt, self.io.tcp_offset)
