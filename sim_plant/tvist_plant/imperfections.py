@@ -1,0 +1,128 @@
+"""What an arm may have that its description does not say.
+
+Friction on a motor turning at v falls with speed (Stribeck; Canudas de Wit and others 1995, without the bristles):
+
+    F(v) = [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w)
+
+A gear twisted by δ pushes with
+
+    K δ                                   as described,
+    K₁ δ up to |δ| = δ₁, K beyond it      piecewise (makers of strain wave gears give K₁ < K),
+    K δ + z                               with hysteresis, ż = r K δ̇ - |δ̇| z r K/z_max  (Dahl 1968).
+
+A base that yields stands on two springs about the world's x and y axes, and below it a ring of some mass.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from tvist_plant.description import RobotDescription
+from tvist_plant.model import FLANGE, FlexibleModel, Floats
+
+
+@dataclass(frozen=True)
+class YieldingBase:
+    """A base on springs."""
+
+    stiffness: float = 1.5e5
+    """About each of the two axes [N m/rad]."""
+    damping_time: float = 1e-3
+    """Damping over stiffness [s]."""
+    mass: float = 20.0
+    """Of the ring under the arm [kg]."""
+    radius: float = 0.25
+    """Of the ring's inertia [m]."""
+
+
+@dataclass(frozen=True)
+class Imperfections:
+    """What is added to the arm that its description describes; as they stand here they add nothing."""
+
+    breakaway: float = 1.0
+    """F_s over F_c [-]."""
+    stribeck_speed: float = 0.05
+    """v_s [rad/s]."""
+    hysteresis: float = 0.0
+    """r: stiffness that a gear has more when its twist turns back [-]."""
+    hysteresis_torque: float = 0.02
+    """z_max over the joint's torque limit [-]."""
+    soft: float = 1.0
+    """K₁ over K [-]."""
+    soft_torque: float = 0.1
+    """K₁ δ₁ over the joint's torque limit [-]."""
+    base: YieldingBase | None = None
+    """None: the base is rigid."""
+
+
+@dataclass(frozen=True)
+class GearLaw:
+    """The imperfections of friction and gears in the units of the equations, one entry a joint where it is an array."""
+
+    breakaway: float
+    """F_s/F_c [-]."""
+    stribeck_speed: float
+    """v_s [rad/s]."""
+    softness: Floats
+    """K - K₁, shape (n,) [N m/rad]."""
+    soft_angle: Floats
+    """δ₁, shape (n,) [rad]."""
+    hysteresis: Floats
+    """r K, shape (n,) [N m/rad]."""
+    hysteresis_torque: Floats
+    """z_max, shape (n,) [N m]."""
+    stiffness: Floats
+    """K, shape (n,) [N m/rad]."""
+
+    @classmethod
+    def of(cls, imperfections: Imperfections, description: RobotDescription) -> "GearLaw":
+        """Scale them by the arm's gears and torque limits."""
+        limit = np.array(description.limits.torque)
+        K = np.array(description.drives.gear_stiffness)
+        return cls(
+            breakaway=imperfections.breakaway,
+            stribeck_speed=imperfections.stribeck_speed,
+            softness=(1.0 - imperfections.soft) * K,
+            soft_angle=imperfections.soft_torque * limit / (imperfections.soft * K),
+            hysteresis=imperfections.hysteresis * K,
+            hysteresis_torque=imperfections.hysteresis_torque * limit,
+            stiffness=K,
+        )
+
+    def twist(self, torque: Floats) -> Floats:
+        """Angle by which each gear is twisted under a steady torque, without hysteresis, shape (n,) [rad].
+
+        Args:
+            torque: That the gears transmit, shape (n,) [N m].
+        """
+        if not self.softness.any():
+            return torque / self.stiffness
+        soft = self.stiffness - self.softness
+        within = np.minimum(np.abs(torque) / soft, self.soft_angle)
+        beyond = np.maximum(np.abs(torque) - soft * self.soft_angle, 0.0)
+        return np.asarray(np.sign(torque) * (within + beyond / self.stiffness))
+
+
+def on_base(arm: FlexibleModel, base: YieldingBase) -> FlexibleModel:
+    """The same arm on a base that yields about the world's x and y axes; both count as virtual joints."""
+    ground = pin.Model()
+    inertia = pin.Inertia(base.mass, np.zeros(3), base.mass * base.radius**2 * np.eye(3) / 2.0)
+    light = pin.Inertia(0.05 * base.mass, np.zeros(3), 0.05 * base.mass * base.radius**2 * np.eye(3) / 2.0)
+    first = ground.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), "base_x")
+    ground.appendBodyToJoint(first, light, pin.SE3.Identity())
+    second = ground.addJoint(first, pin.JointModelRY(), pin.SE3.Identity(), "base_y")
+    ground.appendBodyToJoint(second, inertia, pin.SE3.Identity())
+    foot = ground.addFrame(pin.Frame("foot", second, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    whole = pin.appendModel(ground, arm.model, foot, pin.SE3.Identity())
+    place = np.array(
+        [whole.idx_vs[whole.getJointId(arm.model.names[j + 1])] for j in range(arm.model.njoints - 1)]
+    )
+    return FlexibleModel(
+        model=whole,
+        joints=place[arm.joints],
+        flexes=np.concatenate([[0, 1], place[arm.flexes]]).astype(np.int64),
+        flex_stiffness=np.concatenate([[base.stiffness] * 2, arm.flex_stiffness]),
+        flex_damping=np.concatenate([[base.stiffness * base.damping_time] * 2, arm.flex_damping]),
+        flange=whole.getFrameId(FLANGE),
+    )
