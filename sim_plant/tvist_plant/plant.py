@@ -86,7 +86,8 @@ class Plant(Protocol):
             seed: Of all that is left to chance, such as sensor noise.
 
         Raises:
-            ValueError: The arm cannot be there, or cannot carry that.
+            ValueError: The arm cannot be there, or cannot carry that, and no controller starts with it. A plant whose
+                controller has started does what it is told.
         """
 
     def step(self, command: DriveCommand) -> Measurement:
