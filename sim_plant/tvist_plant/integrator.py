@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tvist_plant._compiled import compiled
-from tvist_plant.joint_parameters import JointParameters, named
+from tvist_plant.joint_parameters import JointParameters, of_joint
 from tvist_plant.model import Floats, Integers
 
 LAST, NOW = 0, 1
@@ -77,6 +77,14 @@ def parts(state: Floats, n: int) -> State:
 
 
 @compiled
+def shift(ticks: Floats) -> None:
+    """Copy what is NOW to LAST, in loops: numba takes seconds to compile an assignment of arrays."""
+    for i in range(ticks.shape[1]):
+        for j in range(ticks.shape[2]):
+            ticks[LAST, i, j] = ticks[NOW, i, j]
+
+
+@compiled
 def set_points(commands: Floats, j: int, share: float) -> tuple[float, float, float]:
     """Set-points q_r, q̇_r and τ_ff of joint j at a share of the period."""
     start, end = commands[LAST], commands[NOW]
@@ -95,24 +103,24 @@ def relaxed(z: float, twist: float, stiffness: float, most: float) -> float:
 
 
 @compiled
-def softened(joint: JointParameters, j: int, twist: float) -> float:
-    """What the gear of joint j pushes with beyond K δ where it is softer near zero [N m]."""
-    return float(-joint.softness[j] * min(max(twist, -joint.soft_angle[j]), joint.soft_angle[j]))
+def softened(joint: JointParameters, twist: float) -> float:
+    """What the gear of a joint pushes with beyond K δ where it is softer near zero [N m]."""
+    return float(-joint.softness * min(max(twist, -joint.soft_angle), joint.soft_angle))
 
 
 @compiled
-def dragged(joint: JointParameters, j: int, z: float, twist: float) -> float:
-    """Torque of the hysteresis in the gear of joint j after a further twist [N m]."""
-    if joint.hysteresis[j] > 0.0:
-        return relaxed(z, twist, joint.hysteresis[j], joint.hysteresis_torque[j])
+def dragged(joint: JointParameters, z: float, twist: float) -> float:
+    """Torque of the hysteresis in the gear of a joint after a further twist [N m]."""
+    if joint.hysteresis > 0.0:
+        return relaxed(z, twist, joint.hysteresis, joint.hysteresis_torque)
     return z
 
 
 @compiled
-def factor(S: Floats, dynamics: Floats, springs: Floats, joint: JointParameters, h: float) -> None:
+def factor(S: Floats, dynamics: Floats, springs: Floats, parameters: Floats, h: float) -> None:
     """Cholesky factor of the matrix that serves all substeps of a period, h [s] each, into S."""
     stiffness, damping = springs[0], springs[1]
-    size, n, links = S.shape[0], joint.rotor_inertia.shape[0], dynamics.shape[2]
+    size, n, links = S.shape[0], parameters.shape[1], dynamics.shape[2]
     M, last_M = dynamics[NOW], dynamics[LAST]
     for i in range(size):
         for j in range(i + 1):
@@ -121,7 +129,8 @@ def factor(S: Floats, dynamics: Floats, springs: Floats, joint: JointParameters,
         for j in range(i + 1):
             S[i, j] += 1.5 * M[j, i] - 0.5 * last_M[j, i]
     for j in range(n):
-        S[links + j, links + j] += joint.rotor_inertia[j] + 0.125 * h * h * h * joint.integral_gain[j]
+        joint = of_joint(parameters, j)
+        S[links + j, links + j] += joint.rotor_inertia + 0.125 * h * h * h * joint.integral_gain
     cholesky(S)
 
 
@@ -150,40 +159,39 @@ def advance(  # noqa: C901 - one kernel: its branches are the loops over rows an
         period: Control period [s].
         substeps: Number of substeps.
     """
-    joint = named(parameters)
     n, size, links = parameters.shape[1], state.shape[1], dynamics.shape[2]
     y, v, a, s, z = parts(state, n)
     bias, last_bias = dynamics[NOW, links], dynamics[LAST, links]
     stiffness, damping = springs[0], springs[1]
     h = period / substeps
     S, f = np.empty((size, size)), np.empty(size)
-    factor(S, dynamics, springs, joint, h)
+    factor(S, dynamics, springs, parameters, h)
 
     for step in range(substeps):
         middle = (step + 0.5) / substeps
         for i in range(links):
             f[i] = -bias[i] - middle * (bias[i] - last_bias[i])
         for j in range(n):
-            m, l = links + j, joints[j]
+            joint, m, l = of_joint(parameters, j), links + j, joints[j]
             q_r, qd_r, torque = set_points(commands, j, middle)
             speed = v[m] + 0.5 * h * a[m]
             angle = y[m] + 0.5 * h * speed
             rise = 1.0
-            if joint.breakaway[j] != 1.0:
-                fall = np.exp(-((speed / joint.stribeck_speed[j]) ** 2))
-                rise = 1.0 + (joint.breakaway[j] - 1.0) * fall
+            if joint.breakaway != 1.0:
+                fall = np.exp(-((speed / joint.stribeck_speed) ** 2))
+                rise = 1.0 + (joint.breakaway - 1.0) * fall
             # Friction's slope at rest is implicit in `damping`; what saturates beyond it is put back here.
-            steep = speed / joint.friction_width[j]
-            slack = joint.friction[j] * (steep - rise * np.tanh(steep))
-            swing = np.sin(joint.gear_waves[j] * angle + joint.gear_phase[j])
-            wave = joint.gear_stiffness[j] * joint.gear_error[j] * swing
+            steep = speed / joint.friction_width
+            slack = joint.friction * (steep - rise * np.tanh(steep))
+            swing = np.sin(joint.gear_waves * angle + joint.gear_phase)
+            wave = joint.gear_stiffness * joint.gear_error * swing
             more = 0.0
-            if joint.softness[j] != 0.0 or joint.hysteresis[j] > 0.0:
+            if joint.softness != 0.0 or joint.hysteresis > 0.0:
                 twisting = v[l] + 0.5 * h * a[l] - speed
-                twist = y[l] - y[m] + 0.5 * h * twisting - joint.gear_error[j] * swing
-                more = softened(joint, j, twist) + dragged(joint, j, z[j], 0.5 * h * twisting)
-            f[m] = torque + joint.velocity_gain[j] * qd_r + joint.position_gain[j] * q_r + slack - wave
-            f[m] += joint.integral_gain[j] * (s[j] + 0.5 * h * q_r) + more
+                twist = y[l] - y[m] + 0.5 * h * twisting - joint.gear_error * swing
+                more = softened(joint, twist) + dragged(joint, z[j], 0.5 * h * twisting)
+            f[m] = torque + joint.velocity_gain * qd_r + joint.position_gain * q_r + slack - wave
+            f[m] += joint.integral_gain * (s[j] + 0.5 * h * q_r) + more
             f[l] += wave - more
         for i in range(size):
             value = f[i]
@@ -191,20 +199,20 @@ def advance(  # noqa: C901 - one kernel: its branches are the loops over rows an
                 value -= damping[i, j] * v[j] + stiffness[i, j] * (y[j] + 0.5 * h * v[j])
             a[i] = value
         for j in range(n):
-            m = links + j
-            a[m] -= 0.5 * h * joint.integral_gain[j] * (y[m] + 0.5 * h * v[m])
+            joint, m = of_joint(parameters, j), links + j
+            a[m] -= 0.5 * h * joint.integral_gain * (y[m] + 0.5 * h * v[m])
         solve(S, a)
         for j in range(n):
-            m, l = links + j, joints[j]
+            joint, m, l = of_joint(parameters, j), links + j, joints[j]
             q_r, _, _ = set_points(commands, j, middle)
             s[j] += h * (q_r - (y[m] + 0.5 * h * (v[m] + 0.5 * h * a[m])))
             twisted = h * (v[l] - v[m] + 0.5 * h * (a[l] - a[m]))
-            z[j] = dragged(joint, j, z[j], twisted)
+            z[j] = dragged(joint, z[j], twisted)
         for i in range(size):
             y[i] += h * (v[i] + 0.5 * h * a[i])
             v[i] += h * a[i]
-    commands[LAST] = commands[NOW]
-    dynamics[LAST] = dynamics[NOW]
+    shift(commands)
+    shift(dynamics)
 
 
 @compiled
@@ -222,7 +230,6 @@ def balance(
 
     The other arguments are those of `advance`; of commands and dynamics the present ones count.
     """
-    joint = named(parameters)
     n, size, links = parameters.shape[1], state.shape[1], dynamics.shape[2]
     y, v, _, s, z = parts(state, n)
     command, M = commands[NOW], dynamics[NOW]
@@ -236,11 +243,11 @@ def balance(
         for j in range(i + 1):
             S[i, j] = M[j, i]
     for j in range(n):
-        m, l = links + j, joints[j]
-        swing = np.sin(joint.gear_waves[j] * y[m] + joint.gear_phase[j])
-        qdd[l] += joint.gear_stiffness[j] * joint.gear_error[j] * swing
-        qdd[l] -= z[j] + softened(joint, j, y[l] - y[m] - joint.gear_error[j] * swing)
-        moment[j] = command[2, j] + joint.velocity_gain[j] * (command[1, j] - v[m])
-        moment[j] += joint.position_gain[j] * (command[0, j] - y[m]) + joint.integral_gain[j] * s[j]
+        joint, m, l = of_joint(parameters, j), links + j, joints[j]
+        swing = np.sin(joint.gear_waves * y[m] + joint.gear_phase)
+        qdd[l] += joint.gear_stiffness * joint.gear_error * swing
+        qdd[l] -= z[j] + softened(joint, y[l] - y[m] - joint.gear_error * swing)
+        moment[j] = command[2, j] + joint.velocity_gain * (command[1, j] - v[m])
+        moment[j] += joint.position_gain * (command[0, j] - y[m]) + joint.integral_gain * s[j]
     cholesky(S)
     solve(S, qdd)

@@ -1,8 +1,8 @@
-"""What the kernel knows of each joint's drive and gear: one array, whose rows have names on both sides.
+"""What the kernel knows of each joint's drive and gear: one array, whose columns get names in the kernel.
 
 A kernel takes few arguments, since numba looks at the type of each at every call: 20 arrays cost twice as much as 8,
 and a NamedTuple more than its arrays one by one. So the parameters travel in one array, and get their names back in
-the kernel, where a NamedTuple costs nothing.
+the kernel, where a NamedTuple of numbers costs nothing.
 """
 
 from typing import NamedTuple
@@ -16,53 +16,55 @@ from tvist_plant.model import Floats
 
 
 class JointParameters(NamedTuple):
-    """Parameters of the joints, each of shape (n,)."""
+    """Parameters of one joint."""
 
-    rotor_inertia: Floats
+    rotor_inertia: float
     """B [kg m^2]."""
-    velocity_gain: Floats
+    velocity_gain: float
     """K_d [N m s/rad]."""
-    position_gain: Floats
+    position_gain: float
     """K_d (K_p + K_i) [N m/rad]."""
-    integral_gain: Floats
+    integral_gain: float
     """K_d K_p K_i [N m/(rad s)]."""
-    friction: Floats
+    friction: float
     """F_c; zero where friction is taken as linear [N m]."""
-    friction_width: Floats
+    friction_width: float
     """w [rad/s]."""
-    breakaway: Floats
+    breakaway: float
     """F_s/F_c [-]."""
-    stribeck_speed: Floats
+    stribeck_speed: float
     """v_s [rad/s]."""
-    gear_stiffness: Floats
+    gear_stiffness: float
     """K [N m/rad]."""
-    gear_error: Floats
+    gear_error: float
     """Amplitude ε of the gear's kinematic error [rad]."""
-    gear_waves: Floats
+    gear_waves: float
     """n_w [-]."""
-    gear_phase: Floats
+    gear_phase: float
     """φ [rad]."""
-    softness: Floats
+    softness: float
     """K - K₁ [N m/rad]."""
-    soft_angle: Floats
+    soft_angle: float
     """δ₁ [rad]."""
-    hysteresis: Floats
+    hysteresis: float
     """r K [N m/rad]."""
-    hysteresis_torque: Floats
+    hysteresis_torque: float
     """z_max [N m]."""
 
 
 @compiled
-def named(rows: Floats) -> JointParameters:
-    """Give the rows of an array their names; they stay views of it."""
+def of_joint(parameters: Floats, j: int) -> JointParameters:
+    """Parameters of joint j, from the array that `packed` made."""
     return JointParameters(
-        rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7],
-        rows[8], rows[9], rows[10], rows[11], rows[12], rows[13], rows[14], rows[15],
+        parameters[0, j], parameters[1, j], parameters[2, j], parameters[3, j],
+        parameters[4, j], parameters[5, j], parameters[6, j], parameters[7, j],
+        parameters[8, j], parameters[9, j], parameters[10, j], parameters[11, j],
+        parameters[12, j], parameters[13, j], parameters[14, j], parameters[15, j],
     )  # fmt: skip
 
 
 def packed(linear: LinearPart, nonlinear: Nonlinear, law: GearLaw, gear_phase: Floats) -> Floats:
-    """One array of all parameters, shape (16, n), for `named`.
+    """One array of all parameters, a row each in the order of `JointParameters`, shape (16, n).
 
     Args:
         linear: Gains and rotors.
@@ -70,24 +72,22 @@ def packed(linear: LinearPart, nonlinear: Nonlinear, law: GearLaw, gear_phase: F
         law: What friction and gears have that the description does not say.
         gear_phase: Phase of each gear's error, shape (n,) [rad].
     """
-    n = len(gear_phase)
-    return np.array(
-        JointParameters(
-            rotor_inertia=linear.rotor_inertia,
-            velocity_gain=linear.velocity_gain,
-            position_gain=linear.position_gain,
-            integral_gain=linear.integral_gain,
-            friction=nonlinear.friction,
-            friction_width=np.full(n, nonlinear.friction_width),
-            breakaway=np.full(n, law.breakaway),
-            stribeck_speed=np.full(n, law.stribeck_speed),
-            gear_stiffness=nonlinear.gear_stiffness,
-            gear_error=np.full(n, nonlinear.gear_error),
-            gear_waves=np.full(n, nonlinear.gear_waves),
-            gear_phase=gear_phase,
-            softness=law.softness,
-            soft_angle=law.soft_angle,
-            hysteresis=law.hysteresis,
-            hysteresis_torque=law.hysteresis_torque,
-        )
-    )
+    rows = {
+        "rotor_inertia": linear.rotor_inertia,
+        "velocity_gain": linear.velocity_gain,
+        "position_gain": linear.position_gain,
+        "integral_gain": linear.integral_gain,
+        "friction": nonlinear.friction,
+        "friction_width": nonlinear.friction_width,
+        "breakaway": law.breakaway,
+        "stribeck_speed": law.stribeck_speed,
+        "gear_stiffness": nonlinear.gear_stiffness,
+        "gear_error": nonlinear.gear_error,
+        "gear_waves": nonlinear.gear_waves,
+        "gear_phase": gear_phase,
+        "softness": law.softness,
+        "soft_angle": law.soft_angle,
+        "hysteresis": law.hysteresis,
+        "hysteresis_torque": law.hysteresis_torque,
+    }
+    return np.array([np.full(len(gear_phase), rows[name]) for name in JointParameters._fields])
