@@ -148,7 +148,10 @@ class FlexibleArm:
         """Let something outside push the joints from now on, until it is changed or the arm is reset.
 
         Args:
-            torque: On the link side, shape (n,) [N m].
+            torque: On the link side, shape (n,); zeros end it [N m].
+
+        Raises:
+            ValueError: It is not n finite numbers.
         """
         self._outside.push(torque)
 

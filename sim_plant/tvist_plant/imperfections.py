@@ -13,6 +13,7 @@ A gear twisted by δ pushes with
 A base that yields stands on two springs about the world's x and y axes, and below it a ring of some mass.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +25,11 @@ from tvist_plant.model import FLANGE, FlexibleModel, Floats
 
 @dataclass(frozen=True)
 class YieldingBase:
-    """A base on springs."""
+    """A base on springs.
+
+    Raises:
+        ValueError: A number is not positive; `damping_time` may be 0.
+    """
 
     stiffness: float = 1.5e5
     """About each of the two axes [N m/rad]."""
@@ -35,25 +40,44 @@ class YieldingBase:
     radius: float = 0.25
     """Of the ring's inertia [m]."""
 
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        for name in ("stiffness", "mass", "radius"):
+            _check(f"base.{name}", getattr(self, name), 0.0, math.inf, above=True)
+        _check("base.damping_time", self.damping_time, 0.0, math.inf)
+
 
 @dataclass(frozen=True)
 class Imperfections:
-    """What is added to the arm that its description describes; as they stand here they add nothing."""
+    """What is added to the arm that its description describes; as they stand here they add nothing.
+
+    Raises:
+        ValueError: A number is outside the range that it is said to have.
+    """
 
     breakaway: float = 1.0
-    """F_s over F_c [-]."""
+    """F_s over F_c, at least 1 [-]."""
     stribeck_speed: float = 0.05
-    """v_s [rad/s]."""
+    """v_s, above 0 [rad/s]."""
     hysteresis: float = 0.0
-    """r: stiffness that a gear has more when its twist turns back [-]."""
+    """r: stiffness that a gear has more when its twist turns back, at least 0 [-]."""
     hysteresis_torque: float = 0.02
-    """z_max over the joint's torque limit [-]."""
+    """z_max over the joint's torque limit, above 0 [-]."""
     soft: float = 1.0
-    """K₁ over K [-]."""
+    """K₁ over K, above 0 and at most 1 [-]."""
     soft_torque: float = 0.1
-    """K₁ δ₁ over the joint's torque limit [-]."""
+    """K₁ δ₁ over the joint's torque limit, at least 0 [-]."""
     base: YieldingBase | None = None
     """None: the base is rigid."""
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        _check("breakaway", self.breakaway, 1.0, math.inf)
+        _check("stribeck_speed", self.stribeck_speed, 0.0, math.inf, above=True)
+        _check("hysteresis", self.hysteresis, 0.0, math.inf)
+        _check("hysteresis_torque", self.hysteresis_torque, 0.0, math.inf, above=True)
+        _check("soft", self.soft, 0.0, 1.0, above=True)
+        _check("soft_torque", self.soft_torque, 0.0, math.inf)
 
 
 @dataclass(frozen=True)
@@ -126,3 +150,13 @@ def on_base(arm: FlexibleModel, base: YieldingBase) -> FlexibleModel:
         flex_damping=np.concatenate([[base.stiffness * base.damping_time] * 2, arm.flex_damping]),
         flange=whole.getFrameId(FLANGE),
     )
+
+
+def _check(name: str, value: float, least: float, most: float, *, above: bool = False) -> None:
+    """Check that a number is finite and at least (`above`: above) one limit and at most another."""
+    if math.isfinite(value) and (least < value if above else least <= value) and value <= most:
+        return
+    limit = f"{'above' if above else 'at least'} {least:g}" + (
+        f" and at most {most:g}" if most < math.inf else ""
+    )
+    raise ValueError(f"{name} is {value}: must be {limit}, and finite")

@@ -55,8 +55,11 @@ class Outside:
         self._torque, self._wrenches = None, {}
 
     def push(self, torque: Floats) -> None:
-        """Push the joints on the link side, shape (n,) [N m]; zeros let go of them."""
-        self._torque = np.array(torque, dtype=float) if np.any(torque) else None
+        """Push the joints on the link side; see `FlexibleArm.push`."""
+        given, shape = np.array(torque, dtype=float), self._flexible.joints.shape
+        if given.shape != shape or not np.isfinite(given).all():
+            raise ValueError(f"torque is {given.tolist()}: must be {shape[0]} finite numbers, one a joint")
+        self._torque = given if given.any() else None
 
     def push_body(
         self, body: str, force: Sequence[float], moment: Sequence[float], point: Sequence[float]

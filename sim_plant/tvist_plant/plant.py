@@ -115,7 +115,7 @@ class Pushable(Protocol):
         """Push the joints from now on, until this is changed or the arm is reset.
 
         Args:
-            torque: On the link side, shape (n,) [N m].
+            torque: On the link side, shape (n,); zeros let go [N m].
         """
 
 

@@ -61,6 +61,25 @@ def test_a_reset_starts_the_same_run_again(ur5e, drive, imperfections):
     np.testing.assert_array_equal(*runs)
 
 
+@pytest.mark.parametrize(
+    ("make", "numbers", "said"),
+    [
+        (Imperfections, {"soft": 0.0}, "soft is 0.0: must be above 0 and at most 1"),
+        (Imperfections, {"soft": 1.5}, "soft is 1.5"),
+        (Imperfections, {"breakaway": 0.9}, "breakaway is 0.9: must be at least 1"),
+        (Imperfections, {"stribeck_speed": 0.0}, "stribeck_speed is 0.0: must be above 0"),
+        (Imperfections, {"hysteresis": -0.1}, "hysteresis is -0.1"),
+        (Imperfections, {"hysteresis_torque": 0.0}, "hysteresis_torque is 0.0"),
+        (Imperfections, {"soft_torque": np.nan}, "soft_torque is nan"),
+        (YieldingBase, {"stiffness": np.inf}, "base.stiffness is inf"),
+        (YieldingBase, {"damping_time": -1e-3}, "base.damping_time is -0.001: must be at least 0"),
+    ],
+)
+def test_numbers_without_sense_are_refused(make, numbers, said):
+    with pytest.raises(ValueError, match=said):
+        make(**numbers)
+
+
 def test_an_imperfect_arm_can_be_pushed(ur5e):
     """It gives way as far as its gears let it, the described arm's way in the mean."""
     turned = {}

@@ -151,6 +151,12 @@ def test_a_wrench_without_sense_is_refused(ur5e, arguments, said):
         FlexibleArm(ur5e, ur5e.payload).push_body(**arguments)
 
 
+@pytest.mark.parametrize("torque", [np.ones(5), np.array(1.0), np.array([1.0, np.nan, 0.0, 0.0, 0.0, 0.0])])
+def test_torques_without_sense_are_refused(ur5e, torque):
+    with pytest.raises(ValueError, match=r"torque is .*: must be 6 finite numbers"):
+        FlexibleArm(ur5e, ur5e.payload).push(torque)
+
+
 def test_the_flexible_arm_can_be_pushed_and_broken_and_knows_its_modes(ur5e):
     for ability in (Pushable, Breakable, Modal):
         assert isinstance(FlexibleArm(ur5e, ur5e.payload), ability)
