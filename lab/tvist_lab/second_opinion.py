@@ -79,7 +79,7 @@ class SecondOpinion:
             mujoco.mj_forward(self._model, data)
             gravity = data.qfrc_bias.copy()
         self._s = (gravity[self._joints] - command.torque) / self._integral_gain
-        return self._q()
+        return self.q
 
     def step(self, command: DriveCommand) -> Floats:
         """One period of 2 ms, the drives going linearly to this command; link-side q, shape (n,) [rad]."""
@@ -99,7 +99,7 @@ class SecondOpinion:
             self._s += self._timestep * (q_r - angle)
             mujoco.mj_step(self._model, data)
         self._command = end
-        return self._q()
+        return self.q
 
     def flange(self) -> tuple[Floats, Floats]:
         """Specific force in the flange frame [m/s^2], shape (3,), and its orientation, shape (3, 3)."""
@@ -110,8 +110,40 @@ class SecondOpinion:
         mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_XBODY, self._flange, felt, 1)
         return felt[3:], np.array(data.xmat[self._flange]).reshape(3, 3)
 
-    def _q(self) -> Floats:
+    def flange_position(self) -> Floats:
+        """Where the flange is, shape (3,) [m]."""
+        return np.array(self._data.xpos[self._flange])
+
+    @property
+    def q(self) -> Floats:
+        """Link-side joint angles, shape (n,) [rad]."""
         return np.array(self._data.qpos[self._joints])
+
+    @property
+    def qd(self) -> Floats:
+        """Link-side joint velocities, shape (n,) [rad/s]."""
+        return np.array(self._data.qvel[self._joints])
+
+    @property
+    def motor_q(self) -> Floats:
+        """Motor angles on the joint side, shape (n,) [rad]."""
+        return np.array(self._data.qpos[self._motors])
+
+    @property
+    def motor_qd(self) -> Floats:
+        """Motor velocities on the joint side, shape (n,) [rad/s]."""
+        return np.array(self._data.qvel[self._motors])
+
+    @property
+    def link_deflection(self) -> Floats:
+        """Angles of the virtual joints of bending links [rad]."""
+        return np.array(self._data.qpos[self._flexes])
+
+    def moment(self) -> Floats:
+        """Torques of the motors on the joint side, shape (n,) [N m]."""
+        q_r, qd_r, torque = self._command
+        feedback = self._velocity_gain * (qd_r - self.motor_qd) + self._position_gain * (q_r - self.motor_q)
+        return np.asarray(torque + feedback + self._integral_gain * self._s)
 
 
 def _joint(number: int) -> str:
@@ -135,7 +167,10 @@ def _build(description: RobotDescription, payload: Payload, timestep: float) -> 
     spec.option.timestep = timestep
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0.0, 0.0, -9.81]
-    spec.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    # A state that is no longer finite stays so, to be noticed; MuJoCo would start anew at zero by itself.
+    spec.option.disableflags = int(
+        mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    )
     frame = spec.worldbody
     for number in range(description.joints):
         a, d, alpha = kinematics.a[number], kinematics.d[number], kinematics.alpha[number]

@@ -47,7 +47,7 @@ CODE_MEANINGS: dict[Code, str] = {
     "unknown_shaper": "there is no shaper of that name: `info` lists them",
     "unknown_estimator": "there is no estimator of that name",
     "unknown_calibration": "there is no calibration of that name: `info` lists them",
-    "unknown_fault": "there is no fault of that name: they are listed below",
+    "unknown_fault": "there is no fault of that name, or this robot's plant cannot have it: they are listed below",
     "plant_failure": "the simulated arm's state was no longer finite",
     "payload_mismatch": "the calibration was made with another payload than the one declared",
     "unsupported_version": "the server does not speak this version of the protocol",

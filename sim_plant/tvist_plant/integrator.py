@@ -10,10 +10,17 @@ solves for the mean acceleration and moves y by the mean velocity: second order,
 that light lumps between stiff springs have (about -5e4 1/s), where explicit rules need steps below 0.04 ms.
 """
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 
 from tvist_plant._compiled import compiled
+from tvist_plant.joint_parameters import JointParameters, of_joint
 from tvist_plant.model import Floats, Integers
+
+LAST, NOW = 0, 1
+"""Where commands and dynamics of the last and the present tick are."""
 
 
 @compiled
@@ -48,69 +55,73 @@ def solve(L: Floats, x: Floats) -> None:
         x[i] = value / L[i, i]
 
 
-@compiled
-def advance(  # noqa: C901, PLR0912 - one kernel: its branches are the loops over rows and joints
-    y: Floats,
-    v: Floats,
-    s: Floats,
-    a: Floats,
-    M: Floats,
-    bias: Floats,
-    last_M: Floats,
-    last_bias: Floats,
-    start: Floats,
-    end: Floats,
-    joints: Integers,
-    stiffness: Floats,
-    damping: Floats,
-    rotor_inertia: Floats,
-    velocity_gain: Floats,
-    position_gain: Floats,
-    integral_gain: Floats,
-    friction: Floats,
-    friction_width: float,
-    gear_stiffness: Floats,
-    gear_error: float,
-    gear_waves: float,
-    gear_phase: Floats,
-    period: float,
-    substeps: int,
-    S: Floats,
-    f: Floats,
-) -> None:
-    """Move the state by one period, in place.
+class State(NamedTuple):
+    """What moves, N links and n motors."""
 
-    Args:
-        y: Angles, N of the links then n of the motors [rad].
-        v: Their velocities [rad/s].
-        s: Integrators of the drives, shape (n,) [rad s].
-        a: Mean accelerations of the last substep, in and out, shape (N+n,) [rad/s^2].
-        M: Mass matrix, upper triangle, shape (N, N) [kg m^2].
-        bias: Coriolis, centrifugal and gravity torques at the start, shape (N,) [N m].
-        last_M: M one period earlier.
-        last_bias: The bias one period earlier.
-        start: Rows q_r, q̇_r, τ_ff of the last command, shape (3, n).
-        end: Rows of this command.
-        joints: Numbers of the n joints among the N link angles.
-        stiffness: Of `LinearPart`; so are damping, rotor_inertia and the gains.
-        damping: See above.
-        rotor_inertia: See above.
-        velocity_gain: See above.
-        position_gain: See above.
-        integral_gain: See above.
-        friction: Of `Nonlinear`; so are the four that follow.
-        friction_width: See above.
-        gear_stiffness: See above.
-        gear_error: See above.
-        gear_waves: See above.
-        gear_phase: Phase φ of each gear's error, shape (n,) [rad].
-        period: Control period [s].
-        substeps: Number of substeps.
-        S: Work, shape (N+n, N+n).
-        f: Work, shape (N+n,).
-    """
-    size, links, n = y.shape[0], M.shape[0], s.shape[0]
-    h = period / substeps
+    y: Floats
+    """Angles, N of the links then n of the motors, shape (N+n,) [rad]."""
+    v: Floats
+    """Their velocities, shape (N+n,) [rad/s]."""
+    a: Floats
+    """Mean accelerations of the last substep, shape (N+n,) [rad/s^2]."""
+    s: Floats
+    """Integrators of the drives, shape (n,) [rad s]."""
+    z: Floats
+    """Torque of each gear's hysteresis, shape (n,) [N m]."""
+
+
+@compiled
+def parts(state: Floats, n: int) -> State:
+    """Give the rows of a state, shape (5, N+n), their names; they stay views of it."""
+    return State(state[0], state[1], state[2], state[3, :n], state[4, :n])
+
+
+@compiled
+def shift(ticks: Floats) -> None:
+    """Copy what is NOW to LAST, in loops: numba takes seconds to compile an assignment of arrays."""
+    for i in range(ticks.shape[1]):
+        for j in range(ticks.shape[2]):
+            ticks[LAST, i, j] = ticks[NOW, i, j]
+
+
+@compiled
+def set_points(commands: Floats, j: int, share: float) -> tuple[float, float, float]:
+    """Set-points q_r, q̇_r and τ_ff of joint j at a share of the period."""
+    start, end = commands[LAST], commands[NOW]
+    return (
+        start[0, j] + share * (end[0, j] - start[0, j]),
+        start[1, j] + share * (end[1, j] - start[1, j]),
+        start[2, j] + share * (end[2, j] - start[2, j]),
+    )
+
+
+@compiled
+def relaxed(z: float, twist: float, stiffness: float, most: float) -> float:
+    """Dahl's friction force z after a further twist in one direction: the exact solution of its equation."""
+    end = most if twist > 0.0 else -most
+    return float(end + (z - end) * math.exp(-stiffness * abs(twist) / most))
+
+
+@compiled
+def softened(joint: JointParameters, twist: float) -> float:
+    """What the gear of a joint pushes with beyond K δ where it is softer near zero [N m]."""
+    return float(-joint.softness * min(max(twist, -joint.soft_angle), joint.soft_angle))
+
+
+@compiled
+def dragged(joint: JointParameters, z: float, twist: float) -> float:
+    """Torque of the hysteresis in the gear of a joint after a further twist [N m]."""
+    if joint.hysteresis > 0.0:
+        return relaxed(z, twist, joint.hysteresis, joint.hysteresis_torque)
+    return z
+
+
+@compiled
+def factor(S: Floats, dynamics: Floats, springs: Floats, parameters: Floats, h: float) -> None:
+    """Cholesky factor of the matrix that serves all substeps of a period, h [s] each, into S."""
+    stiffness, damping = springs[0], springs[1]
+    size, n, links = S.shape[0], parameters.shape[1], dynamics.shape[2]
+    M, last_M = dynamics[NOW], dynamics[LAST]
     for i in range(size):
         for j in range(i + 1):
             S[i, j] = 0.5 * h * damping[i, j] + 0.25 * h * h * stiffness[i, j]
@@ -118,82 +129,125 @@ def advance(  # noqa: C901, PLR0912 - one kernel: its branches are the loops ove
         for j in range(i + 1):
             S[i, j] += 1.5 * M[j, i] - 0.5 * last_M[j, i]
     for j in range(n):
-        S[links + j, links + j] += rotor_inertia[j] + 0.125 * h * h * h * integral_gain[j]
+        joint = of_joint(parameters, j)
+        S[links + j, links + j] += joint.rotor_inertia + 0.125 * h * h * h * joint.integral_gain
     cholesky(S)
+
+
+@compiled
+def advance(  # noqa: C901 - one kernel: its branches are the loops over rows and joints
+    state: Floats,
+    commands: Floats,
+    dynamics: Floats,
+    springs: Floats,
+    parameters: Floats,
+    joints: Integers,
+    period: float,
+    substeps: int,
+) -> None:
+    """Move the state by one period, in place; what was the present tick's is the last one's then.
+
+    Args:
+        state: Rows of `State`, shape (5, N+n).
+        commands: Rows q_r, q̇_r, τ_ff of the last command and of this one, shape (2, 3, n); LAST becomes this one.
+        dynamics: Mass matrix, upper triangle [kg m^2], and below it a row of the bias [N m]: Coriolis, centrifugal and
+            gravity torques less what pushes from outside; one period earlier and at the start, shape (2, N+1, N);
+            LAST becomes that of the start.
+        springs: Stiffness and damping of `LinearPart`, shape (2, N+n, N+n).
+        parameters: Rows of `JointParameters`, shape (16, n).
+        joints: Numbers of the n joints among the N link angles.
+        period: Control period [s].
+        substeps: Number of substeps.
+    """
+    n, size, links = parameters.shape[1], state.shape[1], dynamics.shape[2]
+    y, v, a, s, z = parts(state, n)
+    bias, last_bias = dynamics[NOW, links], dynamics[LAST, links]
+    stiffness, damping = springs[0], springs[1]
+    h = period / substeps
+    S, f = np.empty((size, size)), np.empty(size)
+    factor(S, dynamics, springs, parameters, h)
 
     for step in range(substeps):
         middle = (step + 0.5) / substeps
         for i in range(links):
             f[i] = -bias[i] - middle * (bias[i] - last_bias[i])
         for j in range(n):
-            m, l = links + j, joints[j]
-            q_r = start[0, j] + middle * (end[0, j] - start[0, j])
-            qd_r = start[1, j] + middle * (end[1, j] - start[1, j])
-            torque = start[2, j] + middle * (end[2, j] - start[2, j])
+            joint, m, l = of_joint(parameters, j), links + j, joints[j]
+            q_r, qd_r, torque = set_points(commands, j, middle)
             speed = v[m] + 0.5 * h * a[m]
             angle = y[m] + 0.5 * h * speed
+            rise = 1.0
+            if joint.breakaway != 1.0:
+                fall = np.exp(-((speed / joint.stribeck_speed) ** 2))
+                rise = 1.0 + (joint.breakaway - 1.0) * fall
             # Friction's slope at rest is implicit in `damping`; what saturates beyond it is put back here.
-            slack = friction[j] * (speed / friction_width - np.tanh(speed / friction_width))
-            wave = gear_stiffness[j] * gear_error * np.sin(gear_waves * angle + gear_phase[j])
-            f[m] = torque + velocity_gain[j] * qd_r + position_gain[j] * q_r + slack - wave
-            f[m] += integral_gain[j] * (s[j] + 0.5 * h * q_r)
-            f[l] += wave
+            steep = speed / joint.friction_width
+            slack = joint.friction * (steep - rise * np.tanh(steep))
+            swing = np.sin(joint.gear_waves * angle + joint.gear_phase)
+            wave = joint.gear_stiffness * joint.gear_error * swing
+            more = 0.0
+            if joint.softness != 0.0 or joint.hysteresis > 0.0:
+                twisting = v[l] + 0.5 * h * a[l] - speed
+                twist = y[l] - y[m] + 0.5 * h * twisting - joint.gear_error * swing
+                more = softened(joint, twist) + dragged(joint, z[j], 0.5 * h * twisting)
+            f[m] = torque + joint.velocity_gain * qd_r + joint.position_gain * q_r + slack - wave
+            f[m] += joint.integral_gain * (s[j] + 0.5 * h * q_r) + more
+            f[l] += wave - more
         for i in range(size):
             value = f[i]
             for j in range(size):
                 value -= damping[i, j] * v[j] + stiffness[i, j] * (y[j] + 0.5 * h * v[j])
             a[i] = value
         for j in range(n):
-            m = links + j
-            a[m] -= 0.5 * h * integral_gain[j] * (y[m] + 0.5 * h * v[m])
+            joint, m = of_joint(parameters, j), links + j
+            a[m] -= 0.5 * h * joint.integral_gain * (y[m] + 0.5 * h * v[m])
         solve(S, a)
         for j in range(n):
-            m = links + j
-            q_r = start[0, j] + middle * (end[0, j] - start[0, j])
+            joint, m, l = of_joint(parameters, j), links + j, joints[j]
+            q_r, _, _ = set_points(commands, j, middle)
             s[j] += h * (q_r - (y[m] + 0.5 * h * (v[m] + 0.5 * h * a[m])))
+            twisted = h * (v[l] - v[m] + 0.5 * h * (a[l] - a[m]))
+            z[j] = dragged(joint, z[j], twisted)
         for i in range(size):
             y[i] += h * (v[i] + 0.5 * h * a[i])
             v[i] += h * a[i]
+    shift(commands)
+    shift(dynamics)
 
 
 @compiled
 def balance(
-    y: Floats,
-    v: Floats,
-    s: Floats,
-    M: Floats,
-    bias: Floats,
-    command: Floats,
+    state: Floats,
+    commands: Floats,
+    dynamics: Floats,
+    springs: Floats,
+    parameters: Floats,
     joints: Integers,
-    stiffness: Floats,
-    damping: Floats,
-    velocity_gain: Floats,
-    position_gain: Floats,
-    integral_gain: Floats,
-    gear_stiffness: Floats,
-    gear_error: float,
-    gear_waves: float,
-    gear_phase: Floats,
-    S: Floats,
     qdd: Floats,
     moment: Floats,
 ) -> None:
-    """Link accelerations `qdd`, shape (N,), and motor torques `moment`, shape (n,), at a state.
+    """Link accelerations `qdd`, shape (N,) [rad/s^2], and motor torques `moment`, shape (n,) [N m], at a state.
 
-    The other arguments are those of `advance`; `command` is the present one's rows, `S` work.
+    The other arguments are those of `advance`; of commands and dynamics the present ones count.
     """
-    size, links, n = y.shape[0], M.shape[0], s.shape[0]
+    n, size, links = parameters.shape[1], state.shape[1], dynamics.shape[2]
+    y, v, _, s, z = parts(state, n)
+    command, M = commands[NOW], dynamics[NOW]
+    stiffness, damping = springs[0], springs[1]
+    S = np.empty((links, links))
     for i in range(links):
-        value = -bias[i]
+        value = -M[links, i]
         for j in range(size):
             value -= stiffness[i, j] * y[j] + damping[i, j] * v[j]
         qdd[i] = value
         for j in range(i + 1):
             S[i, j] = M[j, i]
     for j in range(n):
-        m = links + j
-        qdd[joints[j]] += gear_stiffness[j] * gear_error * np.sin(gear_waves * y[m] + gear_phase[j])
-        moment[j] = command[2, j] + velocity_gain[j] * (command[1, j] - v[m])
-        moment[j] += position_gain[j] * (command[0, j] - y[m]) + integral_gain[j] * s[j]
-    cholesky(S[:links, :links])
-    solve(S[:links, :links], qdd)
+        joint, m, l = of_joint(parameters, j), links + j, joints[j]
+        swing = np.sin(joint.gear_waves * y[m] + joint.gear_phase)
+        qdd[l] += joint.gear_stiffness * joint.gear_error * swing
+        qdd[l] -= z[j] + softened(joint, y[l] - y[m] - joint.gear_error * swing)
+        moment[j] = command[2, j] + joint.velocity_gain * (command[1, j] - v[m])
+        moment[j] += joint.position_gain * (command[0, j] - y[m]) + joint.integral_gain * s[j]
+    cholesky(S)
+    solve(S, qdd)

@@ -151,7 +151,7 @@ class TestLine:
         felt = []
         while not cycle.at_rest:
             cycle.step()
-            felt.append(cycle.arm.truth().specific_force)
+            felt.append(cycle.plant.truth().specific_force)
         tvist = recipe.make(ur5e, 5.0)
         tvist.reset(start)
         reference = point_to_point(start, target)

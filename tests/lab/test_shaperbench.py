@@ -17,15 +17,18 @@ from tvist_lab.evaluation.leaderboard import leaderboard
 from tvist_lab.evaluation.line import PAPER, control_line, point_to_point, simulate
 from tvist_lab.evaluation.markdown import page
 from tvist_lab.evaluation.moves import Move
-from tvist_lab.evaluation.plants import MujocoArm, Variant, VariantPlant, Yields, relaxed
 from tvist_lab.evaluation.recipes import Recipe
 from tvist_lab.evaluation.running import ShaperFaultError, run
 from tvist_lab.evaluation.shaperbench import draw, inspect, jobs, judge
 from tvist_lab.evaluation.standing import candidates
 from tvist_lab.metrics import best_tool_acceleration
+from tvist_lab.mujoco_arm import MujocoArm
 from tvist_plant.description import load
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import PERIOD, Plant
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_plant.imperfections import Imperfections, YieldingBase
+from tvist_plant.integrator import relaxed
+from tvist_plant.plant import PERIOD
 from tvist_server.calibrations import load as load_calibration
 
 HONEST = """
@@ -286,6 +289,12 @@ class TestOwn:
             assert 0.08 < shaped.delay < 0.15
 
 
+def imperfect(description, **imperfections):
+    return FlexibleArm(
+        description, description.payload, imperfections=Imperfections(**imperfections), substeps=8
+    )
+
+
 class TestArms:
     @pytest.fixture
     def q1_q3(self, ur5e):
@@ -298,24 +307,17 @@ class TestArms:
 
         return felt
 
-    def test_a_variant_without_anything_is_the_plant(self, ur5e, q1_q3):
-        plain = q1_q3(Plant(ur5e, ur5e.payload))
-        same = q1_q3(VariantPlant(ur5e, ur5e.payload, Variant(), substeps=4))
-        np.testing.assert_allclose(same, plain, rtol=0.0, atol=1e-9)  # measured 2e-11
-
     def test_a_base_that_hardly_yields_is_rigid(self, ur5e, q1_q3):
-        stiff = q1_q3(VariantPlant(ur5e, ur5e.payload, Variant(base=Yields(stiffness=1e9))))
-        plain = q1_q3(Plant(ur5e, ur5e.payload, substeps=8))
+        stiff = q1_q3(imperfect(ur5e, base=YieldingBase(stiffness=1e9)))
+        plain = q1_q3(FlexibleArm(ur5e, ur5e.payload, substeps=8))
         np.testing.assert_allclose(
             stiff, plain, rtol=0.0, atol=0.01
         )  # measured 2e-3; it falls with the stiffness
 
     def test_a_base_that_yields_lowers_every_frequency(self, ur5e):
-        arms = (Plant(ur5e, ur5e.payload), VariantPlant(ur5e, ur5e.payload, Variant(base=Yields())))
+        arms = (FlexibleArm(ur5e, ur5e.payload), imperfect(ur5e, base=YieldingBase()))
         q = np.array(ur5e.poses["Q3"])
         rigid = arms[0].modes(q)
-        links = np.zeros(arms[1]._links)
-        links[arms[1]._flexible.joints] = q
         yields = arms[1].modes(q)
         assert (yields.f_d[:3] < rigid.f_d[:3]).all()
         assert (yields.f_d[:3] > 0.7 * rigid.f_d[:3]).all()
@@ -324,7 +326,7 @@ class TestArms:
         """Two integrators of different order and no gear error in one: alike, not equal."""
         peak = [
             np.abs(q1_q3(arm)[-300:]).max()
-            for arm in (Plant(ur5e, ur5e.payload), MujocoArm(ur5e, ur5e.payload))
+            for arm in (FlexibleArm(ur5e, ur5e.payload), MujocoArm(ur5e, ur5e.payload))
         ]
         assert peak[1] == pytest.approx(peak[0], rel=0.5, abs=0.01)
 
@@ -357,7 +359,7 @@ class TestArms:
             assert abs(z) <= most
 
     def test_a_soft_gear_twists_further_under_the_same_torque(self, ur5e):
-        plain, soft = Plant(ur5e, ur5e.payload), VariantPlant(ur5e, ur5e.payload, Variant(soft=0.75))
+        plain, soft = FlexibleArm(ur5e, ur5e.payload), imperfect(ur5e, soft=0.75)
         q = np.array(ur5e.poses["Q1"])
         command = DriveCommand(q=q, qd=np.zeros(6), torque=np.zeros(6))
         for arm in (plain, soft):

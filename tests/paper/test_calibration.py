@@ -5,7 +5,7 @@ import pytest
 
 from tvist_lab.paper.published import published
 from tvist_lab.workspace import WORKSPACE
-from tvist_plant.plant import Plant
+from tvist_plant.flexible_arm import FlexibleArm
 from tvist_server.calibrations import DEFAULT, estimator_of, fits, load
 from tvist_server.config import ServeConfig
 
@@ -25,7 +25,7 @@ def test_it_has_table_1_at_the_papers_poses(calibration, name):
 
 def test_it_is_right_at_the_median_of_random_configurations_it_never_saw(calibration):
     setup = ServeConfig().setup()
-    arm = Plant(setup.description, setup.description.payload)
+    arm = FlexibleArm(setup.description, setup.description.payload)
     estimator = estimator_of(calibration)
     errors = []
     for q in WORKSPACE.random(300, 6, seed=2024):

@@ -16,7 +16,7 @@ from tvist_plant.description import (
     load,
     robots,
 )
-from tvist_plant.plant import Plant
+from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.units import check_limits
 from tvist_plant.user_file import UserFileError
 
@@ -153,7 +153,7 @@ def test_clean_takes_away_what_is_not_linear(ur5e):
 def test_arms_of_other_sizes_stand_still_and_move(joints):
     arm = chain(joints)
     assert isinstance(arm, RobotDescription)
-    plant = Plant(arm, arm.payload)
+    plant = FlexibleArm(arm, arm.payload)
     command = hold(arm, np.linspace(0.3, -0.4, joints))
     first = plant.reset(command, seed=3)
     place = plant.truth().flange_position
@@ -172,7 +172,7 @@ def test_arms_of_other_sizes_stand_still_and_move(joints):
 def test_modes_are_found_for_any_number_of_joints():
     for joints in (1, 2, 3, 7):
         arm = chain(joints)
-        found = Plant(arm, arm.payload).modes(np.zeros(joints))
+        found = FlexibleArm(arm, arm.payload).modes(np.zeros(joints))
         assert len(found.f_d) >= 1
         assert np.all(np.diff(found.f_d) >= 0.0)
         assert np.all((found.zeta > 0.0) & (found.zeta < 1.0))

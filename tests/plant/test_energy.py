@@ -7,7 +7,8 @@ import pinocchio as pin
 import pytest
 
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import Plant
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_plant.integrator import LAST, NOW
 
 from .arms import changed, conservative
 
@@ -17,7 +18,7 @@ PERIODS = (0.002, 0.001, 0.0005)
 def limp(description, period, gravity):
     """The UR5e let go: hung up deflected by its weight, or, without gravity, thrown."""
     arm = conservative(description)
-    plant = Plant(arm, arm.payload, period=period)
+    plant = FlexibleArm(arm, arm.payload, period=period)
     if not gravity:
         plant._flexible.model.gravity.linear = np.zeros(3)
     q = np.array(arm.poses["Q1"]) + np.array([0.0, 0.6, 0.5, 0.0, 0.3, 0.2])
@@ -26,7 +27,7 @@ def limp(description, period, gravity):
     if not gravity:
         plant._qd[plant._flexible.joints] = plant._speed[:] = [0.6, 0.4, -0.8, 0.5, 0.5, -0.5]
         plant._evaluate()
-        plant._last_M, plant._last_bias = plant._data.M.copy(), plant._bias
+        plant._dynamics[LAST] = plant._dynamics[NOW]
     return plant, command
 
 
@@ -55,7 +56,7 @@ def test_energy_stays_and_its_drift_shrinks_with_the_period(ur5e, gravity, limit
 def test_damping_takes_energy_and_never_gives_any(ur5e):
     arm = conservative(ur5e)
     arm = changed(arm, "drives", gear_damping=ur5e.drives.gear_damping, coulomb_friction=(6.0,) * 6)
-    plant = Plant(arm, arm.payload)
+    plant = FlexibleArm(arm, arm.payload)
     command = DriveCommand(np.array(arm.poses["Q1"]) + 0.3, np.zeros(6), np.zeros(6))
     plant.reset(command)
     energy = [plant.energy()]

@@ -6,14 +6,16 @@ import sys
 import numpy as np
 import pytest
 
-from tvist_plant import _compiled, integrator, plant
+from tvist_plant import _compiled, flexible_arm, integrator
 from tvist_plant.drives import DriveCommand
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_plant.imperfections import Imperfections, YieldingBase
 from tvist_plant.integrator import advance, balance, cholesky, solve
-from tvist_plant.plant import Plant
 
 from .arms import quiet
 from .reference import commands, runge_kutta
 
+ALL = Imperfections(breakaway=1.5, hysteresis=0.3, soft=0.75, base=YieldingBase())
 TICKS = 1400
 """Q1 to Q3 takes 2.5153 s; the rest is ring-down."""
 
@@ -41,7 +43,7 @@ def between(last, new, share):
 
 def felt(description, drive, *, period=0.002, substeps=4):
     """Specific force at every tick [ticks, 3], the commands going the same way whatever the period."""
-    simulated = Plant(description, description.payload, period=period, substeps=substeps)
+    simulated = FlexibleArm(description, description.payload, period=period, substeps=substeps)
     simulated.reset(drive[0])
     parts = round(0.002 / period)
     rows = []
@@ -76,39 +78,41 @@ def copies(arguments):
     ]
 
 
-def call_in_motion(arm, drive, monkeypatch, name):
+def call_in_motion(arm, drive, monkeypatch, name, imperfections):
     """Arguments of a kernel's call in mid-motion, friction saturated and gears with an error."""
     calls = []
-    kernel = getattr(plant, name)
+    kernel = getattr(flexible_arm, name)
 
     def spy(*arguments):
         calls.append(copies(arguments))
         kernel(*arguments)
 
-    simulated = Plant(arm, arm.payload)
+    simulated = FlexibleArm(arm, arm.payload, imperfections=imperfections)
     simulated.reset(drive[0], seed=4)
     for command in drive[1:600]:
         simulated.step(command)
-    monkeypatch.setattr(plant, name, spy)
+    monkeypatch.setattr(flexible_arm, name, spy)
     simulated.step(drive[600])
     return calls[-1]
 
 
-@pytest.mark.parametrize("kernel", [advance, balance], ids=["advance", "balance"])
-def test_compiled_kernel_is_its_python_source(ur5e, drive, monkeypatch, kernel):
-    arguments = call_in_motion(ur5e, drive, monkeypatch, kernel.__name__)
+@pytest.mark.parametrize("imperfections", [None, ALL], ids=["described", "imperfect"])
+@pytest.mark.parametrize(
+    ("kernel", "changed"), [(advance, {0, 1, 2}), (balance, {6, 7})], ids=["advance", "balance"]
+)
+def test_compiled_kernel_is_its_python_source(ur5e, drive, monkeypatch, kernel, changed, imperfections):
+    arguments = call_in_motion(ur5e, drive, monkeypatch, kernel.__name__, imperfections)
     compiled, plain = copies(arguments), copies(arguments)
     kernel(*compiled)
-    for name in ("cholesky", "solve"):
-        monkeypatch.setattr(integrator, name, getattr(integrator, name).py_func)
+    for name, function in vars(integrator).copy().items():
+        if hasattr(function, "py_func"):
+            monkeypatch.setattr(integrator, name, function.py_func)
     kernel.py_func(*plain)
-    moved = 0
-    for before, a, b in zip(arguments, compiled, plain, strict=True):
+    for number, (before, a, b) in enumerate(zip(arguments, compiled, plain, strict=True)):
         if isinstance(a, np.ndarray):
             scale = max(1.0, np.max(np.abs(b)))
             np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-12 * scale)
-            moved += not np.array_equal(before, a)
-    assert moved >= 3
+            assert (not np.array_equal(before, a)) == (number in changed)
 
 
 def test_without_numba_the_python_function_serves(monkeypatch):

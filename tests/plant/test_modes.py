@@ -7,8 +7,8 @@ from scipy.optimize import least_squares
 
 from tvist_plant.description import Payload
 from tvist_plant.drives import DriveCommand
+from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.model import rigid_model
-from tvist_plant.plant import Plant
 
 from .arms import hold
 
@@ -17,7 +17,7 @@ TABLE_1 = {"Q1": (6.7, 0.34), "Q2": (6.7, 0.34), "Q3": (15.0, 0.14)}
 
 @pytest.fixture(scope="module")
 def plant(ur5e):
-    return Plant(ur5e.clean(), ur5e.payload)
+    return FlexibleArm(ur5e.clean(), ur5e.payload)
 
 
 def modes(plant, q):
@@ -115,7 +115,7 @@ def test_a_heavier_payload_lowers_every_pose(ur5e):
     poses = np.random.default_rng(3).uniform(-np.pi, np.pi, (10, 6))
     lowest = []
     for mass in (0.0, 2.5, 5.0):
-        plant = Plant(ur5e, Payload(mass=mass, com=ur5e.payload.com))
+        plant = FlexibleArm(ur5e, Payload(mass=mass, com=ur5e.payload.com))
         lowest.append([modes(plant, q).f_d[0] for q in poses])
     assert np.all(np.diff(lowest, axis=0) < 0.0)
 
@@ -158,7 +158,7 @@ def reference_step(description, pose, joint, period, ticks):
 def simulated_participation(description, pose, joint, found):
     """Amplitude of the first two modes that a step of the reference acceleration excites, simulated."""
     period = 0.0005
-    plant = Plant(description, description.payload, period=period, substeps=2)
+    plant = FlexibleArm(description, description.payload, period=period, substeps=2)
     drive = reference_step(description, pose, joint, period, 1500)
     plant.reset(drive[0])
     rest = plant.truth().specific_force

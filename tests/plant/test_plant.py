@@ -6,7 +6,8 @@ import pytest
 
 from tvist_plant.description import Payload
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import Plant, PlantError
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_plant.plant import PlantError
 from tvist_plant.sensors import gear_phases
 
 from .arms import changed, hold, quiet
@@ -31,7 +32,7 @@ def drive(ur5e):
 
 @pytest.mark.parametrize("pose", ["Q1", "Q3"])
 def test_the_start_has_no_transient(ur5e, pose):
-    plant = Plant(ur5e, ur5e.payload)
+    plant = FlexibleArm(ur5e, ur5e.payload)
     command = hold(ur5e, ur5e.poses[pose])
     plant.reset(command, seed=2)
     place = plant.truth().flange_position
@@ -42,7 +43,7 @@ def test_the_start_has_no_transient(ur5e, pose):
 
 def test_a_minute_of_holding_still_moves_nothing(ur5e):
     arm = changed(ur5e, "sensors", accelerometer_noise=0.0)
-    plant = Plant(arm, arm.payload)
+    plant = FlexibleArm(arm, arm.payload)
     command = hold(arm, arm.poses["Q1"])
     first = plant.reset(command, seed=1)
     for _ in range(30_000):
@@ -54,7 +55,7 @@ def test_a_minute_of_holding_still_moves_nothing(ur5e):
 
 def test_at_rest_the_motors_carry_the_arm(ur5e):
     arm = quiet(ur5e)
-    plant = Plant(arm, arm.payload)
+    plant = FlexibleArm(arm, arm.payload)
     command = hold(arm, arm.poses["Q1"])
     measured = plant.reset(command)
     assert measured.moment[1] == pytest.approx(command.torque[1], abs=0.2)
@@ -64,7 +65,7 @@ def test_at_rest_the_motors_carry_the_arm(ur5e):
 
 def test_a_wrong_declared_payload_is_carried_by_the_integrators(ur5e):
     """The command feeds forward gravity of 5 kg, the arm carries none: it still starts at rest."""
-    plant = Plant(ur5e, ur5e.payload)
+    plant = FlexibleArm(ur5e, ur5e.payload)
     command = hold(ur5e, ur5e.poses["Q1"])
     first = plant.reset(command, payload=Payload())
     for _ in range(500):
@@ -74,12 +75,12 @@ def test_a_wrong_declared_payload_is_carried_by_the_integrators(ur5e):
 
 
 def test_equal_runs_are_equal_to_the_last_bit(ur5e, drive):
-    first, second = (run(Plant(ur5e, ur5e.payload), drive, seed=9) for _ in range(2))
+    first, second = (run(FlexibleArm(ur5e, ur5e.payload), drive, seed=9) for _ in range(2))
     np.testing.assert_array_equal(first, second)
 
 
 def test_a_reset_starts_the_same_run_again(ur5e, drive):
-    plant = Plant(ur5e, ur5e.payload)
+    plant = FlexibleArm(ur5e, ur5e.payload)
     first = run(plant, drive, seed=9)
     run(plant, drive[300:500], seed=1)
     plant.reset(drive[0], payload=Payload(mass=2.0, inertia=(0.01, 0.0, 0.0, 0.01, 0.0, 0.01)))
@@ -89,22 +90,22 @@ def test_a_reset_starts_the_same_run_again(ur5e, drive):
 
 
 def test_seeds_differ_in_noise_and_gear_error(ur5e, drive):
-    plant = Plant(ur5e, ur5e.payload)
+    plant = FlexibleArm(ur5e, ur5e.payload)
     one, two = run(plant, drive, seed=1), run(plant, drive, seed=2)
     assert np.any(one[-1] != two[-1])
     silent = changed(ur5e, "sensors", accelerometer_noise=0.0)
-    plant = Plant(silent, silent.payload)
+    plant = FlexibleArm(silent, silent.payload)
     assert np.max(np.abs(run(plant, drive, seed=1)[:, :6] - run(plant, drive, seed=2)[:, :6])) > 1e-6
 
 
 def test_without_noise_and_gear_error_the_seed_means_nothing(ur5e, drive):
     arm = quiet(ur5e)
-    plant = Plant(arm, arm.payload)
+    plant = FlexibleArm(arm, arm.payload)
     np.testing.assert_array_equal(run(plant, drive[:200], seed=1), run(plant, drive[:200], seed=2))
 
 
 def test_a_lighter_payload_twists_the_gears_less(ur5e):
-    plant = Plant(ur5e, ur5e.payload)
+    plant = FlexibleArm(ur5e, ur5e.payload)
     command = hold(ur5e, ur5e.poses["Q1"])
     plant.reset(command)
     loaded = plant.truth()
@@ -119,7 +120,7 @@ def test_a_lighter_payload_twists_the_gears_less(ur5e):
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
 @pytest.mark.parametrize("field", ["q", "qd", "torque"])
 def test_a_command_without_sense_raises_and_a_reset_heals(ur5e, field, bad):
-    plant = Plant(ur5e, ur5e.payload)
+    plant = FlexibleArm(ur5e, ur5e.payload)
     command = hold(ur5e, ur5e.poses["Q1"])
     first = plant.reset(command)
     values = {name: getattr(command, name).copy() for name in ("q", "qd", "torque")}
@@ -134,8 +135,8 @@ def test_a_command_without_sense_raises_and_a_reset_heals(ur5e, field, bad):
 
 def test_a_gear_error_turns_the_link_by_its_amplitude_and_wave(ur5e):
     """Where the arm stands, the links are off by ε sin(n_w θ + φ) against those of a perfect gear."""
-    plant = Plant(ur5e, ur5e.payload)
-    perfect = Plant(quiet(ur5e), ur5e.payload)
+    plant = FlexibleArm(ur5e, ur5e.payload)
+    perfect = FlexibleArm(quiet(ur5e), ur5e.payload)
     for turn in np.linspace(0.0, 0.05, 7):
         command = hold(ur5e, np.array(ur5e.poses["Q1"]) + turn)
         difference = plant.reset(command, seed=5).q - perfect.reset(command).q
@@ -150,7 +151,7 @@ def test_a_gear_error_ripples_while_the_joint_turns(ur5e):
     rows = []
     for description in (arm, quiet(ur5e)):
         only_base = changed(description, "drives", windup_feedforward=(0.0,) * 6)
-        plant = Plant(only_base, arm.payload)
+        plant = FlexibleArm(only_base, arm.payload)
         start = hold(arm, arm.poses["Q1"])
         plant.reset(start)
         drive = []
@@ -165,7 +166,7 @@ def test_a_gear_error_ripples_while_the_joint_turns(ur5e):
 
 
 def test_measurements_are_copies(ur5e, drive):
-    plant = Plant(ur5e, ur5e.payload)
+    plant = FlexibleArm(ur5e, ur5e.payload)
     measured = plant.reset(drive[0])
     truth = plant.truth()
     before = [part.copy() for part in (*fields(measured), *fields(truth))]
@@ -178,18 +179,18 @@ def test_measurements_are_copies(ur5e, drive):
 def test_the_rotors_and_all_links_follow_the_reference(ur5e):
     """After the move and its ring-down the motors stand at the target, the links hang by their weight."""
     arm = quiet(ur5e)
-    plant = Plant(arm, arm.payload)
+    plant = FlexibleArm(arm, arm.payload)
     target = hold(arm, arm.poses["Q3"])
     drive = [*commands(arm, arm.poses["Q1"], arm.poses["Q3"], 1400), *[target] * 3000]
     plant.reset(drive[0])
     for command in drive[1:]:
         plant.step(command)
-    rest = Plant(arm, arm.payload).reset(target)
+    rest = FlexibleArm(arm, arm.payload).reset(target)
     np.testing.assert_allclose(plant.truth().motor_q, target.q, rtol=0.0, atol=2e-6)
     np.testing.assert_allclose(plant._q[plant._flexible.joints], rest.q, rtol=0.0, atol=2e-6)
 
 
 def test_numbers_of_the_description_are_not_changed_by_a_run(ur5e, drive):
     before = msgspec.json.encode(ur5e)
-    run(Plant(ur5e, ur5e.payload), drive[:50])
+    run(FlexibleArm(ur5e, ur5e.payload), drive[:50])
     assert msgspec.json.encode(ur5e) == before

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from tvist_lab.second_opinion import SecondOpinion
-from tvist_plant.plant import Plant
+from tvist_plant.flexible_arm import FlexibleArm
 
 from .arms import chain, hold, quiet
 from .reference import commands
 
 
 def angles(description, drive):
-    plant = Plant(description, description.payload)
+    plant = FlexibleArm(description, description.payload)
     return np.array([plant.reset(drive[0]).q, *(plant.step(command).q for command in drive[1:])])
 
 
@@ -39,7 +39,7 @@ def test_static_equilibrium_is_that_of_mujoco(ur5e):
     arm = quiet(ur5e)
     for pose in arm.poses.values():
         command = hold(arm, pose)
-        ours = Plant(arm, arm.payload).reset(command).q
+        ours = FlexibleArm(arm, arm.payload).reset(command).q
         np.testing.assert_allclose(
             SecondOpinion(arm, arm.payload, 0.00025).reset(command), ours, rtol=0.0, atol=1e-12
         )

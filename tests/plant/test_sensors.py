@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_plant.plant import Plant
+from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.sensors import Accelerometer, gear_phases
 
 from .arms import forward_kinematics, hold, quiet
@@ -44,7 +44,7 @@ def test_gear_phases_are_drawn_by_the_seed_and_not_by_the_noise():
 def test_at_rest_it_points_up_with_9_81_in_the_flange_frame(ur5e, case):
     arm = quiet(ur5e)
     q = np.random.default_rng(case).uniform(-np.pi, np.pi, 6)
-    plant = Plant(arm, arm.payload)
+    plant = FlexibleArm(arm, arm.payload)
     felt = plant.reset(hold(arm, q)).accelerometer
     assert np.linalg.norm(felt) == pytest.approx(9.81, abs=1e-6)
     up = plant.truth().flange_rotation @ felt

@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 
 from tvist_plant.description import RobotDescription, load
-from tvist_plant.plant import PERIOD
+from tvist_plant.plant import PERIOD, Measurement, Plant
 from tvist_protocol import commands as c
 from tvist_protocol.calibration import Calibration, calibration_of
 from tvist_server.controller import Controller
@@ -91,10 +91,10 @@ def calibration(mass: float = 5.0, robot: str = "UR5e", name: str = "test", **po
     )
 
 
-def cycle(name: str = "zv", q=Q1, estimator=None, seed: int = 0) -> ControlCycle:
+def cycle(name: str = "zv", q=Q1, estimator=None, seed: int = 0, plant: Plant | None = None) -> ControlCycle:
     payload = body(paper_payload(UR5E))
     tvist = TvistFilter(shaper(name), estimator or Polynomial(**POLYNOMIAL), joints=6)
-    return ControlCycle(UR5E, tvist, q=np.array(q), declared=payload, carried=payload, seed=seed)
+    return ControlCycle(UR5E, tvist, q=np.array(q), declared=payload, carried=payload, seed=seed, plant=plant)
 
 
 def stop(line: ControlCycle, deceleration: float | None):
@@ -107,16 +107,21 @@ def stop(line: ControlCycle, deceleration: float | None):
 class NoArm:
     """Stands for the arm where only its reference matters."""
 
+    payload = UR5E.payload
+
     def step(self, command):
-        return command
+        return Measurement(command.q, command.qd, np.zeros_like(command.q), np.zeros(3))
 
     def reset(self, command, **_):
-        return command
+        return self.step(command)
+
+    def truth(self):
+        return None
 
 
-def without_arm(line: ControlCycle) -> ControlCycle:
-    line.arm = NoArm()
-    return line
+def without_arm(*arguments, **named) -> ControlCycle:
+    """A `cycle` with nothing at its end."""
+    return cycle(*arguments, plant=NoArm(), **named)
 
 
 def setup(description: RobotDescription = UR5E, **changes) -> Setup:
@@ -127,8 +132,15 @@ def setup(description: RobotDescription = UR5E, **changes) -> Setup:
 class Robot:
     """A controller, the lease on it, and what came out of it."""
 
-    def __init__(self, description: RobotDescription = UR5E, *, lease_s: float = 30.0, **changes) -> None:
-        self.controller = Controller(setup(description, **changes))
+    def __init__(
+        self,
+        description: RobotDescription = UR5E,
+        *,
+        lease_s: float = 30.0,
+        plant: Plant | None = None,
+        **changes,
+    ) -> None:
+        self.controller = Controller(setup(description, **changes), plant)
         self.token = self.controller.receive(c.TakeControl(client="a", lease_s=lease_s)).token
         self.states, self.events = [], []
 

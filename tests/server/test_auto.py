@@ -18,7 +18,7 @@ FIELDS = {"mass": LIGHT.mass, "com": LIGHT.com, "inertia": LIGHT.inertia}
 
 def ringing(robot: Robot) -> float:
     """Largest true acceleration of the tool later than 10 ms after the reference has stopped [m/s²]."""
-    arm = robot.controller.cycle.arm
+    arm = robot.controller.cycle.plant
     robot.tick(5)
     felt = []
     for _ in range(300):

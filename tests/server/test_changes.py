@@ -29,7 +29,6 @@ from .robots import (
     H,
     Robot,
     calibration,
-    cycle,
     stop,
     without_arm,
 )
@@ -47,7 +46,7 @@ def a_filter(random, name=None):
 
 
 def a_line(tvist):
-    line = without_arm(cycle())
+    line = without_arm()
     line.use(tvist)
     return line
 
@@ -228,7 +227,7 @@ def test_a_reset_during_a_change_leaves_nothing_of_it():
 @pytest.mark.parametrize("masses", [(5.0, 0.0), (0.0, 5.0), (1.0, 4.0)])
 def test_another_payload_makes_no_step_in_torque_and_ends_as_if_it_had_always_been(moving, masses):
     first, then = (body(paper_payload(UR5E, mass)) for mass in masses)
-    changed, never, always = (without_arm(cycle()) for _ in range(3))
+    changed, never, always = (without_arm() for _ in range(3))
     for line, payload in ((changed, first), (never, first), (always, then)):
         line.declare(payload)
         line.reset(Q1)
@@ -253,7 +252,7 @@ def test_another_payload_makes_no_step_in_torque_and_ends_as_if_it_had_always_be
 
 @pytest.mark.parametrize("masses", [(5.0, 0.0), (0.0, 5.0)])
 def test_a_stop_while_the_payload_changes_is_safe_with_either(masses):
-    line = without_arm(cycle())
+    line = without_arm()
     line.declare(body(paper_payload(UR5E, masses[0])))
     line.reset(Q1)
     line.start(line.plan(Q2 + np.array([0.0, 0.4, 0.0, 0.0, 0.0, 0.0]), Limits(2.5, 6.0, 500.0)))

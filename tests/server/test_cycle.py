@@ -30,7 +30,7 @@ def motion(line, target, limits=PAPER):
 
 def alpha(line):
     """Magnitude of the flange's acceleration without gravity, free of noise [m/s^2]."""
-    truth = line.arm.truth()
+    truth = line.plant.truth()
     return np.linalg.norm(truth.flange_rotation @ truth.specific_force + GRAVITY)
 
 
@@ -60,7 +60,7 @@ def test_at_rest_is_one_tick_after_the_last_that_moved(name, target):
 
     Up to two more where a small last impulse makes steps below 1e-7 rad that come to more than that together.
     """
-    shaped, rested = motion(without_arm(cycle(name)), target)
+    shaped, rested = motion(without_arm(name), target)
     steps = np.abs(np.diff(shaped, axis=0)).max(axis=1)
     last_moved = np.flatnonzero(steps > STILL)[-1] + 1
     assert last_moved + 2 <= rested <= last_moved + (2 if name in {"none", "zv"} else 4)
@@ -70,7 +70,7 @@ def test_at_rest_is_one_tick_after_the_last_that_moved(name, target):
 @pytest.mark.parametrize("name", ["zv", "zvd", "ei3"])
 def test_a_plateau_between_two_impulses_is_no_rest(name):
     """A jog of 0.1 mrad lasts 32 ms, the shaper 75 ms and more: in between the shaped reference stands still."""
-    line = without_arm(cycle(name, estimator=Fixed([6.7], [0.1])))
+    line = without_arm(name, estimator=Fixed([6.7], [0.1]))
     shaped, rested = motion(line, Q1 + 1e-4)
     steps = np.abs(np.diff(shaped, axis=0)).max(axis=1)
     assert (steps[: rested - 2] < STILL).sum() > 15
@@ -80,25 +80,25 @@ def test_a_plateau_between_two_impulses_is_no_rest(name):
 
 
 def test_a_move_to_where_it_is_rests_after_a_tick():
-    _, rested = motion(without_arm(cycle()), Q1)
+    _, rested = motion(without_arm(), Q1)
     assert rested == 0
 
 
 def test_moves_one_after_the_other_begin_where_the_reference_ended():
     """Not where the shaped reference was when it was said to rest, up to 1e-7 rad before."""
-    line = without_arm(cycle())
+    line = without_arm()
     for target in (Q1 + 0.2, Q1 + 0.5):
         line.start(line.plan(target, PAPER))
         line.step()
         while not line.at_rest:
             line.step()
         assert (line.reference == target).all()
-    fresh = without_arm(cycle(q=Q1 + 0.5))
+    fresh = without_arm(q=Q1 + 0.5)
     assert (motion(line, Q2)[0][:900] == motion(fresh, Q2)[0][:900]).mean() > 0.99
 
 
 def test_a_straight_line_stays_straight_under_shaping():
-    shaped, _ = motion(without_arm(cycle("ei")), Q3)
+    shaped, _ = motion(without_arm("ei"), Q3)
     way = Q3 - Q1
     share = (shaped - Q1) @ way / (way @ way)
     assert np.abs(shaped - Q1 - share[:, None] * way).max() < 1e-12
@@ -106,14 +106,14 @@ def test_a_straight_line_stays_straight_under_shaping():
 
 def test_shaping_lasts_as_long_as_its_delay_says():
     """Double-S plus delay at the end, on the tick grid."""
-    line = without_arm(cycle("zv", estimator=Fixed([6.7], [0.34])))
-    _, plain = motion(without_arm(cycle("none")), Q2)
+    line = without_arm("zv", estimator=Fixed([6.7], [0.34]))
+    _, plain = motion(without_arm("none"), Q2)
     _, shaped = motion(line, Q2)
     assert (shaped - plain) * H == pytest.approx(0.5 / 6.7, abs=3 * H)
 
 
 def test_the_target_s_derivatives_are_central_differences_of_the_shaped_reference():
-    line = without_arm(cycle())
+    line = without_arm()
     line.start(line.plan(Q3, PAPER))
     samples = [line.step().target for _ in range(700)]
     q = np.array([target.q for target in samples])
@@ -123,7 +123,7 @@ def test_the_target_s_derivatives_are_central_differences_of_the_shaped_referenc
 
 
 def test_what_a_stream_leaves_behind_comes_to_rest_through_the_filter():
-    line = without_arm(cycle("zv"))
+    line = without_arm("zv")
     stream = line.stream(H, PAPER)
     for k in range(300):
         stream.offer(k, Q1 + 0.2 * (1 - np.cos(2.0 * k * H)))
@@ -174,4 +174,4 @@ def test_what_is_declared_changes_the_torque_and_not_the_arm():
     for _ in range(SLEW):
         after = line.step()
     assert np.abs(after.torque).max() < np.abs(before.torque).max()
-    assert line.arm.payload.mass == 5.0
+    assert line.plant.payload.mass == 5.0

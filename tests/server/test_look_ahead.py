@@ -15,13 +15,13 @@ from tvist_server.collision import CLEARANCE, CollisionModel
 from tvist_server.cycle import STILL
 from tvist_server.outlook import Outlook
 
-from .robots import FITTING, PAPER, Q3, UR5E, H, Robot, cycle, without_arm
+from .robots import FITTING, PAPER, Q3, UR5E, H, Robot, without_arm
 
 
 @pytest.mark.parametrize("name", [*FITTING[:4], "none"])
 def test_what_is_foreseen_is_what_happens_to_the_bit(name):
     random = np.random.default_rng(FITTING.index(name) if name in FITTING else 99)
-    line = without_arm(cycle(name))
+    line = without_arm(name)
     motion = line.start(line.plan(Q3, PAPER))
     for moment in sorted(random.integers(2, 1100, 3)):
         while line.trajectory._ticks < moment and not line.at_rest and motion.rate == 1.0:
@@ -54,7 +54,7 @@ def test_a_pause_and_a_change_of_the_filter_are_foreseen_too():
 
 
 def test_what_lasts_too_long_is_not_foreseen():
-    line = without_arm(cycle())
+    line = without_arm()
     line.start(line.plan(Q3, type(PAPER)(0.01, 0.1, 1.0)))
     line.step()
     assert MOST_AHEAD * H < 100.0

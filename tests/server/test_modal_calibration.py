@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tvist_plant.description import load as load_robot
-from tvist_plant.plant import Plant
+from tvist_plant.flexible_arm import FlexibleArm
 from tvist_protocol.calibration import (
     CalibrationError,
     calibration_from_json,
@@ -41,7 +41,7 @@ def test_it_is_near_the_true_modes_with_any_payload(calibration):
     for _ in range(60):
         q = rng.uniform([-np.pi, -np.pi, -2.6, -np.pi, 0, 0], [np.pi, 0, 2.6, 0, 0, 0])
         payload = paper_payload(ROBOT, float(rng.uniform(0.0, 5.0)))
-        true = Plant(ROBOT, body(payload)).modes(q)
+        true = FlexibleArm(ROBOT, body(payload)).modes(q)
         f_d, zeta = modal_estimator(calibration, ROBOT, payload, 3).estimate(q)
         off.append((np.abs(f_d / true.f_d[:3] - 1.0), np.abs(zeta / true.zeta[:3] - 1.0)))
     f_d, zeta = np.median(off, axis=0)

@@ -123,7 +123,7 @@ def test_a_reset_puts_it_into_any_mode_from_everywhere(activity, mode):
 def test_it_starts_in_any_mode(mode):
     robot = Robot(mode=mode, carried=Payload(mass=1.0, com=(0, 0, 0), inertia=(0.0,) * 6))
     assert robot.tick().robot_mode == RobotMode[mode]
-    assert robot.controller.cycle.arm.payload.mass == 1.0
+    assert robot.controller.cycle.plant.payload.mass == 1.0
     assert robot.controller.declared.mass == 5.0
     assert robot.send(c.MoveJ, q=Q2_).code == "wrong_mode"
     assert robot.send(c.PowerOn) == Done()

@@ -1,12 +1,14 @@
 """Inputs, outputs, registers and the tool centre point: what is set is told, and nothing else changes."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tvist_protocol.commands import PowerOn, SimulationReset
+from tvist_protocol.commands import PowerOff, PowerOn, SimulationInject, SimulationReset
 from tvist_protocol.io import BITS, NUMBERS, SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Done, Refused
@@ -18,13 +20,33 @@ from .robots import Q1, UR5E, Robot
 BITS18 = st.integers(0, 2**18 - 1)
 
 
+NO_PROGRAM = SimpleNamespace(name=None, state="STOPPED", line=0)
+
+
+def bare():
+    return Peripherals(lambda _: None)
+
+
 def told(peripherals: Peripherals):
-    return peripherals.io(1, paper_payload(UR5E), 1.0)
+    return peripherals.io(1, paper_payload(UR5E), 1.0, NO_PROGRAM, [0.0] * 6)
+
+
+def test_a_push_at_the_tool_is_told_in_io():
+    robot = Robot()
+    robot.tick(50)
+    assert robot.controller.io().actual_TCP_force == pytest.approx([0.0] * 6, abs=1.0)
+    robot.send(SimulationInject, fault="torque", joint=0, value=20.0, seconds=4.0)
+    robot.tick(1000)
+    force = np.array(robot.controller.io().actual_TCP_force)
+    assert 1.0 < np.linalg.norm(force[:3]) + np.linalg.norm(force[3:]) < 200.0
+    robot.send(PowerOff)
+    robot.tick(500)
+    assert robot.controller.io().actual_TCP_force == [0.0] * 6
 
 
 @given(st.lists(st.tuples(BITS18, BITS18), max_size=8))
 def test_a_mask_decides_which_digital_outputs_change(steps):
-    peripherals, bits = Peripherals(), [False] * 18
+    peripherals, bits = bare(), [False] * 18
     for mask, values in steps:
         peripherals.set_outputs(SetIo(token="", digital_output_mask=mask, digital_outputs=values))
         peripherals.set_inputs(SimulationSetInputs(token="", digital_input_mask=mask, digital_inputs=values))
@@ -36,7 +58,7 @@ def test_a_mask_decides_which_digital_outputs_change(steps):
 
 @given(st.integers(0, 3), st.integers(0, 3), st.floats(0, 1), st.floats(0, 1))
 def test_an_analog_output_is_a_share_of_its_range(mask, kind, first, second):
-    peripherals = Peripherals()
+    peripherals = bare()
     peripherals.set_outputs(
         SetIo(
             token="",
@@ -62,7 +84,7 @@ def test_an_analog_output_is_a_share_of_its_range(mask, kind, first, second):
     ),
 )
 def test_bits_stand_in_words_of_32(bank, writes):
-    peripherals, bits = Peripherals(), [False] * BITS
+    peripherals, bits = bare(), [False] * BITS
     for first, values in writes:
         fitting = values[: BITS - first]
         peripherals.set_registers(SetRegisters(bank=bank, first=first, values=tuple(fitting)))
@@ -74,7 +96,7 @@ def test_bits_stand_in_words_of_32(bank, writes):
 
 
 def test_what_was_told_does_not_change_afterwards():
-    peripherals = Peripherals()
+    peripherals = bare()
     before = told(peripherals)
     peripherals.set_registers(SetRegisters(bank="input_int", values=(7,)))
     assert before.input_int_register == [0] * NUMBERS
@@ -100,7 +122,7 @@ def test_what_a_register_cannot_hold_is_refused_and_changes_nothing(bank, first,
     assert isinstance(reply, Refused)
     assert (reply.code, reply.where) == ("out_of_range", where)
     robot.tick()
-    io = robot.controller.peripherals.io(1, robot.controller.declared, 1.0)
+    io = robot.controller.io()
     assert not any(any(getattr(io, name)) for name in io.__struct_fields__ if name.endswith("register"))
 
 

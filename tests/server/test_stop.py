@@ -8,7 +8,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted
 from tvist_server.trajectory import DoubleS, Limits, LineStop, Stop
 
-from .robots import PAPER, Q1, Q2, Q3, ROUNDING, UR5E, H, Robot, calibration, cycle, stop, without_arm
+from .robots import PAPER, Q1, Q2, Q3, ROUNDING, UR5E, H, Robot, calibration, stop, without_arm
 
 
 def run(line, ticks):
@@ -78,20 +78,20 @@ def test_a_move_whose_torque_passes_a_limit_says_by_how_much():
 
 @pytest.mark.parametrize("name", ["zv", "ei3"])
 def test_after_a_stop_a_move_is_what_it_is_of_a_fresh_line(name):
-    line = without_arm(cycle(name))
+    line = without_arm(name)
     line.start(line.plan(Q3, PAPER))
     run(line, 431)
     stop(line, None)
     end = until_rest(line)[-1, 0]
     run(line, 3)
-    fresh = without_arm(cycle(name, q=end))
+    fresh = without_arm(name, q=end)
     for moved in (line, fresh):
         moved.start(moved.plan(Q2, PAPER))
     assert (until_rest(line) == until_rest(fresh)).all()
 
 
 def test_a_stop_while_the_shaper_lets_a_finished_trajectory_out_is_a_stop_too():
-    line = without_arm(cycle("ei3"))
+    line = without_arm("ei3")
     motion = line.start(line.plan(Q1 + 0.1, PAPER))
     while not motion.finished:
         run(line, 1)
@@ -104,7 +104,7 @@ def test_a_stop_while_the_shaper_lets_a_finished_trajectory_out_is_a_stop_too():
 
 def test_a_harder_stop_takes_over_from_a_gentle_one():
     def way(*decelerations):
-        line = without_arm(cycle())
+        line = without_arm()
         line.start(line.plan(Q2, PAPER))
         run(line, 450)
         for deceleration in decelerations:
@@ -118,7 +118,7 @@ def test_a_harder_stop_takes_over_from_a_gentle_one():
 
 
 def test_a_harder_stop_keeps_the_acceleration_within_its_limit():
-    line = without_arm(cycle())
+    line = without_arm()
     line.start(line.plan(Q2, PAPER))
     run(line, 450)
     stop(line, 2.0)
@@ -129,7 +129,7 @@ def test_a_harder_stop_keeps_the_acceleration_within_its_limit():
 
 def test_a_repeated_stop_changes_nothing():
     def stopped(times):
-        line = without_arm(cycle())
+        line = without_arm()
         line.start(line.plan(Q2, PAPER))
         run(line, 300)
         out = []

@@ -8,7 +8,7 @@ from tvist_server.safety import GENTLEST_STOP, TORQUE_SHARE, TorqueRoom
 from tvist_server.setup import body, paper_payload
 from tvist_server.trajectory import Limits
 
-from .robots import PAPER, Q1, Q3, UR5E, H, cycle, without_arm
+from .robots import PAPER, Q1, Q3, UR5E, H, without_arm
 from .streams import swinging
 
 DYNAMICS = InverseDynamics(UR5E, body(paper_payload(UR5E)))
@@ -41,7 +41,7 @@ def test_little_is_left_where_gravity_takes_most_and_much_where_it_does_not():
 @pytest.mark.parametrize("start", [Q1, Q3])
 def test_the_shaped_torque_stays_within_its_share_whatever_the_stream_asks_for(start, frequency):
     """Two per thousand for what lies between a reference and its shaped one."""
-    line = without_arm(cycle(q=start))
+    line = without_arm(q=start)
     stream = line.stream(H, Limits(3.0, 40.0, 2000.0))
     motion = swinging([0.05, 0.1, 0.1, 0.1, 0.1, 0.1], frequency, 0.4)
     samples = []
@@ -59,7 +59,7 @@ def test_the_shaped_torque_stays_within_its_share_whatever_the_stream_asks_for(s
 
 
 def test_a_gentle_stream_passes_to_the_bit_there():
-    line = without_arm(cycle(q=Q1))
+    line = without_arm(q=Q1)
     stream = line.stream(H, PAPER)
     for k, q in enumerate(swinging([0.05, -0.05, 0.05, 0.05, 0.0, 0.05], 0.6)(np.arange(600) * H)):
         stream.offer(k, Q1 + q)

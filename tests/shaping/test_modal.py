@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tvist_plant.description import load
+from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.model import flexible_model
-from tvist_plant.plant import Plant
 from tvist_server.calibrations.modal import mass_matrix
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators import modal
@@ -125,7 +125,7 @@ def test_a_step_away_from_where_two_modes_are_almost_one_finds_both():
 def test_with_the_plant_s_own_parameters_they_are_the_plant_s_modes():
     # without what the estimator leaves out: the integrator and gravity's little stiffness
     drives = msgspec.structs.replace(ROBOT.drives, integral_gain=(0.0,) * 6)
-    plant = Plant(msgspec.structs.replace(ROBOT, drives=drives), ROBOT.payload)
+    plant = FlexibleArm(msgspec.structs.replace(ROBOT, drives=drives), ROBOT.payload)
     rng = np.random.default_rng(5)
     for q in [Q1, *rng.uniform(LOW, HIGH, (15, 6))]:
         estimator, *_ = arm(modes=3)

@@ -37,7 +37,7 @@ main()
 @pytest.mark.parametrize(
     "where",
     [
-        "tvist_plant.plant.is_compiled",  # nothing is there yet
+        "tvist_plant.flexible_arm.is_compiled",  # nothing is there yet
         "tvist_server.server.Network",  # the recording has begun
     ],
 )

@@ -10,7 +10,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from tvist_plant.fingerprint import fingerprint
-from tvist_plant.plant import PERIOD, PlantError
+from tvist_plant.plant import PERIOD, Plant, PlantError
 from tvist_protocol import commands as c
 from tvist_protocol.info import StopReason
 from tvist_protocol.io import Io
@@ -34,7 +34,7 @@ from tvist_server.planning.filter_planner import PlannedFilter
 from tvist_server.planning.planner import Plan, Planner
 from tvist_server.programs.player import ProgramPlayer
 from tvist_server.refusal import RefusalError, check_content, check_joints
-from tvist_server.reporting import Reporter
+from tvist_server.reporting import Reporter, truth_of
 from tvist_server.safety_control import SafetyControl
 from tvist_server.session import NoControlError, Session
 from tvist_server.setup import Setup, body
@@ -57,12 +57,13 @@ class Controller:
 
     Args:
         setup: How it starts.
+        plant: What it moves; None: the flexible arm that the setup describes.
 
     Raises:
-        ValueError: The setup is wrong.
+        ValueError: The setup is wrong, or the plant does not fit it.
     """
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, setup: Setup, plant: Plant | None = None) -> None:
         setup.check()
         self.setup = setup
         self.tick_number = 0
@@ -79,7 +80,10 @@ class Controller:
             declared=body(setup.payload),
             carried=body(setup.carried or setup.payload),
             seed=setup.seed,
+            plant=plant,
         )
+        if setup.truth:
+            truth_of(self.cycle.plant)  # found missing now rather than at the first tick
         self._seed = setup.seed
         self._reporter = Reporter(setup.description)
         self._wrench = ToolWrench(setup.description)
@@ -253,8 +257,12 @@ class Controller:
         return self.io()
 
     def truth(self) -> Truth:
-        """What no robot can know, after a tick."""
-        return self._reporter.truth(self.tick_number, self.cycle.arm)
+        """What no robot can know, after a tick.
+
+        Raises:
+            ValueError: The plant does not know it either.
+        """
+        return self._reporter.truth(self.tick_number, self.cycle.plant)
 
     def _emit(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
         """Put down an event of the tick that is being made; of the next one between two."""

@@ -6,7 +6,8 @@ import numpy as np
 from msgspec import Struct
 
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.plant import PERIOD, Measurement, Plant
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_plant.plant import PERIOD, Measurement, Plant, check_measurement
 from tvist_server.control.differentiator import Differentiator, Floats, Target
 from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.control.joint_controllers import JointControllers
@@ -38,7 +39,7 @@ class Sample(Struct, frozen=True, eq=False, gc=False):
 
 
 class ControlCycle:
-    """Trajectory generator, TVIST filter, differentiator, inverse dynamics, joint controllers, arm.
+    """Trajectory generator, TVIST filter, differentiator, inverse dynamics, joint controllers, plant.
 
     Args:
         description: The robot.
@@ -47,6 +48,10 @@ class ControlCycle:
         declared: The payload that inverse dynamics counts on.
         carried: The payload that the arm has.
         seed: Of the arm's noise and gear errors.
+        plant: What the line moves; None: the flexible arm that the description describes.
+
+    Raises:
+        ValueError: The plant cannot start there, or what it measures has the wrong shape.
     """
 
     def __init__(
@@ -58,12 +63,13 @@ class ControlCycle:
         declared: Payload,
         carried: Payload,
         seed: int,
+        plant: Plant | None = None,
     ) -> None:
         self.description = description
         limits = description.limits
         most = Limits(min(limits.velocity), min(limits.acceleration), min(limits.jerk))
         self.line_filter = LineFilter(tvist, most)
-        self.arm = Plant(description, carried)
+        self._plant: Plant = FlexibleArm(description, carried) if plant is None else plant
         self.inverse_dynamics = InverseDynamics(description, declared)
         self._joint_controllers = JointControllers(description, PERIOD)
         self._differentiator = Differentiator(q, PERIOD)
@@ -79,11 +85,17 @@ class ControlCycle:
         self.guard: LookAhead | None = None
         """Asked before each shaped reference is played; where it answers with a stop, that is made instead."""
         self.reset(q, carried=carried, seed=seed)
+        check_measurement(self.standing.measured, description.joints, self._plant)
         # The first steps load compiled code, which lasts many ticks: they are made here, and taken back.
         self.line_filter.rehearse(q)
         for _ in range(3):
             self.step()
         self.reset(q, seed=seed)
+
+    @property
+    def plant(self) -> Plant:
+        """What the line moves; the line alone steps and resets it."""
+        return self._plant
 
     @property
     def tvist(self) -> Filter:
@@ -102,7 +114,7 @@ class ControlCycle:
         torque = self.inverse_dynamics.torque(target.q, target.qd, target.qdd)  # τ* [N m]
         gravity = self.inverse_dynamics.gravity(target.q)
         command = self._joint_controllers.command(target, torque, gravity)
-        measured = self.arm.step(command)
+        measured = self._plant.step(command)
         self._settle(reference, target)
         return Sample(reference, target, torque, command.torque, measured)
 
@@ -220,7 +232,7 @@ class ControlCycle:
         still = np.zeros_like(q)
         torque = self.inverse_dynamics.gravity(q)
         command = self._joint_controllers.command(Target(q, still, still), torque, torque)
-        measured = self.arm.reset(command, payload=carried, seed=seed)
+        measured = self._plant.reset(command, payload=carried, seed=seed)
         self.standing = Sample(q, Target(q, still, still), torque, command.torque, measured)
         """What there is to tell before the first tick from there."""
 

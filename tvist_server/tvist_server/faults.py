@@ -6,7 +6,7 @@ from itertools import count
 
 import numpy as np
 
-from tvist_plant.plant import PERIOD
+from tvist_plant.plant import PERIOD, Breakable, Pushable
 from tvist_protocol.commands import SimulationInject
 from tvist_protocol.faults import FAULTS
 from tvist_server.command_row import Row
@@ -44,10 +44,13 @@ class Faults:
             "power_loss": lambda: safety.cut_power("a loss of power was injected"),
             "violation": lambda: safety.cut_power("the safety system found a violation", "violation"),
             "fault": lambda: safety.cut_power("the safety system failed", "fault"),
-            "nan": lambda: motion.cycle.arm.spoil(),  # noqa: PLW0108  the line may get another arm
         }
         """What is over at once."""
         self.rows = (Row(SimulationInject, lambda call: self.inject(call.command, call.tick)),)
+        plant = motion.cycle.plant
+        self._pushable = plant if isinstance(plant, Pushable) else None
+        if isinstance(plant, Breakable):
+            self._momentary["nan"] = plant.make_nan
         self._push = np.zeros(motion.cycle.description.joints)
         self._ends: list[tuple[int, int, str, Callable[[], None]]] = []
         self._number = count()
@@ -60,9 +63,11 @@ class Faults:
             tick: The next one.
 
         Raises:
-            RefusalError: There is none of that name, a field it needs is missing, or one it has not is there.
+            RefusalError: There is none of that name, a field it needs is missing, one it has not is there, or the plant
+                cannot have this fault.
         """
         _check(command, self._motion.cycle.description.joints)
+        self._check_plant(command.fault)
         fault, seconds = command.fault, command.seconds
         ends = tick + round((seconds or 0.0) / PERIOD)
         if fault == "torque":
@@ -90,7 +95,18 @@ class Faults:
         while self._ends:
             heapq.heappop(self._ends)[-1]()
         self._push[:] = 0.0
-        self._motion.cycle.arm.push(self._push)
+        if self._pushable is not None:
+            self._pushable.push(self._push)
+
+    def _check_plant(self, fault: str) -> None:
+        """Check that the plant can have a fault that is its own."""
+        if (fault == "torque" and self._pushable is None) or (
+            fault == "nan" and fault not in self._momentary
+        ):
+            plant = type(self._motion.cycle.plant).__name__
+            missing = "push" if fault == "torque" else "make_nan"
+            why = f"fault is {fault!r}: the plant, {plant}, cannot have it, since it has no method {missing}"
+            raise RefusalError("unknown_fault", "fault", why)
 
     def _forget(self, faults: set[str]) -> None:
         """Let these go on, if they last, until something else ends them."""
@@ -102,7 +118,8 @@ class Faults:
 
     def _add(self, joint: int, torque: float) -> None:
         self._push[joint] += torque
-        self._motion.cycle.arm.push(self._push)
+        if self._pushable is not None:
+            self._pushable.push(self._push)
 
 
 def _check(command: SimulationInject, joints: int) -> None:

@@ -229,7 +229,7 @@ class MotionControl:
         if target is not None:
             self.activity = target
         if target is not None and not cycle.at_rest:
-            stop = brake(cycle.description, cycle.arm.payload, cycle.newest, PERIOD)
+            stop = brake(cycle.description, cycle.plant.payload, cycle.newest, PERIOD)
             way = float(np.abs(stop.end - cycle.position).max())
             plan = StopPlan(None, None, limited=False, duration=stop.duration, way=way)
             self.outlook.brake(stop)

@@ -1,7 +1,8 @@
 """What went along the line in a tick, as the messages that clients get."""
 
 from tvist_plant.description import RobotDescription
-from tvist_plant.plant import PERIOD, Plant
+from tvist_plant.plant import PERIOD, Modal, Plant
+from tvist_plant.plant import Truth as PlantTruth
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.stream import State, Truth
 from tvist_server.control.kinematics import ForwardKinematics, rotation_vector
@@ -70,16 +71,21 @@ class Reporter:
         """Say where the tool centre point is in the flange frame: x y z [m] and rotation vector [rad]."""
         self._kinematics.set_tool(offset)
 
-    def truth(self, tick: int, arm: Plant) -> Truth:
-        """What no robot can know of itself after a tick; its modes are computed now and then."""
+    def truth(self, tick: int, plant: Plant) -> Truth:
+        """What no robot can know of itself after a tick.
+
+        Its modes are computed now and then, and are empty lists where the plant does not know them.
+
+        Raises:
+            ValueError: The plant does not know the truth.
+        """
         if not self._true_modes or tick % TRUE_MODES_EVERY == 0:
-            modes = arm.modes()
+            modes = plant.modes() if isinstance(plant, Modal) else None
             self._true_modes = {
-                "f_d": modes.f_d[: self._joints].tolist(),
-                "zeta": modes.zeta[: self._joints].tolist(),
-                "participation": modes.participation[: self._joints].tolist(),
+                name: [] if modes is None else getattr(modes, name)[: self._joints].tolist()
+                for name in ("f_d", "zeta", "participation")
             }
-        truth = arm.truth()
+        truth = truth_of(plant)
         return Truth(
             tick=tick,
             timestamp=tick * PERIOD,
@@ -95,3 +101,17 @@ class Reporter:
     def forget_modes(self) -> None:
         """The arm was put elsewhere: compute its modes anew."""
         self._true_modes = {}
+
+
+def truth_of(plant: Plant) -> PlantTruth:
+    """What no robot can know, from a plant that does.
+
+    Raises:
+        ValueError: The plant does not know it.
+    """
+    truth = plant.truth()
+    if truth is None:
+        raise ValueError(
+            f"truth is on, and plant {type(plant).__name__} does not know the truth: turn it off"
+        )
+    return truth

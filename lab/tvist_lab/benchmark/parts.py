@@ -10,6 +10,7 @@ from tvist_lab.in_process import free_setup
 from tvist_lab.paper.published import pose
 from tvist_lab.second_opinion import SecondOpinion
 from tvist_plant.drives import DriveCommand
+from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD, Plant
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import MoveJ, SimulationReset, SimulationStep, TakeControl
@@ -38,7 +39,7 @@ def parts(tell: Callable[[str], None]) -> dict[str, float]:
     motion, payload = _motion(setup), body(setup.payload)
     commands = _commands(setup, motion)
     tell("the plant")
-    plant = _arm(Plant(setup.description, payload), commands)
+    plant = _arm(FlexibleArm(setup.description, payload), commands)
     tell("MuJoCo")
     mujoco = _arm(SecondOpinion(setup.description, payload, MUJOCO_STEP), commands[:300])
     tell("filter, cycle and line")

@@ -2,15 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
 
-from tvist_lab.evaluation.plants import MujocoArm, Variant, VariantPlant, Yields
+from tvist_lab.mujoco_arm import MujocoArm
 from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_plant.imperfections import Imperfections, YieldingBase
 from tvist_plant.plant import Plant
 
+SUBSTEPS = 8
+"""Of the integrator in a period where an arm has imperfections, which are explicit in it."""
 SCATTER = 0.15
 """By which each stiffness and gain differs from the description's, up or down by chance [-]."""
 
@@ -23,33 +26,37 @@ class Arm:
     """In JSON."""
     label: str
     """What it has."""
-    make: Callable[[RobotDescription, Payload, int], Any]
-    """Description, payload carried and seed to something with the plant's `reset`, `step` and `truth`."""
+    make: Callable[[RobotDescription, Payload, int], Plant]
+    """Description, payload carried and seed to a plant that knows its truth."""
 
 
-def _calibrated(description: RobotDescription, carried: Payload, seed: int) -> Plant:  # noqa: ARG001
-    return Plant(description, carried)
+def _imperfect(description: RobotDescription, carried: Payload, imperfections: Imperfections) -> FlexibleArm:
+    return FlexibleArm(description, carried, imperfections=imperfections, substeps=SUBSTEPS)
 
 
-def _coulomb(description: RobotDescription, carried: Payload, seed: int) -> Plant:  # noqa: ARG001
+def _calibrated(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:  # noqa: ARG001
+    return FlexibleArm(description, carried)
+
+
+def _coulomb(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:  # noqa: ARG001
     drives = replace(description.drives, friction_width=0.2 * description.drives.friction_width)
-    return VariantPlant(replace(description, drives=drives), carried, Variant())
+    return _imperfect(replace(description, drives=drives), carried, Imperfections())
 
 
-def _stribeck(description: RobotDescription, carried: Payload, seed: int) -> Plant:  # noqa: ARG001
+def _stribeck(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:  # noqa: ARG001
     drives = replace(description.drives, friction_width=0.3 * description.drives.friction_width)
-    return VariantPlant(replace(description, drives=drives), carried, Variant(breakaway=1.5))
+    return _imperfect(replace(description, drives=drives), carried, Imperfections(breakaway=1.5))
 
 
-def _hysteretic(description: RobotDescription, carried: Payload, seed: int) -> Plant:  # noqa: ARG001
-    return VariantPlant(description, carried, Variant(hysteresis=0.3))
+def _hysteretic(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:  # noqa: ARG001
+    return _imperfect(description, carried, Imperfections(hysteresis=0.3))
 
 
-def _piecewise(description: RobotDescription, carried: Payload, seed: int) -> Plant:  # noqa: ARG001
-    return VariantPlant(description, carried, Variant(soft=0.75))
+def _piecewise(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:  # noqa: ARG001
+    return _imperfect(description, carried, Imperfections(soft=0.75))
 
 
-def _scattered(description: RobotDescription, carried: Payload, seed: int) -> Plant:
+def _scattered(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:
     random = np.random.default_rng([seed, 15])
 
     def scattered(values: tuple[float, ...]) -> tuple[float, ...]:
@@ -59,11 +66,11 @@ def _scattered(description: RobotDescription, carried: Payload, seed: int) -> Pl
     names = ("gear_stiffness", "velocity_gain", "position_gain")
     other = replace(drives, **{name: scattered(getattr(drives, name)) for name in names})
     bending = replace(links, stiffness=scattered(links.stiffness))
-    return Plant(replace(description, drives=other, link_flexibility=bending), carried)
+    return FlexibleArm(replace(description, drives=other, link_flexibility=bending), carried)
 
 
-def _on_base(description: RobotDescription, carried: Payload, seed: int) -> Plant:  # noqa: ARG001
-    return VariantPlant(description, carried, Variant(base=Yields()))
+def _on_base(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:  # noqa: ARG001
+    return _imperfect(description, carried, Imperfections(base=YieldingBase()))
 
 
 def _mujoco(description: RobotDescription, carried: Payload, seed: int) -> MujocoArm:  # noqa: ARG001

@@ -15,6 +15,7 @@ from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import PERIOD, Plant
 from tvist_server.control.differentiator import Target
 from tvist_server.cycle import STILL, ControlCycle
+from tvist_server.reporting import truth_of
 from tvist_server.trajectory import DoubleS, Limits, Trajectory
 from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.fixed import Fixed
@@ -137,10 +138,10 @@ def shape(step: Step, reference: Floats) -> tuple[Floats, bool]:
 def simulate(
     cycle: ControlCycle, start: Floats, reference: Floats, shaped: Floats, seed: int, delay: float = 0.0
 ) -> Recording:
-    """Let an arm follow a shaped reference from rest, and rest for a while.
+    """Let a plant follow a shaped reference from rest, and rest for a while.
 
     Args:
-        cycle: The line, with `Unchanged` for a filter and any arm at its end.
+        cycle: The line, with `Unchanged` for a filter and any plant at its end.
         start: Where it rests, shape (n,) [rad].
         reference: The unshaped one that all is compared with, shape (T, n) [rad].
         shaped: What the arm is to follow, shape (T', n) [rad].
@@ -149,8 +150,11 @@ def simulate(
 
     Returns:
         Columns that the metrics on a common clock want, from a tick before the motion on.
+
+    Raises:
+        ValueError: The plant does not know its truth.
     """
-    arm = cycle.arm
+    plant = cycle.plant
     cycle.reset(start, seed=seed)
     resting = 4
     ticks = resting + max(len(shaped), len(reference)) + round(REST / PERIOD)
@@ -162,7 +166,7 @@ def simulate(
         if tick == resting:
             cycle.start(Played(shaped))
         sample = cycle.step()
-        truth = arm.truth()
+        truth = truth_of(plant)
         aim: Target = sample.target
         target[tick], qd[tick], qdd[tick] = aim.q, aim.qd, aim.qdd
         force[tick], rotation[tick] = truth.specific_force, truth.flange_rotation
@@ -186,7 +190,7 @@ def control_line(
     start: Floats,
     declared: Payload,
     carried: Payload,
-    arm: Plant | None = None,
+    plant: Plant | None = None,
 ) -> ControlCycle:
     """The line from shaped reference to arm, without a shaper.
 
@@ -195,10 +199,9 @@ def control_line(
         start: Where it rests, shape (n,) [rad].
         declared: The payload the controller counts on.
         carried: The payload the arm has.
-        arm: Another arm than the description's.
+        plant: What the line moves; None: the arm that the description describes.
     """
     joints = description.joints
-    cycle = ControlCycle(description, Unchanged(joints), q=start, declared=declared, carried=carried, seed=0)
-    if arm is not None:
-        cycle.arm = arm
-    return cycle
+    return ControlCycle(
+        description, Unchanged(joints), q=start, declared=declared, carried=carried, seed=0, plant=plant
+    )

@@ -8,7 +8,7 @@ import numpy as np
 from tvist_lab.recordings import Floats
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import PERIOD, Measurement, Plant
+from tvist_plant.plant import PERIOD, Measurement
 from tvist_protocol import commands as c
 from tvist_protocol.info import Clock
 from tvist_protocol.replies import Accepted, Refused, Reply
@@ -25,17 +25,32 @@ CLIENT, SESSION = "searcher", "5e55"
 """Name and session of who has control."""
 
 
-class RigidArm(Plant):
-    """Stands for the arm where only references matter: it is where it is told to be, and feels nothing."""
+class RigidArm:
+    """A plant for searches where only references matter: it is where it is told to be, and feels nothing.
+
+    Args:
+        payload: What it carries.
+    """
+
+    def __init__(self, payload: Payload) -> None:
+        self._payload = payload
+
+    @property
+    def payload(self) -> Payload:
+        """What it carries."""
+        return self._payload
 
     def step(self, command: DriveCommand) -> Measurement:
         """Be there."""
         return Measurement(command.q, command.qd, np.zeros_like(command.q), np.zeros(3))
 
-    def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
+    def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:  # noqa: ARG002
         """Be there."""
-        super().reset(command, payload=payload, seed=seed)
+        self._payload = self._payload if payload is None else payload
         return self.step(command)
+
+    def truth(self) -> None:
+        """Nothing gives way, and nobody asks."""
 
 
 @dataclass
@@ -76,9 +91,7 @@ class Subject:
             shaper="none" if undamped else self.shaper,
             clock=self.clock,
         )
-        self.controller = Controller(setup)
-        if not self.flexible:
-            self.controller.cycle.arm = RigidArm(self.description, body(self.payload))
+        self.controller = Controller(setup, None if self.flexible else RigidArm(body(self.payload)))
         self.token = self.take_control()
         self.references.append(np.array(self.q))
         if undamped:

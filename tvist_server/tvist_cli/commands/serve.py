@@ -82,7 +82,7 @@ def serve(
         "ur_ports": None if ur_port is None else dict(map(_ur_port, ur_port)),
     }  # fmt: skip
     began = time.monotonic()
-    from tvist_plant.plant import is_compiled
+    from tvist_plant.flexible_arm import is_compiled
 
     if not is_compiled():
         say("compiling the arm's equations, once: this takes some seconds")

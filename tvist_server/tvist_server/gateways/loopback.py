@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from tvist_plant.plant import Plant
 from tvist_protocol.codec import encode
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
@@ -18,10 +19,14 @@ class LoopbackHost(Sink):
 
     Args:
         setup: How the controller starts; its clock should be `free` or `lockstep`.
+        plant: What the controller moves; None: the flexible arm that the setup describes.
+
+    Raises:
+        ValueError: The setup is wrong, or the plant does not fit it.
     """
 
-    def __init__(self, setup: Setup) -> None:
-        self.controller = Controller(setup)
+    def __init__(self, setup: Setup, plant: Plant | None = None) -> None:
+        self.controller = Controller(setup, plant)
         self.entries: list[Entry] = []
         """What reached the controller: with the setup, all that a replay needs."""
         self._host = Host(self.controller, self)

@@ -1,0 +1,72 @@
+"""The flexible arm in MuJoCo as a plant: a second implementation to put at the end of a controller's line."""
+
+import math
+
+from tvist_lab.second_opinion import SecondOpinion
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.drives import DriveCommand
+from tvist_plant.plant import Measurement, PlantError, Truth
+
+TIMESTEP = 0.00025
+"""Of MuJoCo, at which it agrees with `FlexibleArm` [s]."""
+
+
+class MujocoArm:
+    """The arm in MuJoCo: a `Plant`, which can be neither pushed nor broken and does not know its modes.
+
+    Nothing is left to chance: it has neither sensor noise nor gear errors, and seeds mean nothing to it.
+
+    Args:
+        description: The arm.
+        payload: What it carries.
+    """
+
+    def __init__(self, description: RobotDescription, payload: Payload) -> None:
+        self._description = description
+        self._load(payload)
+
+    def _load(self, payload: Payload) -> None:
+        self._payload = payload
+        self._arm = SecondOpinion(self._description, payload, TIMESTEP)
+
+    @property
+    def payload(self) -> Payload:
+        """What the arm carries."""
+        return self._payload
+
+    def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:  # noqa: ARG002
+        """Put the arm at rest in static equilibrium under a command; see `Plant.reset`."""
+        if payload is not None and payload != self._payload:
+            self._load(payload)
+        self._arm.reset(command)
+        return self._measure()
+
+    def step(self, command: DriveCommand) -> Measurement:
+        """Move the arm by one period.
+
+        Raises:
+            PlantError: The state is no longer finite.
+        """
+        self._arm.step(command)
+        measured = self._measure()
+        if not math.isfinite(self._force.dot(self._force)):
+            raise PlantError("the state of the arm in MuJoCo is no longer finite")
+        return measured
+
+    def _measure(self) -> Measurement:
+        arm = self._arm
+        self._force, self._rotation = arm.flange()
+        return Measurement(q=arm.q, qd=arm.qd, moment=arm.moment(), accelerometer=self._force.copy())
+
+    def truth(self) -> Truth:
+        """What no robot can know, at the present state."""
+        arm = self._arm
+        return Truth(
+            motor_q=arm.motor_q,
+            motor_qd=arm.motor_qd,
+            gear_deflection=arm.q - arm.motor_q,
+            link_deflection=arm.link_deflection,
+            flange_position=arm.flange_position(),
+            flange_rotation=self._rotation,
+            specific_force=self._force,
+        )

@@ -1,0 +1,162 @@
+"""What an arm may have that its description does not say.
+
+Friction on a motor turning at v falls with speed (Stribeck; Canudas de Wit and others 1995, without the bristles):
+
+    F(v) = [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w)
+
+A gear twisted by δ pushes with
+
+    K δ                                   as described,
+    K₁ δ up to |δ| = δ₁, K beyond it      piecewise (makers of strain wave gears give K₁ < K),
+    K δ + z                               with hysteresis, ż = r K δ̇ - |δ̇| z r K/z_max  (Dahl 1968).
+
+A base that yields stands on two springs about the world's x and y axes, and below it a ring of some mass.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from tvist_plant.description import RobotDescription
+from tvist_plant.model import FLANGE, FlexibleModel, Floats
+
+
+@dataclass(frozen=True)
+class YieldingBase:
+    """A base on springs.
+
+    Raises:
+        ValueError: A number is not positive; `damping_time` may be 0.
+    """
+
+    stiffness: float = 1.5e5
+    """About each of the two axes [N m/rad]."""
+    damping_time: float = 1e-3
+    """Damping over stiffness [s]."""
+    mass: float = 20.0
+    """Of the ring under the arm [kg]."""
+    radius: float = 0.25
+    """Of the ring's inertia [m]."""
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        for name in ("stiffness", "mass", "radius"):
+            _check(f"base.{name}", getattr(self, name), 0.0, math.inf, above=True)
+        _check("base.damping_time", self.damping_time, 0.0, math.inf)
+
+
+@dataclass(frozen=True)
+class Imperfections:
+    """What is added to the arm that its description describes; as they stand here they add nothing.
+
+    Raises:
+        ValueError: A number is outside the range that it is said to have.
+    """
+
+    breakaway: float = 1.0
+    """F_s over F_c, at least 1 [-]."""
+    stribeck_speed: float = 0.05
+    """v_s, above 0 [rad/s]."""
+    hysteresis: float = 0.0
+    """r: stiffness that a gear has more when its twist turns back, at least 0 [-]."""
+    hysteresis_torque: float = 0.02
+    """z_max over the joint's torque limit, above 0 [-]."""
+    soft: float = 1.0
+    """K₁ over K, above 0 and at most 1 [-]."""
+    soft_torque: float = 0.1
+    """K₁ δ₁ over the joint's torque limit, at least 0 [-]."""
+    base: YieldingBase | None = None
+    """None: the base is rigid."""
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        _check("breakaway", self.breakaway, 1.0, math.inf)
+        _check("stribeck_speed", self.stribeck_speed, 0.0, math.inf, above=True)
+        _check("hysteresis", self.hysteresis, 0.0, math.inf)
+        _check("hysteresis_torque", self.hysteresis_torque, 0.0, math.inf, above=True)
+        _check("soft", self.soft, 0.0, 1.0, above=True)
+        _check("soft_torque", self.soft_torque, 0.0, math.inf)
+
+
+@dataclass(frozen=True)
+class GearLaw:
+    """The imperfections of friction and gears in the units of the equations, one entry a joint where it is an array."""
+
+    breakaway: float
+    """F_s/F_c [-]."""
+    stribeck_speed: float
+    """v_s [rad/s]."""
+    softness: Floats
+    """K - K₁, shape (n,) [N m/rad]."""
+    soft_angle: Floats
+    """δ₁, shape (n,) [rad]."""
+    hysteresis: Floats
+    """r K, shape (n,) [N m/rad]."""
+    hysteresis_torque: Floats
+    """z_max, shape (n,) [N m]."""
+    stiffness: Floats
+    """K, shape (n,) [N m/rad]."""
+
+    @classmethod
+    def of(cls, imperfections: Imperfections, description: RobotDescription) -> "GearLaw":
+        """Scale them by the arm's gears and torque limits."""
+        limit = np.array(description.limits.torque)
+        K = np.array(description.drives.gear_stiffness)
+        return cls(
+            breakaway=imperfections.breakaway,
+            stribeck_speed=imperfections.stribeck_speed,
+            softness=(1.0 - imperfections.soft) * K,
+            soft_angle=imperfections.soft_torque * limit / (imperfections.soft * K),
+            hysteresis=imperfections.hysteresis * K,
+            hysteresis_torque=imperfections.hysteresis_torque * limit,
+            stiffness=K,
+        )
+
+    def twist(self, torque: Floats) -> Floats:
+        """Angle by which each gear is twisted under a steady torque, without hysteresis, shape (n,) [rad].
+
+        Args:
+            torque: That the gears transmit, shape (n,) [N m].
+        """
+        if not self.softness.any():
+            return torque / self.stiffness
+        soft = self.stiffness - self.softness
+        within = np.minimum(np.abs(torque) / soft, self.soft_angle)
+        beyond = np.maximum(np.abs(torque) - soft * self.soft_angle, 0.0)
+        return np.asarray(np.sign(torque) * (within + beyond / self.stiffness))
+
+
+def on_base(arm: FlexibleModel, base: YieldingBase) -> FlexibleModel:
+    """The same arm on a base that yields about the world's x and y axes; both count as virtual joints."""
+    ground = pin.Model()
+    inertia = pin.Inertia(base.mass, np.zeros(3), base.mass * base.radius**2 * np.eye(3) / 2.0)
+    light = pin.Inertia(0.05 * base.mass, np.zeros(3), 0.05 * base.mass * base.radius**2 * np.eye(3) / 2.0)
+    first = ground.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), "base_x")
+    ground.appendBodyToJoint(first, light, pin.SE3.Identity())
+    second = ground.addJoint(first, pin.JointModelRY(), pin.SE3.Identity(), "base_y")
+    ground.appendBodyToJoint(second, inertia, pin.SE3.Identity())
+    foot = ground.addFrame(pin.Frame("foot", second, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    whole = pin.appendModel(ground, arm.model, foot, pin.SE3.Identity())
+    place = np.array(
+        [whole.idx_vs[whole.getJointId(arm.model.names[j + 1])] for j in range(arm.model.njoints - 1)]
+    )
+    return FlexibleModel(
+        model=whole,
+        joints=place[arm.joints],
+        flexes=np.concatenate([[0, 1], place[arm.flexes]]).astype(np.int64),
+        flex_stiffness=np.concatenate([[base.stiffness] * 2, arm.flex_stiffness]),
+        flex_damping=np.concatenate([[base.stiffness * base.damping_time] * 2, arm.flex_damping]),
+        flange=whole.getFrameId(FLANGE),
+    )
+
+
+def _check(name: str, value: float, least: float, most: float, *, above: bool = False) -> None:
+    """Check that a number is finite and at least (`above`: above) one limit and at most another."""
+    if math.isfinite(value) and (least < value if above else least <= value) and value <= most:
+        return
+    limit = f"{'above' if above else 'at least'} {least:g}" + (
+        f" and at most {most:g}" if most < math.inf else ""
+    )
+    raise ValueError(f"{name} is {value}: must be {limit}, and finite")

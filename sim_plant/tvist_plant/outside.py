@@ -1,0 +1,100 @@
+"""What pushes an arm from outside: torques on its joints, and wrenches on any of its bodies.
+
+A wrench w = (f, m) on a body enters the equations of motion as the generalized force Jᵀ w, J being the Jacobian of the
+point that it acts on: its power is w · J q̇ whatever the arm does, so the sum over all wrenches may be added to the
+torques on the joints, and is subtracted from the bias b(q, q̇).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from tvist_plant.model import FLANGE, FlexibleModel, Floats
+
+
+@dataclass(frozen=True)
+class _Wrench:
+    joint: int
+    """Number of the model's joint that the body hangs on."""
+    point: Floats
+    """Where the wrench acts, in that joint's frame, shape (3,) [m]."""
+    force: Floats
+    """World axes, shape (3,) [N]."""
+    moment: Floats
+    """About the point, world axes, shape (3,) [N m]."""
+
+
+class Outside:
+    """Torques and wrenches that act on an arm until they are changed.
+
+    Args:
+        flexible: The arm.
+    """
+
+    def __init__(self, flexible: FlexibleModel) -> None:
+        self._flexible = flexible
+        self._data = flexible.model.createData()
+        self._torque: Floats | None = None
+        self._wrenches: dict[str, _Wrench] = {}
+        self._bodies = {
+            name: (number, pin.SE3.Identity()) for number, name in enumerate(flexible.model.names)
+        }
+        del self._bodies[flexible.model.names[0]]  # the world
+        flange = flexible.model.frames[flexible.flange]
+        self._bodies[FLANGE] = flange.parentJoint, flange.placement
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of the bodies: of the joint or virtual joint that moves each, and "flange"."""
+        return tuple(self._bodies)
+
+    def clear(self) -> None:
+        """Let go of everything."""
+        self._torque, self._wrenches = None, {}
+
+    def push(self, torque: Floats) -> None:
+        """Push the joints on the link side; see `FlexibleArm.push`."""
+        given, shape = np.array(torque, dtype=float), self._flexible.joints.shape
+        if given.shape != shape or not np.isfinite(given).all():
+            raise ValueError(f"torque is {given.tolist()}: must be {shape[0]} finite numbers, one a joint")
+        self._torque = given if given.any() else None
+
+    def push_body(
+        self, body: str, force: Sequence[float], moment: Sequence[float], point: Sequence[float]
+    ) -> None:
+        """Push a body; see `FlexibleArm.push_body`."""
+        if body not in self._bodies:
+            raise ValueError(f"body is {body!r}: must be one of {', '.join(self._bodies)}")
+        vectors = {
+            name: np.array(value, dtype=float)
+            for name, value in (("force", force), ("moment", moment), ("point", point))
+        }
+        for name, vector in vectors.items():
+            if vector.shape != (3,) or not np.isfinite(vector).all():
+                raise ValueError(f"{name} is {vector.tolist()}: must be three finite numbers")
+        joint, placement = self._bodies[body]
+        self._wrenches.pop(body, None)
+        if vectors["force"].any() or vectors["moment"].any():
+            at = placement.act(vectors["point"])
+            self._wrenches[body] = _Wrench(joint, at, vectors["force"], vectors["moment"])
+
+    def generalized_force(self, q: Floats) -> Floats | None:
+        """The sum of what acts, as torques on all N links; None where nothing acts.
+
+        Args:
+            q: Angles of the links, shape (N,) [rad].
+        """
+        if self._torque is None and not self._wrenches:
+            return None
+        sum_ = np.zeros(self._flexible.model.nv)
+        if self._torque is not None:
+            sum_[self._flexible.joints] = self._torque
+        if self._wrenches:
+            pin.computeJointJacobians(self._flexible.model, self._data, q)
+        for wrench in self._wrenches.values():
+            J = pin.getJointJacobian(self._flexible.model, self._data, wrench.joint, pin.LOCAL_WORLD_ALIGNED)
+            lever = self._data.oMi[wrench.joint].rotation @ wrench.point
+            sum_ += J[:3].T @ wrench.force + J[3:].T @ (wrench.moment + np.cross(lever, wrench.force))
+        return sum_

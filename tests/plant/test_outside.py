@@ -1,0 +1,162 @@
+"""What pushes the arm from outside: wrenches on bodies, by virtual work, by weight and against pinocchio."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from tvist_plant.description import Payload
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_plant.imperfections import Imperfections, YieldingBase
+from tvist_plant.model import flexible_model
+from tvist_plant.outside import Outside
+from tvist_plant.plant import Breakable, Modal, Pushable
+
+from .arms import chain, hold, quiet
+
+FORCE, MOMENT, POINT = (30.0, -20.0, 50.0), (4.0, 7.0, -3.0), (0.02, -0.03, 0.05)
+
+
+@pytest.fixture
+def arm(ur5e):
+    return quiet(ur5e)
+
+
+def placed(flexible, q):
+    data = flexible.model.createData()
+    pin.forwardKinematics(flexible.model, data, q)
+    pin.updateFramePlacements(flexible.model, data)
+    return data
+
+
+def where(flexible, body):
+    """Joint that a body hangs on, and its placement there."""
+    if body == "flange":
+        frame = flexible.model.frames[flexible.flange]
+        return frame.parentJoint, frame.placement
+    return flexible.model.getJointId(body), pin.SE3.Identity()
+
+
+@pytest.mark.parametrize("joints", [1, 3, 7])
+def test_a_wrench_on_any_body_is_what_pinocchio_makes_of_it(joints):
+    """Its recursive algorithm takes forces in the frames of the joints, and has no Jacobian in it."""
+    description = chain(joints)
+    flexible = flexible_model(description, description.payload)
+    q = np.random.default_rng(joints).uniform(-1.0, 1.0, flexible.model.nv)
+    data = placed(flexible, q)
+    outside = Outside(flexible)
+    assert len(outside.bodies) == flexible.model.nv + 1
+    for body in outside.bodies:
+        outside.clear()
+        outside.push_body(body, FORCE, MOMENT, POINT)
+        joint, placement = where(flexible, body)
+        R = data.oMi[joint].rotation
+        lever = placement.act(np.array(POINT))
+        force = R.T @ FORCE
+        forces = [pin.Force.Zero() for _ in range(flexible.model.njoints)]
+        forces[joint] = pin.Force(force, R.T @ MOMENT + np.cross(lever, force))
+        still = np.zeros(flexible.model.nv)
+        free = pin.rnea(flexible.model, data, q, still, still).copy()
+        expected = free - pin.rnea(flexible.model, data, q, still, still, forces)
+        np.testing.assert_allclose(outside.generalized_force(q), expected, rtol=0.0, atol=1e-11)
+
+
+def test_the_power_of_a_force_is_force_times_speed_of_its_point(ur5e):
+    flexible = flexible_model(ur5e, ur5e.payload)
+    outside = Outside(flexible)
+    random = np.random.default_rng(2)
+    for body in outside.bodies:
+        q, qd = random.uniform(-1.0, 1.0, (2, flexible.model.nv))
+        outside.clear()
+        outside.push_body(body, FORCE, (0.0, 0.0, 0.0), POINT)
+        places = []
+        for share in (-1e-5, 1e-5):
+            data = placed(flexible, q + share * qd)
+            joint, placement = where(flexible, body)
+            places.append((data.oMi[joint] * placement).act(np.array(POINT)))
+        speed = (places[1] - places[0]) / 2e-5
+        assert outside.generalized_force(q) @ qd == pytest.approx(speed @ FORCE, rel=1e-7, abs=1e-7)
+
+
+def test_a_weight_hung_on_the_flange_bends_the_arm_as_a_payload_does(arm):
+    """In the end: a payload has inertia, too."""
+    loaded = FlexibleArm(arm, arm.payload)
+    command = hold(arm, arm.poses["Q1"])
+    expected = loaded.reset(command).q, loaded.truth()
+    bare = FlexibleArm(arm, Payload())
+    bare.reset(command)
+    weight = (0.0, 0.0, -9.81 * arm.payload.mass)
+    bare.push_body("flange", weight, point=arm.payload.com)
+    for _ in range(3000):
+        measured = bare.step(command)
+    truth = bare.truth()
+    np.testing.assert_allclose(measured.q, expected[0], rtol=0.0, atol=2e-5)
+    np.testing.assert_allclose(truth.link_deflection, expected[1].link_deflection, rtol=0.0, atol=1e-6)
+    assert np.abs(truth.link_deflection).max() > 1e-5
+
+
+def test_a_moment_about_a_joint_and_its_reaction_are_a_torque_on_the_joint(arm):
+    q = np.array(arm.poses["Q3"])
+    command = hold(arm, q)
+    pushed, twisted = FlexibleArm(arm, arm.payload), FlexibleArm(arm, arm.payload)
+    for one in (pushed, twisted):
+        one.reset(command)
+    axis = placed(pushed._flexible, pushed._q).oMi[2].rotation[:, 2]
+    pushed.push(np.array([0.0, 25.0, 0.0, 0.0, 0.0, 0.0]))
+    twisted.push_body("shoulder", moment=25.0 * axis)
+    twisted.push_body("base", moment=-25.0 * axis)
+    for _ in range(50):
+        a, b = pushed.step(command), twisted.step(command)
+    np.testing.assert_allclose(a.q, b.q, rtol=0.0, atol=1e-8)
+    assert np.abs(a.q - q).max() > 1e-4
+
+
+def test_a_push_ends_with_zeros_or_a_reset(arm):
+    one = FlexibleArm(arm, arm.payload)
+    command = hold(arm, arm.poses["Q1"])
+    rest = one.reset(command)
+    one.push_body("flange", FORCE)
+    one.push_body("elbow", FORCE)
+    one.step(command)
+    for body in ("flange", "elbow"):
+        one.push_body(body)
+    assert one._outside.generalized_force(one._q) is None
+    one.push_body("flange", FORCE)
+    one.push(np.ones(6))
+    np.testing.assert_array_equal(one.reset(command).moment, rest.moment)
+    assert one._outside.generalized_force(one._q) is None
+
+
+def test_the_ring_of_a_base_that_yields_is_a_body_too(arm):
+    one = FlexibleArm(arm, arm.payload, imperfections=Imperfections(base=YieldingBase()))
+    command = hold(arm, arm.poses["Q1"])
+    one.reset(command)
+    before = one.truth().link_deflection[1]
+    one.push_body("base_y", moment=(0.0, 150.0, 0.0))
+    for _ in range(1000):
+        one.step(command)
+    assert one.truth().link_deflection[1] - before == pytest.approx(150.0 / 1.5e5, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"body": "nose"}, "body is 'nose': must be one of base, shoulder, .*flange"),
+        ({"body": "flange", "force": (1.0, 2.0)}, "force is .1.0, 2.0.: must be three finite"),
+        ({"body": "flange", "moment": (0.0, np.nan, 0.0)}, "moment is"),
+        ({"body": "flange", "point": (0.0, np.inf, 0.0)}, "point is"),
+    ],
+)
+def test_a_wrench_without_sense_is_refused(ur5e, arguments, said):
+    with pytest.raises(ValueError, match=said):
+        FlexibleArm(ur5e, ur5e.payload).push_body(**arguments)
+
+
+@pytest.mark.parametrize("torque", [np.ones(5), np.array(1.0), np.array([1.0, np.nan, 0.0, 0.0, 0.0, 0.0])])
+def test_torques_without_sense_are_refused(ur5e, torque):
+    with pytest.raises(ValueError, match=r"torque is .*: must be 6 finite numbers"):
+        FlexibleArm(ur5e, ur5e.payload).push(torque)
+
+
+def test_the_flexible_arm_can_be_pushed_and_broken_and_knows_its_modes(ur5e):
+    for ability in (Pushable, Breakable, Modal):
+        assert isinstance(FlexibleArm(ur5e, ur5e.payload), ability)
