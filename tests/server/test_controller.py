@@ -485,7 +485,7 @@ def test_counters_go_on_from_stream_to_stream_and_fit_the_wire():
         robot.tick(5)
         robot.send(c.ServoStop)
         robot.until_rest()
-    late, lost, _ = robot.controller.motion.counters()
+    late, lost, _ = robot.controller.motion.streams.counters()
     assert late == 2
     assert 0 < lost <= 4000
     counts = dict.fromkeys(Telemetry.__struct_fields__, 0)

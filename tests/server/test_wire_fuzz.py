@@ -101,7 +101,7 @@ class Server:
             info,
             controller.tick_number,
             controller.motion.activity,
-            controller.motion.speed,
+            controller.motion.motions.speed,
             controller.cycle.reference.tolist(),
             None if lease is None else (lease.client, lease.token),
         )

@@ -184,12 +184,12 @@ class Controller:
             return
         self.counters.setpoints_received += 1
         self.session.renew(setpoint.token, self.now)
-        self.motion.offer(setpoint.sequence, np.array(setpoint.q, dtype=float), self.now)
+        self.motion.streams.offer(setpoint.sequence, np.array(setpoint.q, dtype=float), self.now)
 
     def refuse_setpoint(self, why: str) -> None:
         """Count and drop a set-point of the lease's holder; should the stream fall silent, its end names the reason."""
         self._count_refused()
-        self.motion.refuse_setpoint(why)
+        self.motion.streams.refuse(why)
 
     def _count_refused(self) -> None:
         self.counters.setpoints_received += 1
@@ -231,15 +231,19 @@ class Controller:
             robot_mode=self.motion.activity.robot_mode,
             safety_mode=self.motion.safety_mode,
             runtime=self.motion.runtime,
-            speed=self.motion.speed,
-            setpoint_sequence=self.motion.sequence,
+            speed=self.motion.motions.speed,
+            setpoint_sequence=self.motion.streams.sequence,
             missed_ticks=self.counters.missed_ticks,
         )
 
     def io(self) -> Io:
         """Inputs, outputs and registers as they are for the next tick."""
         return self.peripherals.io(
-            self.tick_number + 1, self.declared, self.motion.wanted_speed, self.programs, self.wrench()
+            self.tick_number + 1,
+            self.declared,
+            self.motion.motions.wanted_speed,
+            self.programs,
+            self.wrench(),
         )
 
     def wrench(self) -> list[float]:

@@ -53,7 +53,7 @@ class MotionCommands:
         self._safety.stay_paused()
 
     def _set_speed(self, call: Call[c.SetSpeed]) -> None:
-        self._motion.set_speed(call.command.fraction)
+        self._motion.motions.set_speed(call.command.fraction)
 
     def _power_on(self, call: Call[c.PowerOn]) -> None:
         self._motion.power_on(release_brakes=call.command.release_brakes)

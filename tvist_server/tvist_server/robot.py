@@ -128,7 +128,7 @@ class ServedRobot:
     def _telemetry(self, punctuality: Punctuality | None) -> Telemetry:
         controller, counters, reception = self.controller, self.controller.counters, self.reception
         gateways = self._gateways
-        late, lost, limited = controller.motion.counters()
+        late, lost, limited = controller.motion.streams.counters()
         refused = reception.setpoints_refused + sum(gateway.setpoints_refused for gateway in gateways)
         on_time = punctuality or Punctuality(0, 1.0, 0.0, 0.0, 0.0)
         return Telemetry(

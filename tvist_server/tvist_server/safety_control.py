@@ -54,7 +54,7 @@ class SafetyControl:
             return
         self._goes_on = motion.activity is Activity.MOVING
         motion.pause()
-        duration, way = motion.until_rest()
+        duration, way = motion.ahead.until_rest()
         self._emit("safety_stop", why=why, category=2, duration=duration, way=way)
 
     def stay_paused(self) -> None:

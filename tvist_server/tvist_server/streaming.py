@@ -17,6 +17,11 @@ class Streaming:
         self._refused: str | None = None
         self._late, self._lost, self._limited = 0, 0, 0
 
+    @property
+    def sequence(self) -> int | None:
+        """Newest set-point taken in; None without a stream, or before its first."""
+        return None if self.stream is None else self.stream.sequence
+
     def begin(self, stream: SetpointStream, now: float) -> None:
         """Follow a stream from a time on [s]."""
         self.stream, self._heard, self._refused = stream, now, None
