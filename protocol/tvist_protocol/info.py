@@ -119,3 +119,7 @@ class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=F
     """The stop that keeps the robot from moving now; null: there is none, or nothing has told why."""
     arm: str | None = None
     """Fingerprint of what makes the arm vibrate, as a calibration's `provenance` names it; null: not told."""
+    stepper: str | None = None
+    """Client that holds the clock and alone lets time pass; null: nobody, so that who has control may."""
+    commands: dict[str, list[str]] = {}
+    """Fields of each command that the server knows; empty: an older server, which does not say."""

@@ -3,6 +3,7 @@
 from importlib.metadata import version
 
 from tvist_plant.plant import PERIOD
+from tvist_protocol.channels import COMMANDS, tag
 from tvist_protocol.info import CalibrationInfo, Info, Limits
 from tvist_protocol.values import PROTOCOL_VERSION
 from tvist_server.calibrations import available, fits
@@ -16,6 +17,7 @@ VERSION = version("tvist")
 def info_of(controller: Controller) -> Info:
     """The robot, its limits and how it is set up now."""
     setup, limits, lease = controller.setup, controller.setup.description.limits, controller.session.lease
+    hold = controller.stepping.hold
     calibration = controller.filters.source.calibration
     own = (setup.calibration.name,) if setup.calibration is not None else ()
     tvist = controller.cycle.tvist
@@ -53,6 +55,8 @@ def info_of(controller: Controller) -> Info:
         calibrations=sorted({*available(), *own}),
         shapers=shapers(),
         control=None if lease is None else lease.client,
+        stepper=None if hold is None else hold.client,
+        commands={tag(kind): list(kind.__struct_fields__) for kind in COMMANDS},
         tick=controller.tick_number,
         stopping=list(stopping(setup.description)),
         robot_mode=controller.motion.activity.robot_mode,

@@ -35,6 +35,7 @@ from tvist_server.reporting import Reporter
 from tvist_server.safety_control import SafetyControl
 from tvist_server.session import NoControlError, Session
 from tvist_server.setup import Setup, body
+from tvist_server.stepping import Stepping, check_step
 from tvist_server.stop_reasons import StopReasons
 from tvist_server.trajectory import Limits
 from tvist_shaping.base import Filter
@@ -70,6 +71,7 @@ class Controller:
         self._events: list[Event] = []
         self._stop_reasons = StopReasons()
         self.session = Session(timeouts=setup.clock == "realtime")
+        self.stepping = Stepping()
         self._planner = Planner(setup)
         self._plan: Plan | None = None
         self._client_session: str | None = None
@@ -170,7 +172,8 @@ class Controller:
         self.counters.setpoints_refused += 1
 
     def client_gone(self, client: str, session: str) -> None:
-        """A client's session has ended; where it held control, motion ends with it."""
+        """A client's session has ended; where it held control, motion ends with it, and its hold of the clock ends."""
+        self.stepping.client_gone(client, session)
         if self.session.client_gone(client, session):
             self._lose_lease(f"client {client!r} is gone")
 
@@ -256,11 +259,7 @@ class Controller:
 
     def take_control(self, command: c.TakeControl) -> Reply:
         """Give a lease."""
-        if command.protocol != PROTOCOL_VERSION:
-            raise RefusalError(
-                "unsupported_version", "protocol",
-                f"protocol is {command.protocol}; this server speaks {PROTOCOL_VERSION}", PROTOCOL_VERSION,
-            )  # fmt: skip
+        _check_version(command.protocol)
         lease = self.session.take(command.client, command.lease_s, self.now, self._client_session)
         return Accepted(token=lease.token, lease_s=lease.seconds)
 
@@ -280,6 +279,17 @@ class Controller:
         self._authorize(command.token)
         self.session.release()
         self.motion.interrupt("control was released")
+        return Done()
+
+    def take_clock(self, command: c.TakeClock) -> Reply:
+        """Give the clock, where time does not pass by itself."""
+        _check_version(command.protocol)
+        self._check_steppable()
+        return Accepted(token=self.stepping.take(command.client, self._client_session).token)
+
+    def release_clock(self, command: c.ReleaseClock) -> Reply:
+        """Take it back."""
+        self.stepping.release(command.token)
         return Done()
 
     def move_j(self, command: c.MoveJ) -> Reply:
@@ -437,10 +447,10 @@ class Controller:
 
     def simulation_step(self, command: c.SimulationStep) -> Reply:
         """Check that a client may let time pass; the driver then does."""
-        self._authorize(command.token)
-        if self.setup.clock == "realtime":
-            why = "time passes by itself here: start with --clock lockstep to step"
-            raise RefusalError("wrong_mode", "type", why)
+        check_step(self.stepping.hold, self.session.lease, command)
+        if self.stepping.hold is None:
+            self._authorize(command.token)
+        self._check_steppable()
         if command.setpoints is not None and not self.motion.streaming:
             raise RefusalError("wrong_mode", "setpoints", "no stream is running: send servo_start first")
         setpoints = command.setpoints or ()
@@ -450,6 +460,11 @@ class Controller:
         for number, setpoint in enumerate(setpoints):
             check_joints(setpoint.q, self.setup.description, f"setpoints[{number}].q")
         return Done(tick=self.tick_number + command.ticks)
+
+    def _check_steppable(self) -> None:
+        if self.setup.clock == "realtime":
+            why = "time passes by itself here: start with --clock lockstep to step"
+            raise RefusalError("wrong_mode", "type", why)
 
     def simulation_inject(self, command: c.SimulationInject) -> Reply:
         """Cause a fault."""
@@ -472,8 +487,16 @@ class Controller:
         return found
 
 
+def _check_version(protocol: int) -> None:
+    if protocol != PROTOCOL_VERSION:
+        why = f"protocol is {protocol}; this server speaks {PROTOCOL_VERSION}"
+        raise RefusalError("unsupported_version", "protocol", why, PROTOCOL_VERSION)
+
+
 _HANDLERS: dict[type, Callable[[Controller, Any], Reply]] = {
     c.TakeControl: Controller.take_control,
+    c.TakeClock: Controller.take_clock,
+    c.ReleaseClock: Controller.release_clock,
     c.KeepAlive: Controller.keep_alive,
     c.ReleaseControl: Controller.release_control,
     c.MoveJ: Controller.move_j,

@@ -97,7 +97,12 @@ class ServedRobot:
         self.outlet.repeat(self.controller.latest, self.controller.io())
 
     def _carry_out(self, admitted: Admitted, reply: Reply) -> None:
-        self.driven.post(lambda: reply(self._host.carry_out(admitted)))
+        client = admitted.client
+
+        def attend() -> bool:
+            return self.driven.attend(client)
+
+        self.driven.post(lambda: reply(self._host.carry_out(admitted, attend=attend)), client)
 
     # ------------------------------------------------------------------ how it is doing, and its end
 
