@@ -15,6 +15,7 @@ from tvist_client import arm as asynchronous_arm
 from tvist_client import motion as asynchronous_motion
 from tvist_client import robot as asynchronous_robot
 from tvist_client import servo as asynchronous_servo
+from tvist_client import stepper as asynchronous_stepper
 from tvist_client import stream as asynchronous_stream
 from tvist_client.portal import Portal
 from tvist_client.robot import ANSWER_S, BUFFER, ENDPOINT, NAME
@@ -240,7 +241,7 @@ class Arm:
         )
 
     def step(self, ticks: int, setpoints: Sequence[StepSetpoint] | None = None) -> int:
-        """Let 1 to 1000 ticks pass at once, in lockstep and free."""
+        """Let 1 to 100000 ticks pass at once, in lockstep and free."""
         return self._portal.call(lambda: self._arm.step(ticks, setpoints))
 
     def inject(
@@ -261,6 +262,27 @@ class Arm:
     def keep_alive(self) -> None:
         """Renew the lease; `Robot.control` sees to it."""
         self._portal.call(self._arm.keep_alive)
+
+
+class Stepper:
+    """The clock of a simulated robot; see `tvist_client.stepper.Stepper`."""
+
+    def __init__(self, portal: Portal, stepper: asynchronous_stepper.Stepper) -> None:
+        self._portal = portal
+        self._stepper = stepper
+
+    @property
+    def token(self) -> str:
+        """Names the hold of the clock."""
+        return self._stepper.token
+
+    def step(self, ticks: int) -> int:
+        """Let 1 to 100000 ticks pass by one command."""
+        return self._portal.call(lambda: self._stepper.step(ticks))
+
+    def advance(self, ticks: int) -> int:
+        """Let any number of ticks pass."""
+        return self._portal.call(lambda: self._stepper.advance(ticks))
 
 
 class Robot:
@@ -360,6 +382,12 @@ class Robot:
         """Hold control for as long as the block lasts."""
         with self._portal.enter(self._robot.control(client, lease_s=lease_s)) as arm:
             yield Arm(self._portal, arm)
+
+    @contextlib.contextmanager
+    def clock_control(self, client: str) -> Iterator[Stepper]:
+        """Hold the clock for as long as the block lasts, in lockstep and free."""
+        with self._portal.enter(self._robot.clock_control(client)) as stepper:
+            yield Stepper(self._portal, stepper)
 
     def advance(self, ticks: int) -> int:
         """Let ticks pass: by steps in lockstep and free, by waiting in real time."""
