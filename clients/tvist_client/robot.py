@@ -1,14 +1,12 @@
 """A robot as a client sees it: what it is, what it tells, and control over it."""
 
-import asyncio
-import contextlib
-from collections.abc import AsyncIterator, Callable
+from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager
 from types import TracebackType
 from typing import Self, TypeVar
 
-from tvist_client.arm import Arm
-from tvist_client.errors import ClientError, MisuseError, NotConnectedError, UnexpectedReplyError
+from tvist_client.arm import Arm, hold_control
+from tvist_client.errors import MisuseError, NotConnectedError, UnexpectedReplyError
 from tvist_client.feed import Feed
 from tvist_client.motion import Motion, Motions
 from tvist_client.stepper import MAX_STEP, Stepper, hold_clock
@@ -16,7 +14,7 @@ from tvist_client.stream import Stream
 from tvist_client.transports.base import Transport
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.zenoh import ZenohTransport
-from tvist_client.values import number, whole
+from tvist_client.values import whole
 from tvist_protocol.codec import (
     decode_event,
     decode_info,
@@ -27,11 +25,10 @@ from tvist_protocol.codec import (
     decode_truth,
     encode,
 )
-from tvist_protocol.commands import Command, ReleaseControl, Stop, TakeControl
+from tvist_protocol.commands import Command, Stop
 from tvist_protocol.errors import ProtocolError, RefusedError
 from tvist_protocol.info import Clock, Info
 from tvist_protocol.io import Io
-from tvist_protocol.keys import check_client_name
 from tvist_protocol.modes import RuntimeState
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.stream import Event, State, Telemetry, Truth
@@ -53,13 +50,14 @@ class Robot:
 
     Attributes:
         motions: Motions by number, this client's and others'.
+        arm: What this client moves, while it has control.
         stepper: The clock, while this client holds it.
     """
 
     def __init__(self, transport: Transport) -> None:
         self._transport = transport
         self._clock: Clock | None = None
-        self._arm: Arm | None = None
+        self.arm: Arm | None = None
         self.stepper: Stepper | None = None
         self._states: Feed[State] = Feed(transport, "state", decode_state, once_a_tick=True)
         self._events: Feed[Event] = Feed(transport, "event", decode_event, once_a_tick=False)
@@ -219,8 +217,7 @@ class Robot:
         """Bring the arm to rest now; anyone may, without control."""
         await self.request(Stop())
 
-    @contextlib.asynccontextmanager
-    async def control(self, client: str, *, lease_s: float = 30.0) -> AsyncIterator[Arm]:
+    def control(self, client: str, *, lease_s: float = 30.0) -> AbstractAsyncContextManager[Arm]:
         """Hold control for as long as the block lasts.
 
         The client's presence is announced first, so that its going ends control at once; in real time the
@@ -234,31 +231,7 @@ class Robot:
             RefusedError: Another client holds control; its name is in the sentence.
             ProtocolError: `client` cannot be a client's name.
         """
-        check_client_name(client)
-        seconds = number(lease_s, "lease_s")
-        clock = await self.clock()
-        await self._transport.announce(client)
-        try:
-            accepted = await self.request(TakeControl(client=client, lease_s=seconds))
-            if not isinstance(accepted, Accepted) or accepted.token is None:
-                raise UnexpectedReplyError(f"take_control was answered by {accepted}, without a token")
-            arm = self._arm = Arm(self, accepted.token)
-            alive = None
-            if clock == "realtime":
-                alive = asyncio.create_task(arm.keep_alive_every((accepted.lease_s or seconds) / 3))
-            try:
-                yield arm
-            finally:
-                if alive is not None:
-                    alive.cancel()
-                    await asyncio.wait([alive])
-                if self._arm is arm:
-                    self._arm = None
-                # Control that is lost, or a robot that has gone, needs no release.
-                with contextlib.suppress(RefusedError, ClientError):
-                    await self.request(ReleaseControl(token=arm.token))
-        finally:
-            await self._transport.withdraw(client)
+        return hold_control(self, self._transport, client, lease_s)
 
     # ------------------------------------------------------------------ time
 
@@ -296,7 +269,7 @@ class Robot:
             while (tick := (await self._next_state()).tick) < last:
                 pass
             return tick
-        by = self.stepper or self._arm
+        by = self.stepper or self.arm
         if by is None:
             raise MisuseError(
                 "time passes here for who has `robot.clock_control(…)`, or else `robot.control(…)`"

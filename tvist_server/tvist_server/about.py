@@ -12,6 +12,8 @@ from tvist_server.controller import Controller
 from tvist_server.stopping import stopping
 
 VERSION = version("tvist")
+FIELDS = {tag(kind): list(kind.__struct_fields__) for kind in COMMANDS}
+"""Of each command."""
 
 
 def info_of(controller: Controller) -> Info:
@@ -56,7 +58,7 @@ def info_of(controller: Controller) -> Info:
         shapers=shapers(),
         control=None if lease is None else lease.client,
         stepper=None if hold is None else hold.client,
-        commands={tag(kind): list(kind.__struct_fields__) for kind in COMMANDS},
+        commands=FIELDS,
         tick=controller.tick_number,
         stopping=list(stopping(setup.description)),
         robot_mode=controller.motion.activity.robot_mode,
