@@ -293,3 +293,32 @@ def test_the_going_of_the_stepping_client_ends_its_step_and_another_one_s_takes_
         assert served.end() == 0
     journal = replayed(tmp_path / "run.mcap").journal
     assert next(entry.client for entry in journal if entry.kind == "client_gone") == "stepper"
+
+
+def test_unmodified_clients_of_ur_rtde_live_by_the_steps_of_another_client(tmp_path):
+    pytest.importorskip("rtde_receive")
+    from tests.system.test_ur_clients import Client, until
+
+    path = tmp_path / "run.mcap"
+    with lockstep(6, path) as (served, host), Wire(served.endpoint) as stepper:
+        clock = take_clock(stepper)
+        stepper.step(clock, 1)
+        begin_step(stepper, clock, 100_000)
+        with (
+            Client("rtde_receive", "RTDEReceiveInterface", host) as receive,
+            Client("rtde_io", "RTDEIOInterface", host) as setter,
+            Client("dashboard_client", "DashboardClient", host) as door,
+        ):
+            door.connect()
+            door.loadURP(PAPER)
+            door.play()
+            assert door.running()
+            door.stop()
+            until(door.programState, f"STOPPED {PAPER}")
+            assert setter.setStandardDigitalOut(1, True)
+            until(lambda: receive.getDigitalOutState(1), wanted=True)
+            assert receive.isConnected()
+            assert served.end() == 0
+    told = [entry.message["type"] for entry in replayed(path).journal if entry.kind == "command"]
+    assert {"move_j", "stop", "set_io"} <= set(told)
+    assert told.count("simulation.step") == 2

@@ -173,6 +173,8 @@ class UrDoors(Gateway):
         for connection in tuple(self._connections):
             connection.close()
         await asyncio.sleep(0)  # in which they end
+        self._loop = None
+        self._room.set()  # whoever hands over a state waits for nobody any more
         self._scripts.flush()
         self._coming_and_going.flush()
 
