@@ -16,6 +16,7 @@ from tvist_client.motion import Motion
 from tvist_client.payload import make_payload
 from tvist_client.robot import Robot
 from tvist_client.servo import Servo
+from tvist_client.stepper import Stepper
 from tvist_client.stream import Stream
 from tvist_client.transports import LoopbackHost, LoopbackTransport, Transport, ZenohTransport
 from tvist_protocol.errors import ProtocolError, RefusedError, TvistError
@@ -43,6 +44,7 @@ __all__ = [
     "Robot",
     "Servo",
     "State",
+    "Stepper",
     "Stream",
     "StreamStoppedError",
     "Telemetry",

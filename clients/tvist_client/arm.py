@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import AsyncIterator, Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tvist_client.errors import (
     AnswerTimeoutError,
@@ -17,6 +17,7 @@ from tvist_client.payload import make_payload
 from tvist_client.servo import Servo
 from tvist_client.simulation import Simulation
 from tvist_client.terminals import Terminals
+from tvist_client.transports.base import Transport
 from tvist_client.values import JointRange, floats, number, whole
 from tvist_protocol.commands import (
     HandOver,
@@ -25,6 +26,7 @@ from tvist_protocol.commands import (
     Pause,
     PowerOff,
     PowerOn,
+    ReleaseControl,
     RestartSafety,
     Resume,
     ServoStart,
@@ -34,13 +36,18 @@ from tvist_protocol.commands import (
     SetShaper,
     SetSpeed,
     Stop,
+    TakeControl,
     UnlockProtectiveStop,
 )
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.io import SetTcp
+from tvist_protocol.keys import check_client_name
 from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramStop
 from tvist_protocol.replies import Accepted
 from tvist_protocol.stream import Event
+
+if TYPE_CHECKING:
+    from tvist_client.robot import Robot
 
 log = logging.getLogger(__name__)
 
@@ -298,6 +305,45 @@ class Arm(Terminals, Simulation):
             except (RefusedError, ClientError) as error:
                 log.warning("control is lost: %s", error)
                 return
+
+
+@contextlib.asynccontextmanager
+async def hold_control(
+    robot: "Robot", transport: Transport, client: str, lease_s: float
+) -> AsyncIterator[Arm]:
+    """Hold control for as long as the block lasts; see `Robot.control`.
+
+    Args:
+        robot: Which one.
+        transport: The robot's; the client is announced there first.
+        client: Who asks.
+        lease_s: How long control lasts without a sign of life [s].
+    """
+    check_client_name(client)
+    seconds = number(lease_s, "lease_s")
+    clock = await robot.clock()
+    await transport.announce(client)
+    try:
+        accepted = await robot.request(TakeControl(client=client, lease_s=seconds))
+        if not isinstance(accepted, Accepted) or accepted.token is None:
+            raise UnexpectedReplyError(f"take_control was answered by {accepted}, without a token")
+        arm = robot.arm = Arm(robot, accepted.token)
+        alive = None
+        if clock == "realtime":
+            alive = asyncio.create_task(arm.keep_alive_every((accepted.lease_s or seconds) / 3))
+        try:
+            yield arm
+        finally:
+            if alive is not None:
+                alive.cancel()
+                await asyncio.wait([alive])
+            if robot.arm is arm:
+                robot.arm = None
+            # Control that is lost, or a robot that has gone, needs no release.
+            with contextlib.suppress(RefusedError, ClientError):
+                await robot.request(ReleaseControl(token=arm.token))
+    finally:
+        await transport.withdraw(client)
 
 
 def _modes(values: float | Iterable[float] | None, where: str) -> tuple[float, ...] | None:

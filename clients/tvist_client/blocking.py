@@ -7,25 +7,24 @@ A call waits for its answer; Ctrl-C ends the wait. Callbacks run in the loop's t
 """
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from types import TracebackType
-from typing import Any, Generic, Self, TypeVar
+from typing import Generic, Self, TypeVar
 
-from tvist_client import arm as asynchronous_arm
-from tvist_client import motion as asynchronous_motion
 from tvist_client import robot as asynchronous_robot
-from tvist_client import servo as asynchronous_servo
 from tvist_client import stream as asynchronous_stream
+from tvist_client.blocking_arm import Arm, Motion, Servo, Stepper
 from tvist_client.portal import Portal
 from tvist_client.robot import ANSWER_S, BUFFER, ENDPOINT, NAME
 from tvist_client.transports.base import Transport
 from tvist_client.transports.certificates import Folder
-from tvist_protocol.commands import Command, StepSetpoint
+from tvist_protocol.commands import Command
 from tvist_protocol.info import Clock, Info
-from tvist_protocol.io import Bank, Io
+from tvist_protocol.io import Io
 from tvist_protocol.replies import Accepted, Done
 from tvist_protocol.stream import Event, State, Telemetry, Truth
-from tvist_protocol.values import Payload, ResetMode
+
+__all__ = ["Arm", "Motion", "Robot", "Servo", "Stepper", "Stream"]
 
 M = TypeVar("M")
 
@@ -47,236 +46,6 @@ class Stream(Iterator[M], Generic[M]):
             return self._portal.call(self._stream.__anext__)
         except StopAsyncIteration:
             raise StopIteration from None
-
-
-class Motion:
-    """One motion; see `tvist_client.motion.Motion`."""
-
-    def __init__(self, portal: Portal, motion: asynchronous_motion.Motion) -> None:
-        self._portal = portal
-        self._motion = motion
-
-    @property
-    def id(self) -> int:
-        """The robot's number for it."""
-        return self._motion.id
-
-    @property
-    def started(self) -> int | None:
-        """Tick at which it began; None before."""
-        return self._motion.started
-
-    @property
-    def done(self) -> int | None:
-        """Tick at which it came to rest at the target; None before, and where it never did."""
-        return self._motion.done
-
-    @property
-    def stopped(self) -> Event | None:
-        """The event that says that it ended before its target; None where it did not."""
-        return self._motion.stopped
-
-    @property
-    def ended(self) -> bool:
-        """Whether the motion moves no more."""
-        return self._motion.ended
-
-    def wait(self) -> Self:
-        """Wait for the end; raises MotionStoppedError where it came before the target."""
-        self._portal.call(self._motion.wait)
-        return self
-
-
-class Servo:
-    """A stream of set-points; see `tvist_client.servo.Servo`."""
-
-    def __init__(self, portal: Portal, servo: asynchronous_servo.Servo) -> None:
-        self._portal = portal
-        self._servo = servo
-
-    @property
-    def period(self) -> float:
-        """Time between two set-points [s]."""
-        return self._servo.period
-
-    @property
-    def sequence(self) -> int:
-        """Number of the next set-point."""
-        return self._servo.sequence
-
-    def set(self, q: Iterable[float]) -> int:
-        """Send the next set-point: call it once a period."""
-        return self._portal.run(lambda: self._servo.set(q))
-
-    def step_through(self, qs: Iterable[Iterable[float]]) -> int:
-        """Play set-points in lockstep and free, each for one period."""
-        return self._portal.call(lambda: self._servo.step_through(qs))
-
-
-class Arm:
-    """An arm under control; see `tvist_client.arm.Arm` for what the arguments mean."""
-
-    def __init__(self, portal: Portal, arm: asynchronous_arm.Arm) -> None:
-        self._portal = portal
-        self._arm = arm
-
-    @property
-    def token(self) -> str:
-        """Names the lease."""
-        return self._arm.token
-
-    def move_j(
-        self,
-        q: Iterable[float],
-        *,
-        velocity: float = 1.5,
-        acceleration: float = 2.0,
-        jerk: float = 100.0,
-        wait: bool = True,
-    ) -> Motion:
-        """Move to a joint configuration [rad]."""
-        motion = self._portal.call(
-            lambda: self._arm.move_j(q, velocity=velocity, acceleration=acceleration, jerk=jerk, wait=wait)
-        )
-        return Motion(self._portal, motion)
-
-    @contextlib.contextmanager
-    def servo(
-        self,
-        *,
-        period: float = 0.002,
-        velocity: float = 1.5,
-        acceleration: float = 2.0,
-        jerk: float = 100.0,
-    ) -> Iterator[Servo]:
-        """Stream set-points for as long as the block lasts; then come to rest."""
-        stream = self._arm.servo(period=period, velocity=velocity, acceleration=acceleration, jerk=jerk)
-        with self._portal.enter(stream) as servo:
-            yield Servo(self._portal, servo)
-
-    def stop(self, deceleration: float | None = None) -> None:
-        """Come to rest now, past the shaper."""
-        self._portal.call(lambda: self._arm.stop(deceleration))
-
-    def pause(self) -> None:
-        """Bring the running motion to a standstill on its way."""
-        self._portal.call(self._arm.pause)
-
-    def resume(self) -> None:
-        """Go on with a paused motion."""
-        self._portal.call(self._arm.resume)
-
-    def set_speed(self, fraction: float) -> None:
-        """Scale the speed of motions, as the slider of a teach pendant does."""
-        self._portal.call(lambda: self._arm.set_speed(fraction))
-
-    def power_on(self, *, release_brakes: bool = True) -> None:
-        """Power the arm and release its brakes."""
-        self._portal.call(lambda: self._arm.power_on(release_brakes=release_brakes))
-
-    def power_off(self) -> None:
-        """Stop what moves, then take the arm's power."""
-        self._portal.call(self._arm.power_off)
-
-    def unlock_protective_stop(self) -> None:
-        """Leave a protective stop, once the arm rests; in real time, look whether it holds."""
-        self._portal.call(self._arm.unlock_protective_stop)
-
-    def restart_safety(self) -> None:
-        """Restart the safety system after a violation or a fault; the arm is without power then."""
-        self._portal.call(self._arm.restart_safety)
-
-    def set_tcp(self, offset: Iterable[float]) -> None:
-        """Say where the tool centre point is."""
-        self._portal.call(lambda: self._arm.set_tcp(offset))
-
-    def set_digital_output(self, number: int, on: bool) -> None:
-        """Switch a digital output."""
-        self._portal.call(lambda: self._arm.set_digital_output(number, on))
-
-    def set_analog_output(self, number: int, share: float, *, voltage: bool = False) -> None:
-        """Set an analogue output."""
-        self._portal.call(lambda: self._arm.set_analog_output(number, share, voltage=voltage))
-
-    def set_registers(self, bank: Bank, values: Iterable[float], first: int = 0) -> None:
-        """Write registers that stand in a row."""
-        self._portal.call(lambda: self._arm.set_registers(bank, values, first))
-
-    def set_digital_input(self, number: int, on: bool) -> None:
-        """Switch a digital input, as what is wired to it would."""
-        self._portal.call(lambda: self._arm.set_digital_input(number, on))
-
-    def load_program(self, name: str) -> None:
-        """Load a program; the one that runs is stopped."""
-        self._portal.call(lambda: self._arm.load_program(name))
-
-    def play_program(self) -> None:
-        """Start the loaded program, or go on with a paused one."""
-        self._portal.call(self._arm.play_program)
-
-    def pause_program(self) -> None:
-        """Hold the program and its motion."""
-        self._portal.call(self._arm.pause_program)
-
-    def stop_program(self) -> None:
-        """Stop the program, and the arm with it."""
-        self._portal.call(self._arm.stop_program)
-
-    def set_shaper(self, name: str, modes: int = 1) -> None:
-        """Choose the input shaper."""
-        self._portal.call(lambda: self._arm.set_shaper(name, modes))
-
-    def set_estimator(
-        self,
-        name: str,
-        *,
-        f_d: float | Iterable[float] | None = None,
-        zeta: float | Iterable[float] | None = None,
-        calibration: str | Mapping[str, Any] | None = None,
-    ) -> None:
-        """Choose where the shaper's frequency and damping come from."""
-        self._portal.call(lambda: self._arm.set_estimator(name, f_d=f_d, zeta=zeta, calibration=calibration))
-
-    def set_payload(self, mass: float, com: Iterable[float], inertia: Iterable[float]) -> None:
-        """Declare what hangs on the flange."""
-        self._portal.call(lambda: self._arm.set_payload(mass, com, inertia))
-
-    def reset(
-        self,
-        q: Iterable[float] | None = None,
-        *,
-        seed: int | None = None,
-        payload: Payload | None = None,
-        mode: ResetMode | None = None,
-        shaper: str | None = None,
-    ) -> int | None:
-        """Put the simulated arm somewhere at rest."""
-        return self._portal.call(
-            lambda: self._arm.reset(q, seed=seed, payload=payload, mode=mode, shaper=shaper)
-        )
-
-    def step(self, ticks: int, setpoints: Sequence[StepSetpoint] | None = None) -> int:
-        """Let 1 to 1000 ticks pass at once, in lockstep and free."""
-        return self._portal.call(lambda: self._arm.step(ticks, setpoints))
-
-    def inject(
-        self,
-        fault: str,
-        *,
-        joint: int | None = None,
-        seconds: float | None = None,
-        value: float | None = None,
-    ) -> None:
-        """Cause a fault on purpose."""
-        self._portal.call(lambda: self._arm.inject(fault, joint=joint, seconds=seconds, value=value))
-
-    def hand_over(self, client: str) -> None:
-        """Give control to another client."""
-        self._portal.call(lambda: self._arm.hand_over(client))
-
-    def keep_alive(self) -> None:
-        """Renew the lease; `Robot.control` sees to it."""
-        self._portal.call(self._arm.keep_alive)
 
 
 class Robot:
@@ -376,6 +145,12 @@ class Robot:
         """Hold control for as long as the block lasts."""
         with self._portal.enter(self._robot.control(client, lease_s=lease_s)) as arm:
             yield Arm(self._portal, arm)
+
+    @contextlib.contextmanager
+    def clock_control(self, client: str) -> Iterator[Stepper]:
+        """Hold the clock for as long as the block lasts, in lockstep and free."""
+        with self._portal.enter(self._robot.clock_control(client)) as stepper:
+            yield Stepper(self._portal, stepper)
 
     def advance(self, ticks: int) -> int:
         """Let ticks pass: by steps in lockstep and free, by waiting in real time."""

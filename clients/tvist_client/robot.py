@@ -1,21 +1,20 @@
 """A robot as a client sees it: what it is, what it tells, and control over it."""
 
-import asyncio
-import contextlib
-from collections.abc import AsyncIterator, Callable
+from collections.abc import Callable
+from contextlib import AbstractAsyncContextManager
 from types import TracebackType
 from typing import Self, TypeVar
 
-from tvist_client.arm import Arm
-from tvist_client.errors import ClientError, MisuseError, NotConnectedError, UnexpectedReplyError
+from tvist_client.arm import Arm, hold_control
+from tvist_client.errors import MisuseError, NotConnectedError, UnexpectedReplyError
 from tvist_client.feed import Feed
 from tvist_client.motion import Motion, Motions
-from tvist_client.simulation import MAX_STEP
+from tvist_client.stepper import MAX_STEP, Stepper, hold_clock
 from tvist_client.stream import Stream
 from tvist_client.transports.base import Transport
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.zenoh import ZenohTransport
-from tvist_client.values import number, whole
+from tvist_client.values import whole
 from tvist_protocol.codec import (
     decode_event,
     decode_info,
@@ -26,11 +25,10 @@ from tvist_protocol.codec import (
     decode_truth,
     encode,
 )
-from tvist_protocol.commands import Command, ReleaseControl, Stop, TakeControl
+from tvist_protocol.commands import Command, Stop
 from tvist_protocol.errors import ProtocolError, RefusedError
 from tvist_protocol.info import Clock, Info
 from tvist_protocol.io import Io
-from tvist_protocol.keys import check_client_name
 from tvist_protocol.modes import RuntimeState
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.stream import Event, State, Telemetry, Truth
@@ -52,12 +50,15 @@ class Robot:
 
     Attributes:
         motions: Motions by number, this client's and others'.
+        arm: What this client moves, while it has control.
+        stepper: The clock, while this client holds it.
     """
 
     def __init__(self, transport: Transport) -> None:
         self._transport = transport
         self._clock: Clock | None = None
-        self._arm: Arm | None = None
+        self.arm: Arm | None = None
+        self.stepper: Stepper | None = None
         self._states: Feed[State] = Feed(transport, "state", decode_state, once_a_tick=True)
         self._events: Feed[Event] = Feed(transport, "event", decode_event, once_a_tick=False)
         self._truths: Feed[Truth] = Feed(transport, "truth", decode_truth, once_a_tick=True)
@@ -216,8 +217,7 @@ class Robot:
         """Bring the arm to rest now; anyone may, without control."""
         await self.request(Stop())
 
-    @contextlib.asynccontextmanager
-    async def control(self, client: str, *, lease_s: float = 30.0) -> AsyncIterator[Arm]:
+    def control(self, client: str, *, lease_s: float = 30.0) -> AbstractAsyncContextManager[Arm]:
         """Hold control for as long as the block lasts.
 
         The client's presence is announced first, so that its going ends control at once; in real time the
@@ -231,33 +231,23 @@ class Robot:
             RefusedError: Another client holds control; its name is in the sentence.
             ProtocolError: `client` cannot be a client's name.
         """
-        check_client_name(client)
-        seconds = number(lease_s, "lease_s")
-        clock = await self.clock()
-        await self._transport.announce(client)
-        try:
-            accepted = await self.request(TakeControl(client=client, lease_s=seconds))
-            if not isinstance(accepted, Accepted) or accepted.token is None:
-                raise UnexpectedReplyError(f"take_control was answered by {accepted}, without a token")
-            arm = self._arm = Arm(self, accepted.token)
-            alive = None
-            if clock == "realtime":
-                alive = asyncio.create_task(arm.keep_alive_every((accepted.lease_s or seconds) / 3))
-            try:
-                yield arm
-            finally:
-                if alive is not None:
-                    alive.cancel()
-                    await asyncio.wait([alive])
-                if self._arm is arm:
-                    self._arm = None
-                # Control that is lost, or a robot that has gone, needs no release.
-                with contextlib.suppress(RefusedError, ClientError):
-                    await self.request(ReleaseControl(token=arm.token))
-        finally:
-            await self._transport.withdraw(client)
+        return hold_control(self, self._transport, client, lease_s)
 
     # ------------------------------------------------------------------ time
+
+    def clock_control(self, client: str) -> AbstractAsyncContextManager[Stepper]:
+        """Hold the clock for as long as the block lasts: time passes by this client's steps alone.
+
+        In lockstep and free. It is another right than control, which another client may have meanwhile.
+
+        Args:
+            client: Who asks: shown to others; its going gives the clock back at once.
+
+        Raises:
+            RefusedError: Another client holds the clock, whose name is in the sentence; or time passes by itself.
+            ProtocolError: `client` cannot be a client's name.
+        """
+        return hold_clock(self, self._transport, client)
 
     async def advance(self, ticks: int) -> int:
         """Let ticks pass: by steps in lockstep and free, by waiting in real time.
@@ -270,7 +260,8 @@ class Robot:
 
         Raises:
             ArgumentError: `ticks` is less than 1, or no whole number.
-            MisuseError: Not in real time, and this client does not hold control.
+            MisuseError: Not in real time, and this client has neither the clock nor control.
+            RefusedError: Another client holds the clock; its name is in the sentence.
         """
         ticks = whole(ticks, "ticks", 1)
         if await self.clock() == "realtime":
@@ -278,11 +269,14 @@ class Robot:
             while (tick := (await self._next_state()).tick) < last:
                 pass
             return tick
-        if self._arm is None:
-            raise MisuseError("time passes here for who holds control: `async with robot.control(…)` first")
+        by = self.stepper or self.arm
+        if by is None:
+            raise MisuseError(
+                "time passes here for who has `robot.clock_control(…)`, or else `robot.control(…)`"
+            )
         tick = 0
         for first in range(0, ticks, MAX_STEP):
-            tick = await self._arm.step(min(MAX_STEP, ticks - first))
+            tick = await by.step(min(MAX_STEP, ticks - first))
         return tick
 
     async def until(self, tick: int) -> State:
@@ -294,24 +288,32 @@ class Robot:
         return await self._states.next(lambda state: state.tick >= tick, STATE_S)
 
     async def rest(self) -> State:
-        """Let time pass until the shaped reference rests; the arm may still ring.
+        """Let time pass until the shaped reference rests, or wait where another client steps; the arm may still ring.
 
         Returns:
             The first state seen that says so.
         """
         while True:
-            if await self.clock() == "realtime":
-                state = await self._next_state()
-            else:
-                state = await self.until(await self.advance(CHUNK))
+            tick = await self._let_pass(CHUNK)
+            state = await (self._next_state() if tick is None else self.until(tick))
             if state.runtime_state == RuntimeState.STOPPED:
                 return state
 
     async def _until_ended(self, motion: Motion) -> None:
-        if await self.clock() == "realtime":
-            await motion.wait_event()
         while not motion.ended:
-            await self.advance(CHUNK)
+            if await self._let_pass(CHUNK) is None:
+                await motion.wait_event()
+
+    async def _let_pass(self, ticks: int) -> int | None:
+        """Let ticks pass; None where that is not up to this client: in real time, or another one holds the clock."""
+        if await self.clock() == "realtime":
+            return None
+        try:
+            return await self.advance(ticks)
+        except RefusedError:
+            if self.stepper is not None or (await self.info()).stepper is None:
+                raise
+            return None
 
     async def _next_state(self) -> State:
         return await self._states.next(lambda _: True, STATE_S)

@@ -5,7 +5,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from tvist_client.errors import MisuseError, StreamStoppedError
-from tvist_client.simulation import MAX_STEP
+from tvist_client.stepper import MAX_STEP
 from tvist_client.values import JointRange
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Setpoint, StepSetpoint

@@ -2,17 +2,12 @@
 
 from collections.abc import Iterable, Sequence
 
-from tvist_client.errors import UnexpectedReplyError
 from tvist_client.leased import Leased
+from tvist_client.stepper import step
 from tvist_client.values import floats, number, whole
-from tvist_protocol.commands import SimulationInject, SimulationReset, SimulationStep, StepSetpoint
+from tvist_protocol.commands import SimulationInject, SimulationReset, StepSetpoint
 from tvist_protocol.replies import Done
 from tvist_protocol.values import Payload, ResetMode
-
-MAX_STEP = 1000
-"""Ticks a `simulation.step` may have, and set-points."""
-STEP_S = 60.0
-"""How long a `simulation.step` may take [s]: a server may compute more slowly than time passes."""
 
 
 class Simulation(Leased):
@@ -52,23 +47,23 @@ class Simulation(Leased):
         return reply.tick if isinstance(reply, Done) else None
 
     async def step(self, ticks: int, setpoints: Sequence[StepSetpoint] | None = None) -> int:
-        """Let 1 to 1000 ticks pass at once, in lockstep and free; `Robot.advance` takes any number.
+        """Let 1 to 100000 ticks pass at once, in lockstep and free; `Robot.advance` takes any number.
+
+        Where this client holds the clock, too (`Robot.clock_control`), it steps by that right.
 
         Args:
             ticks: How many control periods.
-            setpoints: Set-points of a running stream, one a tick in order; `Servo.step_through` numbers them.
+            setpoints: Set-points of a running stream, at most 1000, one a tick in order; `Servo.step_through`
+                numbers them.
 
         Returns:
-            The last of the ticks; its state has arrived.
+            The last tick that passed; its state has arrived.
         """
-        self.robot.watch()
-        played = None if setpoints is None else tuple(setpoints)
-        step = SimulationStep(token=self.token, ticks=whole(ticks, "ticks", 1, MAX_STEP), setpoints=played)
-        reply = await self.robot.request(step, STEP_S)
-        if not isinstance(reply, Done) or reply.tick is None:
-            raise UnexpectedReplyError(f"simulation.step was answered by {reply}, without a tick")
-        await self.robot.until(reply.tick)
-        return reply.tick
+        stepper = self.robot.stepper
+        if stepper is None:
+            return await step(self.robot, self.token, ticks, setpoints)
+        motion_token = None if setpoints is None else self.token
+        return await step(self.robot, stepper.token, ticks, setpoints, motion_token)
 
     async def inject(
         self,

@@ -76,6 +76,22 @@ class HandOver(ClientMessage, frozen=True, kw_only=True, tag="hand_over"):
     """Who shall have control."""
 
 
+class TakeClock(ClientMessage, frozen=True, kw_only=True, tag="take_clock"):
+    """Take the clock, where time does not pass by itself; answered by `accepted` with the `token` of its steps."""
+
+    client: ClientName
+    """Who asks: shown to the others while it holds the clock."""
+    protocol: Version = PROTOCOL_VERSION
+    """Version of the protocol the client speaks."""
+
+
+class ReleaseClock(ClientMessage, frozen=True, kw_only=True, tag="release_clock"):
+    """Give the clock back; who has control may let time pass again."""
+
+    token: Token
+    """Names the hold of the clock."""
+
+
 class MoveJ(ClientMessage, frozen=True, kw_only=True, tag="move_j"):
     """Move to a joint configuration, all joints in phase; answered by `accepted` with `id`, then events."""
 
@@ -250,15 +266,17 @@ class StepSetpoint(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """Where to be, one angle a joint [rad]."""
 
 
-class SimulationStep(ClientMessage, frozen=True, kw_only=True, tag="simulation.step"):
-    """Let time pass in a simulation that does not tick by itself."""
+class SimulationStep(ClientMessage, frozen=True, kw_only=True, tag="simulation.step", omit_defaults=True):
+    """Let time pass in a simulation that does not tick by itself; `done` has the last `tick` that passed."""
 
     token: Token
-    """Names the lease."""
+    """Names the hold of the clock; where nobody holds it, the lease."""
     ticks: Ticks
     """How many control periods of 0.002 s."""
     setpoints: Annotated[tuple[StepSetpoint, ...], Meta(max_length=1000)] | None = None
     """Set-points, one a tick in order."""
+    motion_token: Token | None = None
+    """Names the lease; `setpoints` need it where `token` names the hold of the clock."""
 
 
 class SimulationInject(ClientMessage, frozen=True, kw_only=True, tag="simulation.inject"):
@@ -281,6 +299,8 @@ Command = (
     | KeepAlive
     | ReleaseControl
     | HandOver
+    | TakeClock
+    | ReleaseClock
     | MoveJ
     | ServoStart
     | ServoStop

@@ -121,3 +121,7 @@ class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=F
     """Fingerprint of what makes the arm vibrate, as a calibration's `provenance` names it; null: not told."""
     programs: list[str] = []
     """Programs that can be loaded."""
+    stepper: str | None = None
+    """Client that holds the clock and alone lets time pass; null: nobody, so that who has control may."""
+    commands: dict[str, list[str]] = {}
+    """Fields of each command that the server knows; empty: an older server, which does not say."""

@@ -22,12 +22,12 @@ class Entry(Struct, frozen=True, kw_only=True, tag_field="type", tag="journal"):
     """Number of the first control period computed after it."""
     kind: EntryKind
     """What it was: a message, a set-point of the lease's holder that could not be read, the end of the session that had
-    control, or ticks that began too late. Recordings made before sessions were told apart have every liveliness token
-    that came or went."""
+    control or the clock, or ticks that began too late. Recordings made before sessions were told apart have every
+    liveliness token that came or went."""
     client: str | None = None
     """Client it came from or is about, where that is known."""
     session: str | None = None
-    """Session of who got control, or has gone; empty where the client's liveliness token does not say."""
+    """Session of who got control or the clock, or has gone; empty where the client's liveliness token does not say."""
     message: Annotated[dict[str, Any], Meta(extra_json_schema={"properties": {}})] | None = None
     """The message as it was decoded, for a command or a set-point."""
     count: int | None = None

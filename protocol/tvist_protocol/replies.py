@@ -35,8 +35,8 @@ CODE_MEANINGS: dict[Code, str] = {
     "unknown_field": "a field this message does not have",
     "missing_field": "a field this message must have is absent",
     "out_of_range": "a number, a length, a name or a choice outside its bounds; NaN and infinity always are",
-    "no_control": "nobody has control, or another client: the holder is in `why`",
-    "stale_token": "the token is not the one of the present lease",
+    "no_control": "nobody has control or the clock, or another client: the holder is in `why`",
+    "stale_token": "the token is not the one of the present lease, or of the clock's present holder",
     "busy": "the arm is moving: not now",
     "wrong_mode": "the robot's or the safety system's mode does not allow it",
     "limit_position": "outside a joint's range",
@@ -62,9 +62,9 @@ class Accepted(
     id: int | None = None
     """Names the motion; events that concern it carry the same number."""
     token: str | None = None
-    """Names the lease just taken; goes with every command."""
+    """Names the lease or the hold of the clock just taken; goes with every command that needs it."""
     lease_s: float | None = None
-    """Length of the lease as granted [s]."""
+    """Length of the lease as granted [s]; absent for the clock, of which nothing runs out."""
 
 
 class Done(Struct, frozen=True, kw_only=True, tag_field="type", tag="done", omit_defaults=True, gc=False):

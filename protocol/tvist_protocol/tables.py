@@ -15,7 +15,7 @@ from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import CODE_MEANINGS
 from tvist_protocol.schema import components, field_docs
 from tvist_protocol.stream import EVENT_MEANINGS, Event, State, Telemetry, Truth
-from tvist_protocol.transitions import HAPPENINGS, Activity, Control, diagram
+from tvist_protocol.transitions import HAPPENINGS, Activity, Control, Stepping, diagram
 from tvist_protocol.values import PATTERN_MEANINGS, Payload
 
 Schema = Mapping[str, Any]
@@ -46,6 +46,7 @@ def tables() -> dict[str, str]:
         ),
         "transitions": diagram(Activity),
         "control": diagram(Control),
+        "stepping": diagram(Stepping),
         "happenings": _table(
             ("trigger", "meaning"), ((f"`{name}`", text) for name, text in HAPPENINGS.items())
         ),

@@ -75,6 +75,15 @@ class Control(StrEnum):
     """The client that holds the lease."""
 
 
+class Stepping(StrEnum):
+    """Who may let time pass, where it does not pass by itself."""
+
+    FREE = "FREE"
+    """Who has control."""
+    HELD = "HELD"
+    """The client that holds the clock, and nobody else."""
+
+
 HAPPENINGS: dict[str, str] = {
     "power": "`power_on` with `release_brakes` false",
     "at_rest": "the shaped reference has come to rest",
@@ -84,6 +93,7 @@ HAPPENINGS: dict[str, str] = {
     "the fault was injected",
     "plant_failure": "the simulated arm's state was no longer finite: it was put at rest where its reference was",
     "lease_end": "nobody renewed the lease, or its client's liveliness token went",
+    "clock_end": "the liveliness token of the client that held the clock went",
 }
 
 _A = Activity
@@ -120,6 +130,9 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition("hand_over", (Control.HELD,), Control.HELD),
     Transition("release_control", (Control.HELD,), Control.FREE),
     Transition("lease_end", (Control.HELD,), Control.FREE),
+    Transition("take_clock", (Stepping.FREE, Stepping.HELD), Stepping.HELD),
+    Transition("release_clock", (Stepping.HELD,), Stepping.FREE),
+    Transition("clock_end", (Stepping.HELD,), Stepping.FREE),
     Transition("power_on", (_A.POWER_OFF, _A.IDLE, _A.REST), _A.REST),
     Transition("power", (_A.POWER_OFF, _A.IDLE), _A.IDLE),
     Transition("power", (_A.REST,), _A.REST),
@@ -168,7 +181,7 @@ def diagram(states: type[StrEnum]) -> str:
     drawn once.
 
     Args:
-        states: `Activity` or `Control`.
+        states: `Activity`, `Control` or `Stepping`.
     """
     arrows: dict[tuple[str, str], list[str]] = {}
     for row in TRANSITIONS:

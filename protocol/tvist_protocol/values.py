@@ -69,7 +69,7 @@ Inertia6 = tuple[Moment, Moment, Moment, Moment, Moment, Moment]
 
 Sequence = Annotated[int, Meta(ge=0, extra_json_schema={"maximum": 2**64 - 1})]
 """A uint64. MessagePack has no larger integer, and a bound above 2^63 cannot be said to msgspec."""
-Ticks = Annotated[int, Meta(ge=1, le=1000)]
+Ticks = Annotated[int, Meta(ge=1, le=100_000)]
 """Control periods of 0.002 s"""
 Seed = Annotated[int, Meta(ge=0, le=2**63 - 1)]
 Version = Annotated[int, Meta(ge=0, le=65535)]

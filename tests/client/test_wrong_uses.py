@@ -77,7 +77,7 @@ COMMANDS = {
     "a negative seed": (lambda arm: arm.reset(seed=-1), "seed is -1: must be at least 0"),
     "no tick": (lambda arm: arm.robot.advance(0), "ticks is 0: must be at least 1"),
     "half a tick": (lambda arm: arm.robot.advance(0.5), "ticks is 0.5: must be a whole number"),
-    "too many ticks": (lambda arm: arm.step(1001), "ticks is 1001: must be from 1 to 1000"),
+    "too many ticks": (lambda arm: arm.step(100_001), "ticks is 100001: must be from 1 to 100000"),
     "an unknown fault": (lambda arm: arm.inject("gremlins"), "'gremlins'"),
     "nobody's name": (lambda arm: arm.hand_over(""), "client is ''"),
 }  # fmt: skip

@@ -89,7 +89,7 @@ WRONG = [
     (RESET | {"mode": "running"}, "out_of_range", "mode", "one of 'RUNNING', 'IDLE', 'POWER_OFF'", None),
     (RESET | {"shaper": ""}, "out_of_range", "shaper", "at least 1", 1),
     (STEP | {"ticks": 0}, "out_of_range", "ticks", "at least 1", 1),
-    (STEP | {"ticks": 1001}, "out_of_range", "ticks", "at most 1000", 1000),
+    (STEP | {"ticks": 100_001}, "out_of_range", "ticks", "at most 100000", 100_000),
     (STEP | {"setpoints": [{"sequence": -1, "q": [0]}]}, "out_of_range", "setpoints[0].sequence", "-1", 0),
     (STEP | {"setpoints": [{"sequence": 0, "q": [9e9]}]}, "out_of_range", "setpoints[0].q[0]", "1000", 1e3),
     (STEP | {"setpoints": [{"sequence": 0, "q": [0]}] * 1001}, "out_of_range", "setpoints", "1000", 1000),

@@ -201,6 +201,18 @@ class Sessions(RuleBasedStateMachine):
         if self.lease is not None and self.lease.client == client and self.lease.watched:
             self.lose_lease()
 
+    @rule(whose=TOKENS, client=CLIENTS, ticks=st.integers(1, 3))
+    def ask_for_time(self, whose, client, ticks):
+        """Time passes by itself here, whoever asks."""
+        before = self.robot.tick_number
+        replies = [self.robot.receive(c.TakeClock(client=client), session=self.session(client))]
+        stepped = self.send(c.SimulationStep, whose, ticks=ticks)
+        replies += [] if stepped is None else [stepped]
+        assert {(reply.code, reply.where) for reply in replies} == {("wrong_mode", "type")}
+        released = self.robot.receive(c.ReleaseClock(token=self.token(whose)))
+        assert (released.code, self.robot.stepping.hold) == ("no_control", None)
+        assert self.robot.tick_number == before
+
     # ---------------------------------------------------------------- motion
 
     @rule(command=st.sampled_from(sorted(MOTION)), whose=TOKENS, offset=st.sampled_from([0.0, 0.02, 0.4]))

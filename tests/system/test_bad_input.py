@@ -176,7 +176,7 @@ CASES = {
     ),
     # what does not fit now
     "steps in real time": (of("simulation.step", ticks=1), "wrong_mode", "type"),
-    "too many steps": (of("simulation.step", ticks=1001), "out_of_range", "ticks"),
+    "too many steps": (of("simulation.step", ticks=100_001), "out_of_range", "ticks"),
     "servo_stop without a stream": (of("servo_stop"), "wrong_mode", ""),
     "an unknown mode": (of("simulation.reset", mode="DANCING"), "out_of_range", "mode"),
 }  # fmt: skip

@@ -3,6 +3,7 @@
 from importlib.metadata import version
 
 from tvist_plant.plant import PERIOD
+from tvist_protocol.channels import COMMANDS, tag
 from tvist_protocol.info import CalibrationInfo, Info, Limits
 from tvist_protocol.values import PROTOCOL_VERSION
 from tvist_server.calibrations import available, fits
@@ -10,11 +11,14 @@ from tvist_server.controller import Controller
 from tvist_server.stopping import stopping
 
 VERSION = version("tvist")
+FIELDS = {tag(kind): list(kind.__struct_fields__) for kind in COMMANDS}
+"""Of each command."""
 
 
 def info_of(controller: Controller) -> Info:
     """The robot, its limits and how it is set up now."""
     setup, limits, lease = controller.setup, controller.setup.description.limits, controller.session.lease
+    hold = controller.stepping.hold
     calibration = controller.filters.source.calibration
     own = (setup.calibration.name,) if setup.calibration is not None else ()
     tvist = controller.cycle.tvist
@@ -52,6 +56,8 @@ def info_of(controller: Controller) -> Info:
         calibrations=sorted({*available(), *own}),
         shapers=list(setup.registry.names()),
         control=None if lease is None else lease.client,
+        stepper=None if hold is None else hold.client,
+        commands=FIELDS,
         tick=controller.tick_number,
         stopping=list(stopping(setup.description)),
         robot_mode=controller.motion.activity.robot_mode,

@@ -11,13 +11,29 @@ import msgspec
 
 from tvist_protocol.channels import tag
 from tvist_protocol.codec import Envelope, decode_command, decode_envelope, decode_setpoint, refusal
-from tvist_protocol.commands import Command, SetEstimator, Setpoint, SimulationStep, TakeControl
+from tvist_protocol.commands import (
+    Command,
+    ReleaseClock,
+    SetEstimator,
+    Setpoint,
+    SimulationStep,
+    TakeClock,
+    TakeControl,
+)
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.explain import EXPLAINED_BYTES
 from tvist_protocol.replies import Refused
 from tvist_server.session import Lease, NoControlError, check_free, check_token
+from tvist_server.stepping import (
+    ClockHold,
+    check_clock_free,
+    check_clock_token,
+    check_step,
+    check_step_token,
+)
 
-LONG = frozenset(tag(kind) for kind in (SetEstimator, SimulationStep))
+STEP = tag(SimulationStep)
+LONG = frozenset((tag(SetEstimator), STEP))
 """Types of commands that may have more than `EXPLAINED_BYTES`."""
 
 
@@ -28,41 +44,47 @@ class Admitted(NamedTuple):
     content: dict[str, Any]
     """The same in Python's own types, for the journal."""
     session: str | None = None
-    """Session of the client that it gives control to, where its going will be told."""
+    """Session of the client that it gives control or the clock to, where its going will be told."""
+    client: str | None = None
+    """Who sent it, by its token or the name in it; None where it has neither."""
 
 
-def admit(data: bytes, lease: Lease | None) -> Admitted | Refused:
+def admit(data: bytes, lease: Lease | None, clock: ClockHold | None = None) -> Admitted | Refused:
     """Read a command, and check that its sender may send it.
 
-    Of a long one nothing is read but type and token before its sender is known to have control.
+    Of a long one nothing is read but type and token before its sender is known to have control or the clock.
 
     Args:
         data: The message.
         lease: Who has control.
+        clock: Who holds the clock.
     """
     try:
         if len(data) > EXPLAINED_BYTES:
-            _check_envelope(decode_envelope(data), len(data), lease)
+            _check_envelope(decode_envelope(data), len(data), lease, clock)
         command = decode_command(data)
     except ProtocolError as error:
         return refusal(error)
     except NoControlError as error:
         return error.reply
-    return admit_command(command, lease)
+    return admit_command(command, lease, clock)
 
 
-def admit_command(command: Command, lease: Lease | None) -> Admitted | Refused:
+def admit_command(
+    command: Command, lease: Lease | None, clock: ClockHold | None = None
+) -> Admitted | Refused:
     """Check that whoever sends a command may send it.
 
     Args:
         command: The command.
         lease: Who has control.
+        clock: Who holds the clock.
     """
     try:
-        _authorize(command, lease)
+        client = _authorize(command, lease, clock)
     except NoControlError as error:
         return error.reply
-    return Admitted(command, msgspec.to_builtins(command))
+    return Admitted(command, msgspec.to_builtins(command), client=client)
 
 
 class Unreadable(NamedTuple):
@@ -96,20 +118,31 @@ def _token(data: bytes) -> str | None:
     return None
 
 
-def _authorize(command: Command, lease: Lease | None) -> None:
-    if isinstance(command, TakeControl):
-        check_free(lease, command.client)
-    else:
-        token = getattr(command, "token", None)
-        if token is not None:
-            check_token(lease, token)
+def _authorize(command: Command, lease: Lease | None, clock: ClockHold | None) -> str | None:
+    """Check that a command's sender may send it; the sender's name, as far as the command says it."""
+    match command:
+        case TakeControl():
+            check_free(lease, command.client)
+            return command.client
+        case TakeClock():
+            check_clock_free(clock, command.client)
+            return command.client
+        case ReleaseClock():
+            return check_clock_token(clock, command.token).client
+        case SimulationStep():
+            return check_step(clock, lease, command)
+    token = getattr(command, "token", None)
+    return None if token is None else check_token(lease, token).client
 
 
-def _check_envelope(envelope: Envelope, size: int, lease: Lease | None) -> None:
+def _check_envelope(envelope: Envelope, size: int, lease: Lease | None, clock: ClockHold | None) -> None:
     if envelope.type not in LONG:
         of = "message" if envelope.type is None else f"{envelope.type:.40}"
         why = f"the {of} has {size} bytes, at most {EXPLAINED_BYTES} are allowed"
         raise ProtocolError("malformed", "", why, EXPLAINED_BYTES)
     if envelope.token is None:
         raise ProtocolError("missing_field", "token", "token is missing")
-    check_token(lease, envelope.token)
+    if envelope.type == STEP:
+        check_step_token(clock, lease, envelope.token)
+    else:
+        check_token(lease, envelope.token)

@@ -10,16 +10,14 @@ import os
 import threading
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from queue import Empty, SimpleQueue
+from collections.abc import Sequence
 
 from tvist_server.host import Host
+from tvist_server.jobs import Do, Jobs
 from tvist_server.lateness import Lateness, Punctuality
 from tvist_server.schedule import Schedule
 
 log = logging.getLogger(__name__)
-
-Job = Callable[[], None]
 
 LONGEST_SLEEP = 0.1
 """How long the tick thread sleeps at most without a look at whether it should end [s]."""
@@ -42,18 +40,24 @@ class Driven:
 
     def __init__(self, host: Host) -> None:
         self.host = host
-        self.jobs: SimpleQueue[Job] = SimpleQueue()
+        self.jobs = Jobs()
+        self.ending = False
+        """Whether a step that is under way has to end."""
         self.lateness = Lateness()
 
-    def post(self, job: Job) -> None:
-        """Run a job in the controller's thread before its next tick. From any thread; never waits."""
-        self.jobs.put(job)
+    def post(self, do: Do, client: str | None = None) -> None:
+        """Have something done in the controller's thread before its next tick. From any thread; never waits.
 
-    def run_jobs(self) -> None:
-        """Run what waits now; what comes meanwhile waits for the next tick, lest a flood hold up this one."""
-        jobs = self.jobs
-        for _ in range(jobs.qsize()):
-            jobs.get()()
+        Args:
+            do: What is to be done.
+            client: Who sent it, where that is known.
+        """
+        self.jobs.post(do, client)
+
+    def attend(self, stepper: str | None) -> bool:
+        """Before a tick of a client's step, do what others wait for; whether the step may go on."""
+        self.jobs.do_others(stepper)
+        return not self.ending
 
 
 class Clock(ABC):
@@ -73,9 +77,10 @@ class Clock(ABC):
         self._thread.start()
 
     def close(self) -> None:
-        """End, after the job that is being done; in real time after all that wait."""
+        """End, after the job that is being done, a step before its next tick; in real time after all that wait."""
         self._running = False
         for robot in self._robots:
+            robot.ending = True
             robot.post(_nothing)
         if self._thread.is_alive():
             self._thread.join()
@@ -108,7 +113,7 @@ class Lockstep(Clock):
         repeat: Tells its last state again.
     """
 
-    def __init__(self, robot: Driven, repeat: Job) -> None:
+    def __init__(self, robot: Driven, repeat: Do) -> None:
         super().__init__([robot])
         self._jobs = robot.jobs
         self._repeat = repeat
@@ -118,9 +123,7 @@ class Lockstep(Clock):
 
     def _run(self) -> None:
         while self._running:
-            try:
-                self._jobs.get(timeout=1.0)()
-            except Empty:
+            if not self._jobs.do_next(timeout=1.0):
                 self._repeat()
 
 
@@ -138,7 +141,7 @@ class Realtime(Clock):
     def __init__(
         self,
         robots: Sequence[Driven],
-        hand_on: Job,
+        hand_on: Do,
         period: float,
         speed: float = 1.0,
         *,
@@ -172,13 +175,13 @@ class Realtime(Clock):
             robot.lateness.note(late)
             if missed:
                 robot.host.missed(missed)
-            robot.run_jobs()
+            robot.jobs.do_waiting()
             robot.host.tick()
             if alone or begun - handed_on >= HAND_ON_EVERY:
                 handed_on = begun
                 self._hand_on()
         for robot in robots:
-            robot.run_jobs()
+            robot.jobs.do_waiting()
         self._hand_on()
 
 

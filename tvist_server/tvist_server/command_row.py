@@ -1,7 +1,7 @@
 """A command is a row: its message, what handles it, and what it takes."""
 
 from collections.abc import Callable
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, Literal, NamedTuple, TypeVar
 
 from tvist_protocol.commands import Command
 from tvist_protocol.replies import Reply
@@ -32,7 +32,7 @@ class Row(NamedTuple):
 
     message: type[Command]
     handle: Callable[[Call[Any]], Reply | None]
-    needs_lease: bool = True
-    """False: anyone may send it; a token that is there all the same must be that of the lease."""
+    lease: Literal["needed", "if named", "none"] = "needed"
+    """Whether its token must be that of the lease: always, where it has one, or never: it names something else."""
     changes_io: bool = False
     """Whether it may change what `io` tells."""

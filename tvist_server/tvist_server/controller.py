@@ -90,7 +90,10 @@ class Controller:
         collisions = CollisionModel(setup.description, body(setup.payload))
         self.motion = MotionControl(self.cycle, collisions, self._emit, setup.mode)
         self.session = Session(timeouts=setup.clock == "realtime")
-        self._authority = Authority(self.session, self._interrupt, self._emit)
+        self._authority = Authority(
+            self.session, self._interrupt, self._emit, steppable=setup.clock != "realtime"
+        )
+        self.stepping = self._authority.stepping
         safety = SafetyControl(self.motion, self._emit)
         self._faults = Faults(self.motion, safety)
         self.programs = ProgramPlayer(
@@ -112,7 +115,7 @@ class Controller:
         """Commands on the whole robot."""
         return (
             Row(c.SimulationReset, self._reset, changes_io=True),
-            Row(c.SimulationStep, self._check_step),
+            Row(c.SimulationStep, self._check_step, lease="none"),
         )
 
     @property
@@ -159,7 +162,7 @@ class Controller:
 
         try:
             token: Any = getattr(command, "token", None)
-            if row.needs_lease or token is not None:
+            if row.lease == "needed" or (row.lease == "if named" and token is not None):
                 self.session.renew(token, self.now)
             reply = row.handle(Call(command, self.tick_number + 1, self.now, session, planned))
         except (RefusalError, NoControlError) as refusal:
@@ -196,7 +199,7 @@ class Controller:
         self.counters.setpoints_refused += 1
 
     def client_gone(self, client: str, session: str) -> None:
-        """A client's session has ended; where it held control, motion ends with it."""
+        """A client's session has ended; what it held ends with it."""
         self._authority.client_gone(client, session)
 
     def missed(self, ticks: int) -> None:
@@ -327,9 +330,7 @@ class Controller:
     def _check_step(self, call: Call[c.SimulationStep]) -> Reply:
         """Check that a client may let time pass; the driver then does."""
         command = call.command
-        if self.setup.clock == "realtime":
-            why = "time passes by itself here: start with --clock lockstep to step"
-            raise RefusalError("wrong_mode", "type", why)
+        self._authority.check_step(command, call.now)
         if command.setpoints is not None and not self.motion.streaming:
             raise RefusalError("wrong_mode", "setpoints", "no stream is running: send servo_start first")
         setpoints = command.setpoints or ()

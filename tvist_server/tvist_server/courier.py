@@ -37,6 +37,11 @@ class Courier:
         if self._thread.is_alive():
             self._thread.join(CLOSE_WAIT)
 
+    @property
+    def ended(self) -> bool:
+        """Whether nothing is handed on any more."""
+        return not self._thread.is_alive()
+
     def _run(self) -> None:
         while self._running:
             self._calls.get()

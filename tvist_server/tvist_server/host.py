@@ -4,6 +4,8 @@ Still without clock, thread or socket: whoever calls `tick` lets time pass. In l
 through `simulation.step`.
 """
 
+from collections.abc import Callable
+
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command, Setpoint, SimulationStep
 from tvist_protocol.journal import Entry, entry_of
@@ -15,6 +17,11 @@ from tvist_server.controller import Controller
 from tvist_server.planning.planner import Plan
 from tvist_server.sink import Sink
 from tvist_server.standing import Standing
+from tvist_server.stepping import may_step
+
+Attend = Callable[[], bool]
+"""Does what waits before a tick of a step; False where the step has to end."""
+_BUSY = Refused(code="busy", where="", why="a step is under way: send the next when it is answered")
 
 
 class Host:
@@ -33,24 +40,31 @@ class Host:
         self.standing = self._standing()
         """What any thread may know of the controller."""
         self._info: tuple[int, Standing | None, bytes] = -1, None, b""
+        self._stepping = False
 
     def request(self, data: bytes) -> Reply:
         """Admit and carry out an encoded command."""
-        admitted = admit(data, self.standing.lease)
+        admitted = admit(data, self.standing.lease, self.standing.clock)
         if isinstance(admitted, Refused):
             self.controller.counters.commands += 1
             self.controller.counters.refused += 1
             return admitted
         return self.carry_out(admitted)
 
-    def carry_out(self, admitted: Admitted, plan: Plan | None = None) -> Reply:
+    def carry_out(self, admitted: Admitted, plan: Plan | None = None, attend: Attend | None = None) -> Reply:
         """Carry out a command.
 
         Args:
             admitted: The command.
             plan: For it, where it was planned beforehand and the plan holds.
+            attend: Called before each tick of a step, where others may send something meanwhile. It may carry out
+                other commands, but no step.
         """
         command = admitted.command
+        if self._stepping and isinstance(command, SimulationStep):
+            self.controller.counters.commands += 1
+            self.controller.counters.refused += 1
+            return _BUSY
         session = admitted.session
         entry = Entry(tick=self._next, kind="command", message=admitted.content, session=session)
         try:
@@ -62,7 +76,7 @@ class Host:
         if not isinstance(reply, Refused) or self._is_holders(command):
             self._note(entry)
         if isinstance(command, SimulationStep) and isinstance(reply, Done):
-            reply = self._step(command, reply)
+            reply = self._step(command, attend)
         self.standing = self._standing()
         return reply
 
@@ -76,8 +90,8 @@ class Host:
             self.receive_setpoint(setpoint)
 
     def client_gone(self, client: str, session: str) -> None:
-        """A client's session has ended; nothing comes of it but where that one has control."""
-        if self.controller.session.client_gone(client, session):
+        """A client's session has ended; nothing comes of it but where that one has control or the clock."""
+        if session in self._standing().sessions_of(client):
             self._note(Entry(tick=self._next, kind="client_gone", client=client, session=session))
             self.controller.client_gone(client, session)
             self.standing = self._standing()
@@ -149,13 +163,26 @@ class Host:
         return lease is not None and getattr(message, "token", None) == lease.token
 
     def _standing(self) -> Standing:
-        return Standing(self.controller.session.lease, self.controller.basis)
+        controller = self.controller
+        return Standing(controller.session.lease, controller.basis, controller.stepping.hold)
 
-    def _step(self, command: SimulationStep, reply: Done) -> Done | Refused:
-        setpoints = iter(command.setpoints or ())
-        for _ in range(command.ticks):
-            setpoint = next(setpoints, None)
-            if setpoint is not None:
-                self.receive_setpoint(Setpoint(token=command.token, sequence=setpoint.sequence, q=setpoint.q))
-            self.tick()
-        return reply
+    def _step(self, step: SimulationStep, attend: Attend | None) -> Done:
+        """Tick as often as a step says, or until its token lets time pass no longer."""
+        controller, setpoints = self.controller, iter(step.setpoints or ())
+        motion_token = step.token if step.motion_token is None else step.motion_token
+        self._stepping = True
+        try:
+            for _ in range(step.ticks):
+                going_on = attend is None or attend()
+                if not going_on or not may_step(
+                    controller.stepping.hold, controller.session.lease, step.token
+                ):
+                    break
+                setpoint = next(setpoints, None)
+                if setpoint is not None:
+                    played = Setpoint(token=motion_token, sequence=setpoint.sequence, q=setpoint.q)
+                    self.receive_setpoint(played)
+                self.tick()
+        finally:
+            self._stepping = False
+        return Done(tick=controller.tick_number)

@@ -24,7 +24,7 @@ class MotionCommands:
             Row(c.MoveJ, self._move_j),
             Row(c.ServoStart, self._servo_start),
             Row(c.ServoStop, lambda _: motion.end_stream()),
-            Row(c.Stop, self._stop, needs_lease=False),
+            Row(c.Stop, self._stop, lease="if named"),
             Row(c.Pause, self._pause),
             Row(c.Resume, lambda _: motion.resume()),
             Row(c.SetSpeed, self._set_speed, changes_io=True),

@@ -19,6 +19,9 @@ log = logging.getLogger(__name__)
 
 MAX_WAITING = 2048
 """Messages that may wait, four seconds of states."""
+LEAD = 50
+"""Messages that may wait in lockstep, a tenth of a second of states: the further a step runs ahead of what is told, the
+later a client's answer to a state comes."""
 PAUSE = 0.02
 """How long the controller waits at most, where it does, before it looks for room again [s]."""
 
@@ -68,7 +71,7 @@ class Outlet(Sink):
         queue = self._queue
         for _ in range(len(queue)):
             item = queue.popleft()
-            if self._lossless:
+            if self._lossless and len(queue) <= LEAD // 2:
                 self._room.set()
             try:
                 self._publish(item)
@@ -110,13 +113,18 @@ class Outlet(Sink):
 
     def _offer(self, message: State | Truth | Io) -> None:
         """Queue a message of every tick, where there is room."""
-        while self._lossless and len(self._queue) >= MAX_WAITING:
-            self._room.clear()
-            self._room.wait(PAUSE)
+        if self._lossless and len(self._queue) >= LEAD:
+            self._wait_for_room()
         if len(self._queue) < MAX_WAITING:
             self._put(message)
         else:
             self.dropped += 1
+
+    def _wait_for_room(self) -> None:
+        """Wait until half of the room is free: to be woken for each message would cost more than the message."""
+        while self._lossless and len(self._queue) > LEAD // 2:
+            self._room.clear()
+            self._room.wait(PAUSE)
 
     def _put(self, item: Message | Callable[[], None]) -> None:
         self._queue.append(item)

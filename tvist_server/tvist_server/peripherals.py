@@ -61,7 +61,7 @@ class Peripherals:
         self._on_tcp = on_tcp
         self.rows = (
             Row(SetIo, lambda call: self.set_outputs(call.command), changes_io=True),
-            Row(SetRegisters, self._set_registers, needs_lease=False, changes_io=True),
+            Row(SetRegisters, self._set_registers, lease="if named", changes_io=True),
             Row(SetTcp, lambda call: self.set_tcp(call.command.offset), changes_io=True),
             Row(SimulationSetInputs, lambda call: self.set_inputs(call.command), changes_io=True),
         )

@@ -2,8 +2,9 @@
 
 import threading
 from collections.abc import Callable
+from typing import Protocol
 
-from tvist_protocol.commands import Command, HandOver, TakeControl
+from tvist_protocol.commands import Command, HandOver, TakeClock, TakeControl
 from tvist_protocol.replies import Refused, Reply
 from tvist_server.admission import Admitted, admit, admit_command, admit_setpoint
 from tvist_server.gateways.base import Answer, Desk
@@ -11,8 +12,14 @@ from tvist_server.host import Host
 from tvist_server.presence import Presence
 from tvist_server.session import NoControlError
 
-Post = Callable[[Callable[[], None]], None]
-"""Has something done in the controller's thread, before its next tick. From any thread; never waits."""
+
+class Post(Protocol):
+    """Has something done in the controller's thread, before its next tick. From any thread; never waits."""
+
+    def __call__(self, do: Callable[[], None], client: str | None = None, /) -> None:
+        """Take what is to be done, and who sent it, where that is known."""
+
+
 CarryOut = Callable[[Admitted, Answer], None]
 """Has a command carried out in the controller's thread, and answered there. From any thread; never waits."""
 
@@ -40,11 +47,13 @@ class Reception(Desk):
 
     def request(self, data: bytes, answer: Answer) -> None:
         """Take an encoded command; the reply comes from another thread, or at once where it is turned away."""
-        self._hand_in(admit(data, self._host.standing.lease), answer)
+        standing = self._host.standing
+        self._hand_in(admit(data, standing.lease, standing.clock), answer)
 
     def command(self, command: Command, answer: Answer) -> None:
         """Take a command; `answer` as for `request`."""
-        self._hand_in(admit_command(command, self._host.standing.lease), answer)
+        standing = self._host.standing
+        self._hand_in(admit_command(command, standing.lease, standing.clock), answer)
 
     def info(self, answer: Callable[[bytes], None]) -> None:
         """Say what the robot is."""
@@ -62,12 +71,13 @@ class Reception(Desk):
 
     def setpoint(self, data: bytes) -> None:
         """Admit a set-point."""
-        setpoint = admit_setpoint(data, self._host.standing.lease)
-        if setpoint is None:
+        lease = self._host.standing.lease
+        setpoint = admit_setpoint(data, lease)
+        if setpoint is None or lease is None:
             with self._lock:
                 self.setpoints_refused += 1
         else:
-            self._post(lambda: self._host.receive_setpoint(setpoint))
+            self._post(lambda: self._host.receive_setpoint(setpoint), lease.client)
 
     def client_seen(self, client: str, session: str = "") -> None:
         """A client's liveliness token is there."""
@@ -78,10 +88,7 @@ class Reception(Desk):
         """A client's liveliness token is gone, or its session."""
         with self._lock:
             self._presence.gone(client, session)
-        lease = self._host.standing.lease
-        if (
-            lease is not None and lease.client == client
-        ):  # one that is being given to it now: see _unless_gone
+        if self._host.standing.sessions_of(client):  # what is being given to it now: see _unless_gone
             self._post(lambda: self._host.client_gone(client, session))
 
     def session_gone(self, session: str) -> None:
@@ -96,7 +103,9 @@ class Reception(Desk):
             self._hand_on(lambda: answer(reply))
 
         answered: Answer = hand_on
-        if isinstance(admitted, Admitted) and isinstance(admitted.command, TakeControl | HandOver):
+        if isinstance(admitted, Admitted) and isinstance(
+            admitted.command, TakeControl | HandOver | TakeClock
+        ):
             client = admitted.command.client
             admitted, answered = self._with_session(admitted, client), self._unless_gone(client, hand_on)
         if isinstance(admitted, Refused):
@@ -114,15 +123,16 @@ class Reception(Desk):
             return error.reply
 
     def _unless_gone(self, client: str, answer: Answer) -> Answer:
-        """Answer a command that gives control to a client, and end its lease where it has gone meanwhile."""
+        """Answer a command that gives a client control or the clock, and take it back where the client has gone."""
 
         def answered(reply: Reply) -> None:
-            lease = self._host.standing.lease
-            if lease is not None and lease.client == client and lease.session is not None:
+            for session in self._host.standing.sessions_of(client):
+                if session is None:
+                    continue
                 with self._lock:
-                    there = self._presence.has(client, lease.session)
+                    there = self._presence.has(client, session)
                 if not there:
-                    self._host.client_gone(client, lease.session)
+                    self._host.client_gone(client, session)
             answer(reply)
 
         return answered

@@ -80,7 +80,12 @@ class ServedRobot:
         self._outlet.repeat(self.controller.latest, self.controller.io())
 
     def _carry_out(self, admitted: Admitted, answer: Answer) -> None:
-        self.driven.post(lambda: answer(self._host.carry_out(admitted)))
+        client = admitted.client
+
+        def attend() -> bool:
+            return self.driven.attend(client)
+
+        self.driven.post(lambda: answer(self._host.carry_out(admitted, attend=attend)), client)
 
     # ------------------------------------------------------------------ how it is doing, and its end
 

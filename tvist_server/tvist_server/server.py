@@ -53,7 +53,8 @@ class Server:
             raise ConfigError(str(error)) from error
         self.robots: list[ServedRobot] = []
         self.left = True
-        """After `close`: whether the network is left. Zenoh may still wait for a client that has stopped reading."""
+        """After `close`: whether the network is left. Zenoh, or who hands on, may still wait for a client that has
+        stopped reading."""
         try:
             for setup in setups:
                 self.robots.append(_robot(setup, config, several=len(setups) > 1))
@@ -115,7 +116,7 @@ class Server:
         leaving = Thread(target=self._leave, name="tvist-leave", daemon=True)
         leaving.start()
         leaving.join(LEAVE)
-        self.left = not leaving.is_alive()
+        self.left = not leaving.is_alive() and all(courier.ended for courier in self._couriers)
         gc.unfreeze()
 
     def _leave(self) -> None:

@@ -34,17 +34,22 @@ class NoControlError(Exception):
         return Refused(code=self.code, where=self.where, why=self.why)
 
 
-def check_token(lease: Lease | None, token: str) -> Lease:
+def check_token(lease: Lease | None, token: str, where: str = "token") -> Lease:
     """The lease that a token names.
+
+    Args:
+        lease: The present one.
+        token: The token.
+        where: Field that holds it.
 
     Raises:
         NoControlError: Nobody has control, or the token is another one's or an old one.
     """
     if lease is None:
-        raise NoControlError("no_control", "nobody has control: send take_control first")
+        raise NoControlError("no_control", "nobody has control: send take_control first", where)
     if token != lease.token:
-        why = f"token is not that of the present lease, held by {lease.client!r}"
-        raise NoControlError("stale_token", why)
+        why = f"{where} is not that of the present lease, held by {lease.client!r}"
+        raise NoControlError("stale_token", why, where)
     return lease
 
 

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from tvist_server.planning.basis import Basis
 from tvist_server.session import Lease
+from tvist_server.stepping import ClockHold
 
 
 class Standing(NamedTuple):
@@ -13,6 +14,13 @@ class Standing(NamedTuple):
     """Who has control."""
     basis: Basis
     """What plans for commands depend on."""
+    clock: ClockHold | None
+    """Who holds the clock."""
+
+    def sessions_of(self, client: str) -> set[str | None]:
+        """Sessions with whose going a client loses control or the clock; empty where it has neither."""
+        rights = (self.lease, self.clock)
+        return {right.session for right in rights if right is not None and right.client == client}
 
     @property
     def may_move(self) -> bool:

@@ -48,11 +48,11 @@ class Transport(ABC):
 
     @abstractmethod
     async def announce(self, client: str) -> None:
-        """Say that a client of that name is there, until `withdraw` or as long as this transport lives."""
+        """Say that a client of that name is there, until it was withdrawn as often or this transport ends."""
 
     @abstractmethod
     async def withdraw(self, client: str) -> None:
-        """Take back what `announce` said."""
+        """Take back what one `announce` said."""
 
     @abstractmethod
     async def close(self) -> None:

@@ -6,6 +6,7 @@ and no thread of Python's has to be joined at the end. They make bytes of payloa
 
 import asyncio
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
 
@@ -53,6 +54,7 @@ class ZenohTransport(Transport):
         self._pending: set[asyncio.Future[bytes]] = set()
         self._lost_callbacks: list[Callable[[NotConnectedError], None]] = []
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
+        self._announced: Counter[str] = Counter()
         session.liveliness().declare_subscriber(
             keys.alive(robot), Callback(self._on_alive, indirect=False), history=True
         )
@@ -123,11 +125,17 @@ class ZenohTransport(Transport):
         """Declare the client's liveliness token. It reaches the robot before any command sent later."""
         if self._closed:
             raise self._gone()
-        key = keys.client(self._robot, client, str(self._session.info.zid()))
-        self._tokens[client] = self._session.liveliness().declare_token(key)
+        self._announced[client] += 1
+        if client not in self._tokens:
+            key = keys.client(self._robot, client, str(self._session.info.zid()))
+            self._tokens[client] = self._session.liveliness().declare_token(key)
 
     async def withdraw(self, client: str) -> None:
-        """Undeclare the client's liveliness token."""
+        """Undeclare the client's liveliness token, once whoever announced it needs it no more."""
+        self._announced[client] -= 1
+        if self._announced[client] > 0:
+            return
+        del self._announced[client]
         token = self._tokens.pop(client, None)
         if token is not None and not self._closed:
             token.undeclare()  # type: ignore[no-untyped-call]

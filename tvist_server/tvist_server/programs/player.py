@@ -53,10 +53,10 @@ class ProgramPlayer:
         self._moving: int | None = None
         """Number of the motion of that line."""
         self.rows = (
-            Row(ProgramLoad, self._load, needs_lease=False, changes_io=True),
+            Row(ProgramLoad, self._load, lease="if named", changes_io=True),
             Row(ProgramPlay, self._play, changes_io=True),
             Row(ProgramPause, self._pause, changes_io=True),
-            Row(ProgramStop, self._stop, needs_lease=False, changes_io=True),
+            Row(ProgramStop, self._stop, lease="if named", changes_io=True),
         )
 
     @property

@@ -40,6 +40,8 @@ FIRST = 1000
 """Ticks that the first one may take."""
 MOST_PENDING = 250
 """States that may wait for this thread: half a second."""
+LEAD = 20
+"""The same in lockstep: the further a step runs ahead of what clients are told, the later their answers come."""
 PAUSE = 0.02
 """Time between two looks for room, in lockstep [s]."""
 
@@ -157,7 +159,8 @@ class UrDoors(Gateway):
 
     def _has_room(self) -> bool:
         """Whether one more state may wait; in lockstep there is room in the end."""
-        while self._handed - self._taken >= MOST_PENDING:
+        most = LEAD if self._lockstep else MOST_PENDING
+        while self._handed - self._taken >= most:
             if not self._lockstep or self._loop is None:
                 return False
             self._room.clear()
@@ -173,6 +176,8 @@ class UrDoors(Gateway):
         for connection in tuple(self._connections):
             connection.close()
         await asyncio.sleep(0)  # in which they end
+        self._loop = None
+        self._room.set()  # whoever hands over a state waits for nobody any more
         self._scripts.flush()
         self._coming_and_going.flush()
 

@@ -1,0 +1,112 @@
+"""Time of a simulated robot that does not tick by itself, and the right to let it pass."""
+
+import contextlib
+from collections.abc import AsyncIterator, Sequence
+from typing import TYPE_CHECKING
+
+from tvist_client.errors import ClientError, UnexpectedReplyError
+from tvist_client.transports.base import Transport
+from tvist_client.values import whole
+from tvist_protocol.commands import ReleaseClock, SimulationStep, StepSetpoint, TakeClock
+from tvist_protocol.errors import RefusedError
+from tvist_protocol.keys import check_client_name
+from tvist_protocol.replies import Accepted, Done
+
+if TYPE_CHECKING:
+    from tvist_client.robot import Robot
+
+MAX_STEP = 1000
+"""Set-points that one `simulation.step` may have, and ticks that every server takes at once."""
+LONGEST_STEP = 100_000
+"""Ticks that one may have."""
+TICK_S = 0.06
+"""How long a tick may take on the slowest of machines [s]: a server may compute more slowly than time passes."""
+
+
+class Stepper:
+    """The clock of a simulated robot: what `Robot.clock_control` gives. It moves nothing.
+
+    Attributes:
+        robot: The robot it belongs to.
+        token: Names the hold of the clock.
+    """
+
+    def __init__(self, robot: "Robot", token: str) -> None:
+        self.robot = robot
+        self.token = token
+
+    async def step(self, ticks: int) -> int:
+        """Let ticks pass by one command; what other clients send meanwhile is carried out between them.
+
+        Args:
+            ticks: How many control periods, 1 to 100000.
+
+        Returns:
+            The last tick that passed; its state has arrived. It is an earlier one where the clock was lost meanwhile.
+
+        Raises:
+            RefusedError: The clock was lost; the present holder's name is in the sentence.
+        """
+        return await step(self.robot, self.token, ticks)
+
+    async def advance(self, ticks: int) -> int:
+        """Let any number of ticks pass, as `Robot.advance` does."""
+        return await self.robot.advance(ticks)
+
+
+@contextlib.asynccontextmanager
+async def hold_clock(robot: "Robot", transport: Transport, client: str) -> AsyncIterator[Stepper]:
+    """Hold the clock for as long as the block lasts; see `Robot.clock_control`.
+
+    Args:
+        robot: Whose time passes by the client's steps.
+        transport: The robot's; the client is announced there first, so that its going gives the clock back.
+        client: Who asks.
+    """
+    check_client_name(client)
+    await transport.announce(client)
+    try:
+        accepted = await robot.request(TakeClock(client=client))
+        if not isinstance(accepted, Accepted) or accepted.token is None:
+            raise UnexpectedReplyError(f"take_clock was answered by {accepted}, without a token")
+        stepper = robot.stepper = Stepper(robot, accepted.token)
+        try:
+            yield stepper
+        finally:
+            if robot.stepper is stepper:
+                robot.stepper = None
+            # A clock that is lost, or a robot that has gone, needs no release.
+            with contextlib.suppress(RefusedError, ClientError):
+                await robot.request(ReleaseClock(token=stepper.token))
+    finally:
+        await transport.withdraw(client)
+
+
+async def step(
+    robot: "Robot",
+    token: str,
+    ticks: int,
+    setpoints: Sequence[StepSetpoint] | None = None,
+    motion_token: str | None = None,
+) -> int:
+    """Send one `simulation.step`, and wait for the state of its last tick.
+
+    Args:
+        robot: Whose time passes.
+        token: Names the hold of the clock, or the lease where nobody holds it.
+        ticks: How many control periods, 1 to 100000.
+        setpoints: Of a running stream, one a tick in order.
+        motion_token: Names the lease, where `token` does not and there are set-points.
+
+    Returns:
+        The last tick that passed; its state has arrived.
+    """
+    robot.watch()
+    ticks = whole(ticks, "ticks", 1, LONGEST_STEP)
+    played = None if setpoints is None else tuple(setpoints)
+    command = SimulationStep(token=token, ticks=ticks, setpoints=played, motion_token=motion_token)
+    reply = await robot.request(command, TICK_S * max(ticks, MAX_STEP))
+    if not isinstance(reply, Done) or reply.tick is None:
+        raise UnexpectedReplyError(f"simulation.step was answered by {reply}, without a tick")
+    await robot.until(reply.tick)
+    return reply.tick

@@ -1,0 +1,187 @@
+"""The clock is a right like control: one holder, who is named, and who has gone keeps it no longer."""
+
+import msgpack
+import pytest
+
+from tvist_client.blocking import Robot
+from tvist_client.transports.loopback import LoopbackTransport
+from tvist_lab.in_process import free_setup
+from tvist_protocol import commands as c
+from tvist_protocol.codec import decode_reply, encode
+from tvist_protocol.errors import RefusedError
+from tvist_protocol.explain import EXPLAINED_BYTES
+from tvist_protocol.replies import Accepted, Refused
+from tvist_server.admission import Admitted, admit
+from tvist_server.controller import Controller
+from tvist_server.gateways.loopback import LoopbackHost
+from tvist_server.host import Host
+from tvist_server.jobs import Jobs
+from tvist_server.reception import Reception
+from tvist_server.session import Lease, NoControlError
+from tvist_server.stepping import ClockHold, Stepping, check_step_token, may_step
+
+from .robots import UR5E, setup
+
+LEASE = Lease("anna", "anna#1", 30.0, 30.0, None)
+HOLD = ClockHold("bert", "bert#clock1", None)
+Q2 = UR5E.poses["Q2"]
+LONG = tuple(c.StepSetpoint(sequence=n, q=(3.0,) * 6) for n in range(1000))
+
+
+class Sink:
+    """Takes what a host puts out."""
+
+    def __getattr__(self, _):
+        return lambda *_: None
+
+
+class Network:
+    """A robot's reception, and the thread behind it: jobs are done when the test says."""
+
+    def __init__(self):
+        self.host, self.jobs, self.replies = Host(Controller(setup(clock="lockstep")), Sink()), Jobs(), []
+        self.reception = Reception(self.host, self.jobs.post, self.carry_out, lambda call: call())
+
+    def carry_out(self, admitted, reply):
+        self.jobs.post(lambda: reply(self.host.carry_out(admitted)), admitted.client)
+
+    def send(self, command):
+        self.reception.request(encode(command), self.replies.append)
+
+    def ask(self, command):
+        self.send(command)
+        self.jobs.do_waiting()
+        return self.replies[-1]
+
+
+def test_one_client_holds_the_clock_and_another_is_told_which():
+    stepping = Stepping()
+    hold = stepping.take("bert")
+    with pytest.raises(NoControlError, match="'bert'") as caught:
+        stepping.take("anna")
+    assert caught.value.code == "no_control"
+    assert stepping.hold == hold
+    again = stepping.take("bert")
+    assert again.token != hold.token
+    with pytest.raises(NoControlError) as caught:
+        stepping.release(hold.token)
+    assert caught.value.code == "stale_token"
+    stepping.release(again.token)
+    assert stepping.hold is None
+
+
+@pytest.mark.parametrize(
+    ("hold", "lease", "token", "code"),
+    [
+        (None, None, "anna#1", "no_control"),
+        (None, LEASE, "anna#1", None),
+        (None, LEASE, "bert#clock1", "stale_token"),
+        (HOLD, None, "bert#clock1", None),
+        (HOLD, LEASE, "bert#clock1", None),
+        (HOLD, LEASE, "anna#1", "no_control"),
+        (HOLD, LEASE, "bert#clock0", "stale_token"),
+        (HOLD, None, "anna#1", "stale_token"),
+    ],
+)
+def test_control_lets_time_pass_while_nobody_holds_the_clock(hold, lease, token, code):
+    assert may_step(hold, lease, token) == (code is None)
+    if code is None:
+        assert check_step_token(hold, lease, token) == token.partition("#")[0]
+    else:
+        with pytest.raises(NoControlError) as caught:
+            check_step_token(hold, lease, token)
+        assert caught.value.code == code
+
+
+def test_a_long_step_of_the_clock_s_holder_is_read_and_a_stranger_s_is_not():
+    def long(token, motion_token):
+        return encode(c.SimulationStep(token=token, ticks=1000, setpoints=LONG, motion_token=motion_token))
+
+    data = long(HOLD.token, LEASE.token)
+    assert len(data) > EXPLAINED_BYTES
+    admitted = admit(data, LEASE, HOLD)
+    assert isinstance(admitted, Admitted)
+    assert admitted.client == "bert"
+    refused = admit(long(LEASE.token, None), LEASE, HOLD)
+    assert (refused.code, refused.where) == ("no_control", "token")
+    refused = admit(long(HOLD.token, "anna#0"), LEASE, HOLD)
+    assert (refused.code, refused.where) == ("stale_token", "motion_token")
+    stranger = msgpack.packb({"type": "simulation.step", "token": "x", "setpoints": [{}] * 100_000})
+    assert admit(stranger, LEASE, HOLD).code == "stale_token"
+
+
+@pytest.mark.parametrize(
+    ("command", "client"),
+    [
+        (c.TakeClock(client="bert"), "bert"),
+        (c.ReleaseClock(token=HOLD.token), "bert"),
+        (c.SimulationStep(token=HOLD.token, ticks=1), "bert"),
+        (c.TakeControl(client="anna"), "anna"),
+        (c.MoveJ(token=LEASE.token, q=Q2), "anna"),
+        (c.Stop(), None),
+    ],
+)
+def test_who_sent_a_command_is_known_by_its_token_or_its_name(command, client):
+    assert admit(encode(command), LEASE, HOLD).client == client
+
+
+def test_the_clock_is_free_once_the_session_of_its_holder_has_gone():
+    network = Network()
+    network.reception.client_seen("bert", "1f")
+    assert isinstance(network.ask(c.TakeClock(client="bert")), Accepted)
+    network.reception.client_gone("bert", "2f")
+    network.reception.client_gone("anna", "1f")
+    network.jobs.do_waiting()
+    assert network.host.standing.clock.client == "bert"
+    network.reception.session_gone("1f")
+    network.jobs.do_waiting()
+    assert network.host.standing.clock is None
+
+
+def test_a_clock_that_is_given_to_one_who_has_gone_is_free_at_once():
+    network = Network()
+    network.reception.client_seen("bert", "1f")
+    network.send(c.TakeClock(client="bert"))
+    network.reception.client_gone("bert", "1f")
+    network.jobs.do_waiting()
+    assert network.host.standing.clock is None
+
+
+def test_the_end_of_one_session_ends_both_rights():
+    network = Network()
+    network.reception.client_seen("bert", "1f")
+    for command in (c.TakeClock(client="bert"), c.TakeControl(client="bert")):
+        assert isinstance(network.ask(command), Accepted)
+    network.reception.client_gone("bert", "1f")
+    network.jobs.do_waiting()
+    assert (network.host.standing.clock, network.host.standing.lease) == (None, None)
+
+
+def test_a_step_in_a_callback_of_a_step_is_refused_and_other_commands_are_carried_out():
+    host, said = LoopbackHost(free_setup()), []
+    token = decode_reply(host.request("", encode(c.TakeControl(client="me")))).token
+    step = encode(c.SimulationStep(token=token, ticks=2))
+    host.subscribe("event", lambda _: said.append(decode_reply(host.request("", encode(c.Stop())))))
+    host.request("", encode(c.MoveJ(token=token, q=Q2)))
+    host.subscribe("state", lambda _: said.append(decode_reply(host.request("", step))) if said else None)
+    assert decode_reply(host.request("", step)).tick == 2
+    refused = [reply for reply in said if isinstance(reply, Refused)]
+    assert {reply.code for reply in refused} == {"busy"}
+    assert len(refused) == 2
+    stops = [entry.tick for entry in host.entries if entry.message["type"] == "stop"]
+    assert stops == [2, 3], "the motion begins at tick 1 and has stopped at tick 2"
+
+
+def test_in_process_one_client_steps_and_another_moves():
+    host = LoopbackHost(free_setup(start="Q1"))
+    with Robot.over(LoopbackTransport(host)) as robot, Robot.over(LoopbackTransport(host)) as other:
+        with robot.clock_control("stepper") as stepper, other.control("mover") as arm:
+            motion = arm.move_j(Q2, wait=False)
+            with pytest.raises(RefusedError, match="'stepper'"):
+                other.advance(1)
+            assert robot.info().stepper == "stepper"
+            assert stepper.step(3000) == 3000
+            assert stepper.advance(2500) == 5500
+            assert motion.wait().done is not None
+            assert other.state().tick == 5500
+        assert robot.info().stepper is None
