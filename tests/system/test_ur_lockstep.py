@@ -10,11 +10,11 @@ import pytest
 from tests.conformance.served import PATIENCE, Served
 from tests.conformance.wire import Wire
 from tests.server.ur import decoders, rtde_client
-from tvist_server.gateways.ur.built_in import PAPER, built_in
 
 from tvist_lab.mcap_file import read
 from tvist_lab.replay import replay_file
 from tvist_plant.description import load
+from tvist_server.programs.built_in import PAPER, built_in
 
 BOOTED, TICK = 40.0, 0.002
 FAR = [0.6, -2.9, 0.3, -1.4, 0.2, 0.4]
@@ -234,9 +234,11 @@ def test_a_program_of_the_dashboard_reaches_its_end_within_one_step_of_another_c
         assert served.end() == 0
     told = [entry for entry in replayed(tmp_path / "run.mcap").journal if entry.kind == "command"]
     assert [entry.tick for entry in told if entry.message["type"] == "simulation.step"] == [1, 2]
-    moves = [entry.tick for entry in told if entry.message["type"] == "move_j"]
-    assert moves[0] == 2
-    assert len(moves) == len(set(moves)) == lines
+    assert [entry.tick for entry in told if entry.message["type"] == "program.play"] == [2]
+    assert "move_j" not in {entry.message["type"] for entry in told}  # a replay makes the program's moves again
+    started = [event["tick"] for event in stepper.received["event"] if event["kind"] == "motion_started"]
+    assert started[0] == 2
+    assert len(set(started)) == lines
 
 
 def test_the_dashboard_pauses_resumes_and_stops_within_a_step(tmp_path):
@@ -265,7 +267,8 @@ def test_the_dashboard_pauses_resumes_and_stops_within_a_step(tmp_path):
     content = replayed(tmp_path / "run.mcap")
     told = [(entry.tick, entry.message["type"]) for entry in content.journal if entry.kind == "command"]
     within = [kind for tick, kind in told if 2 < tick < content.states[-1].tick]
-    assert [kind for kind in within if kind in {"pause", "resume", "stop"}] == ["pause", "resume", "stop"]
+    asked = [kind for kind in within if kind.startswith("program.")]
+    assert asked == [f"program.{command}" for command in ("play", "pause", "play", "stop")]
     assert "simulation.step" not in within
 
 
@@ -320,5 +323,5 @@ def test_unmodified_clients_of_ur_rtde_live_by_the_steps_of_another_client(tmp_p
             assert receive.isConnected()
             assert served.end() == 0
     told = [entry.message["type"] for entry in replayed(path).journal if entry.kind == "command"]
-    assert {"move_j", "stop", "set_io"} <= set(told)
+    assert {"program.play", "program.stop", "set_io"} <= set(told)
     assert told.count("simulation.step") == 2
