@@ -275,7 +275,7 @@ class SteadyFilter(Filter):
         self._past, self._sums = self._past.copy(), self._sums.copy()
 
     def _start(self) -> None:
-        self.f_d, self.zeta = self.estimator.settle(self._q_star)
+        self.f_d, self.zeta = self.estimator.settle(self._angles(self._q_star))
         done = self.design.start(self.f_d, self.zeta, self._designed)
         self.clipped = not done or self.estimator.clipped
         self._past[:] = self._designed

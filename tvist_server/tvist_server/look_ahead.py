@@ -6,7 +6,7 @@ from tvist_server.collision import CollisionModel, Meeting
 from tvist_server.control.differentiator import Floats, Target
 from tvist_server.safety import GENTLEST_STOP, TorqueRoom
 from tvist_server.stops import StopPlanner
-from tvist_server.trajectory import Stop
+from tvist_server.trajectory import Stop, Way
 
 MARGIN = 0.8
 """Share of the acceleration that the torque leaves where a stop begins, with which it is made: what it leaves changes
@@ -81,11 +81,10 @@ class LookAhead:
     def meeting(self, stop: Stop) -> Meeting | None:
         """The first pair that meets on the way of a stop."""
         _, qd, qdd = stop.at(0.0)
-        travel = self._collisions.travel(_fastest(qd, qdd, stop.jerk) * stop.duration)
+        turned = _fastest(qd, qdd, stop.jerk) * stop.duration
         before = None if self._before is None else self._before[0].q
-        found = self._collisions.on_way(
-            lambda share: stop.at(share * stop.duration)[0], travel, before=before
-        )
+        way = Way(lambda share: stop.at(share * stop.duration)[0], turned)
+        found = self._collisions.on_way(way, before=before)
         return None if found is None else found[1]
 
     def _permitted(self, state: Target) -> float | Stop | None:

@@ -136,8 +136,8 @@ class MotionControl:
         """
         self._go("move_j")
         trajectory = planned.trajectory
-        self.cycle.tvist.aim(trajectory.target)
         self.cycle.start(trajectory)
+        self.cycle.tvist.aim(trajectory.path.end)
         self._started += 1
         move = self._move = Move(self._started, trajectory, planned.velocity, self.cycle)
         self._emit("motion_started", id=move.number)
