@@ -6,6 +6,8 @@ Each runs through a whole controller; what it did is compared with the curve, an
 import numpy as np
 import pytest
 
+from tvist_lab.safety import sequences
+from tvist_lab.safety.sequences import Sequence
 from tvist_lab.safety.stops import KINDS, PAUSES, SHAPERS
 from tvist_lab.safety.subject import Subject, torques
 from tvist_plant.description import Payload
@@ -28,7 +30,7 @@ from .robots import setup as robot_setup
 DISC = paper_payload(UR5E, 5.0)
 ON = 1e-9
 """Distance from a curve that is none [rad]."""
-BACK = 1e-7
+BACK = 1e-6
 """By so much interpolation in the filter may undershoot where a motion hardly moves, on straight lines too [rad]."""
 EXCESS = 1.01
 """Share of a limit that a filter whose weights vary may reach [-]."""
@@ -214,6 +216,50 @@ def test_stops_of_curves_are_stops_and_not_only_the_motion_let_run_out():
         robot.send(c.Stop)
         sooner.append(1.0 - resting_after(played(robot)) / alone)
     assert min(sooner) > 0.3
+
+
+class OnCurves(Sequence):
+    """Random commands as ever, of which every second move goes along a curve."""
+
+    curve = None
+
+    def move(self):
+        motion = self.robot.controller.basis.motion
+        if motion is None or self._random.random() < 0.5:
+            reply = super().move()
+            self.curve = None if isinstance(reply, Accepted) else self.curve
+            return reply
+        for _ in range(20):
+            curve = random_arc(self._random, motion.q)
+            if (np.abs(curve.posture(curve.end)) < np.array(UR5E.limits.position)).all():
+                break
+        try:
+            start(self.robot, curve, Limits(**self._limits()))
+        except RefusalError as refusal:
+            return refusal.reply
+        self.curve = curve
+        return None
+
+    def _watch_way(self, ahead, q):
+        if self.curve is None:
+            super()._watch_way(ahead, q)
+            return
+        tick = self.robot.controller.tick_number - ahead.since
+        there = ahead.references[min(tick, len(ahead.references) - 1)]
+        (reached, bound), off = progress(self.curve, np.array([q, there]))
+        creeps = 1e-6 if tick >= len(ahead.references) else 0.0
+        if off > ON:
+            raise self._broken("a stop leaves the curve")
+        if reached > bound + ON + creeps:
+            raise self._broken("a stop is ahead of what the motion along a curve would have done")
+        if tick > len(ahead.references) + 1 and not self.robot.resting:
+            raise self._broken("a stop lasts longer than the motion along a curve would have")
+
+
+@pytest.mark.parametrize("number", range(12))
+def test_whatever_is_sent_the_promises_hold_on_curves(number, monkeypatch):
+    monkeypatch.setitem(sequences._SENT, "move", (14.0, OnCurves.move))
+    OnCurves(UR5E, number).run()
 
 
 @pytest.mark.parametrize("seed", range(8))
