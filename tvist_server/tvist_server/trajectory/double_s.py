@@ -39,15 +39,12 @@ class DoubleS:
             ) from error
         self.limits = limits
         """Limits that it keeps."""
+        self.duration = float(self._trajectory.duration)
+        """From rest to rest [s]."""
         # From rest to rest it is the same forwards and backwards: it brakes for as long as it accelerates.
         leading = self._trajectory.profiles[0][int(np.argmax(np.abs(end - start)))]
         self.brakes_at = self.duration - sum(leading.t[:3])
         """Until then it does not slow down [s]."""
-
-    @property
-    def duration(self) -> float:
-        """From rest to rest [s]."""
-        return float(self._trajectory.duration)
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
         """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], m numbers each."""

@@ -29,12 +29,10 @@ class TimeLaw(Protocol):
 
     limits: Limits
     """What every entry of the parameter keeps."""
+    duration: float
+    """From rest to rest [s]."""
     brakes_at: float
     """Until then it does not slow down [s]."""
-
-    @property
-    def duration(self) -> float:
-        """From rest to rest [s]."""
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
         """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], m numbers each."""
@@ -58,16 +56,13 @@ class Motion(Trajectory):
     def __init__(self, path: Path, law: TimeLaw, period: float, speed: float = 1.0) -> None:
         self.path, self._law, self._period = path, law, period
         self.limits = law.limits
+        self.duration = law.duration
+        """From rest to rest at full speed [s]."""
         self.speed = speed
         """Rate that its time is to go at, 0 to 1 [-]."""
         self._pace = Pace(law.limits, period, speed)
         # Time on the path: whole ticks at an even rate since the rate last changed, so that nothing adds up.
         self._since, self._ticks = 0.0, 0
-
-    @property
-    def duration(self) -> float:
-        """From rest to rest at full speed [s]."""
-        return self._law.duration
 
     @property
     def share(self) -> float:
