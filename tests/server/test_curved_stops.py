@@ -68,6 +68,26 @@ def test_stops_of_curves_are_stops_and_not_only_the_motion_let_run_out():
     assert min(sooner) > 0.3
 
 
+@pytest.mark.parametrize("wanted", [9.0, None])
+def test_a_stop_keeps_every_joint_within_the_deceleration_that_it_tells(wanted):
+    """The curve's own part of the acceleration counted: both are as large here as they get."""
+    hardest = []
+    for seed in (1, 2, 3, 5, 6, 7):
+        curve = curve_of(seed)
+        robot = moving(curve, "none", Limits(3.14, 8.0, 2000.0))
+        cycle = robot.controller.cycle
+        while cycle.trajectory.share < 0.5:
+            robot.tick()
+        plan = robot.controller.motion.outlook.plan_stop(wanted)
+        x = [cycle.along.published.q, cycle.along.position]
+        while not plan.trajectory.finished:
+            x.append(plan.trajectory.next())
+        q = np.array([curve.posture(each) for each in x])
+        hardest.append(np.abs(np.diff(q, 2, axis=0)).max() / H**2 / plan.acceleration)
+    assert max(hardest) <= 1.0 + 1e-6
+    assert max(hardest) > 0.6
+
+
 class OnCurves(Sequence):
     """Random commands as ever, of which every second move goes along a curve."""
 
