@@ -25,12 +25,12 @@ class AimedFilter(SteadyFilter):
         """Take the weights of where a motion will end; the reference must be at rest.
 
         Args:
-            q: Joint angles at the end [rad], shape (joints,); None: it is not known.
+            q: Sample at the end, shape (width,); None: it is not known.
         """
         if q is None:
             self._start()
             return
-        self._ask(self.estimator.settle(np.asarray(q, dtype=float)), None)
+        self._ask(self.estimator.settle(self._angles(np.asarray(q, dtype=float))), None)
         self._taps[:] = self._designed
         self._aimed = True
 

@@ -2,6 +2,7 @@
 
 import copy
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import Self
 
 import numpy as np
@@ -9,17 +10,24 @@ import numpy.typing as npt
 
 from tvist_shaping._types import Floats
 from tvist_shaping.delay_line import DelayLine
-from tvist_shaping.errors import FilterError, ShaperFailureError
+from tvist_shaping.errors import FilterError, ShaperFailureError, ShapingError
 from tvist_shaping.estimators.base import Estimator
+
+Posture = Callable[[Floats], Floats]
+"""From a sample, shape (width,), to the joint angles that it stands for, shape (joints,) [rad]."""
 
 
 class Filter(ABC):
     """Time-varying shaping of a sampled reference, one filter for all joints.
 
+    A sample is the joint angles, or the parameter of a path that the joints go along (`reset`): then the shaped
+    parameter stays a parameter, and the shaped reference on its path however that curves. The modes are always those
+    at the joint angles that the shaped sample stands for.
+
     Attributes:
         name: What it is called: of a shaper, or of a design.
         estimator: The modes as functions of q.
-        joints: Entries of a sample.
+        joints: How many joints the arm has: entries of a sample, unless samples are parameters of a path.
         period: h [s].
         f_d: Damped frequencies it works with [Hz], shape (modes,).
         zeta: Damping ratios it works with [-], shape (modes,).
@@ -47,7 +55,7 @@ class Filter(ABC):
         Args:
             name: What it is called.
             estimator: The estimator.
-            joints: Entries of a sample, >= 1.
+            joints: Joints of the arm, >= 1.
             period: Time between two samples h [s], > 0.
             capacity: Samples to keep.
 
@@ -64,7 +72,9 @@ class Filter(ABC):
         self._line = DelayLine(joints, capacity)
         self._reach = capacity
         """How many of the newest samples any weights may read."""
+        self._posture: Posture | None = None
         self._q_star: Floats = np.zeros(joints)
+        """Shaped sample of the last tick."""
 
     @property
     @abstractmethod
@@ -100,34 +110,45 @@ class Filter(ABC):
             FilterError: The two do not fit.
         """
 
-    def reset(self, q: npt.ArrayLike) -> None:
+    @property
+    def width(self) -> int:
+        """Entries of a sample."""
+        return self._line.joints
+
+    def reset(self, q: npt.ArrayLike, posture: Posture | None = None) -> None:
         """Start anew at rest: the reference has been at q for ever.
 
         Args:
-            q: Joint angles [rad], shape (joints,), finite.
+            q: First sample, finite: joint angles [rad], shape (joints,); or a parameter of a path, shape (width,).
+            posture: From a parameter to the joint angles there; None: samples are joint angles.
 
         Raises:
             ShapingError: q has another shape.
         """
-        self._line.fill(q)
-        self._q_star[:] = q
+        sample = np.asarray(q, dtype=float)
+        width = self.joints if posture is None else sample.size
+        if width != self.width:
+            self._widen(width)
+        self._posture = posture
+        self._line.fill(sample)
+        self._q_star[:] = sample
         self._start()
 
     def aim(self, q: npt.ArrayLike | None) -> None:  # noqa: B027  most filters do not care
         """Hear where the motion that begins now will end; the reference must be at rest.
 
         Args:
-            q: Joint angles at the end [rad], shape (joints,); None: it is not known, as in a stream.
+            q: Sample at the end, shape (width,); None: it is not known, as in a stream.
         """
 
     def filter(self, q_ref: npt.ArrayLike) -> Floats:
         """Shape one sample.
 
         Args:
-            q_ref: Reference x_i [rad], shape (joints,), finite.
+            q_ref: Reference x_i, shape (width,), finite: joint angles [rad], or the parameter of a path.
 
         Returns:
-            Shaped reference x*_i [rad], shape (joints,), the caller's own.
+            Shaped reference x*_i, shape (width,), the caller's own.
 
         Raises:
             ShapingError: q_ref has another shape.
@@ -160,7 +181,7 @@ class Filter(ABC):
         return self._line.still > self._reach
 
     def window(self) -> Floats:
-        """Samples of the reference that it may still read, the oldest first, shape (k, joints) [rad]."""
+        """Samples of the reference that it may still read, the oldest first, shape (k, width)."""
         return self._line.newest(self._line.capacity)
 
     def _modes(self) -> tuple[Floats, Floats]:
@@ -169,9 +190,16 @@ class Filter(ABC):
         Where the line holds one sample as far as weights may reach, and did a tick ago, so that the shaped reference
         rests on it.
         """
-        if self.settled:
-            return self.estimator.settle(self._q_star)
-        return self.estimator.estimate(self._q_star)
+        q = self._angles(self._q_star)
+        return self.estimator.settle(q) if self.settled else self.estimator.estimate(q)
+
+    def _angles(self, sample: Floats) -> Floats:
+        """Joint angles that a sample stands for, shape (joints,) [rad]."""
+        return sample if self._posture is None else self._posture(sample)
+
+    def _widen(self, width: int) -> None:
+        """Take samples of another width from now on."""
+        self._line, self._q_star = DelayLine(width, self._line.capacity), np.zeros(width)
 
     def _check_made(self) -> None:
         """Refuse a shaper that fails at once: there are no weights yet to go on with.
@@ -191,6 +219,11 @@ class Filter(ABC):
         Raises:
             ShapingError: It has other joints.
         """
-        self._line.take_over(other._line)  # noqa: SLF001  one of its own kind
+        if self.joints != other.joints:
+            raise ShapingError(f"a filter of {self.joints} joints cannot go on from one of {other.joints}")
+        if self.width != other.width:
+            self._widen(other.width)
+        self._posture = other._posture  # noqa: SLF001  one of its own kind
+        self._line.take_over(other._line)  # noqa: SLF001  likewise
         self._q_star[:] = other._q_star  # noqa: SLF001  likewise
         self._start()

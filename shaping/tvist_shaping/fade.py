@@ -223,7 +223,7 @@ class Fade:
         self.old, self.new, self.share = old, new, 0.0
         self._limits = (float(velocity), float(acceleration), float(jerk), float(old.period))
         self._rate, self._slope, self._later = 0.0, 0.0, 0.0
-        self._history: Floats = np.zeros((3, 3, old.joints))
+        self._history: Floats = np.zeros((3, 3, old.width))
         self._ticks = 0
 
     def __repr__(self) -> str:
@@ -247,10 +247,10 @@ class Fade:
         """Shape one sample.
 
         Args:
-            q_ref: Reference x_i [rad], shape (joints,), finite.
+            q_ref: Reference x_i, shape (width,), finite: joint angles [rad], or the parameter of a path.
 
         Returns:
-            Shaped reference x*_i [rad], shape (joints,), the caller's own.
+            Shaped reference x*_i, shape (width,), the caller's own.
 
         Raises:
             ShapingError: q_ref has another shape.

@@ -20,7 +20,8 @@ class TvistFilter(Filter):
 
     (eq. (10)): the impulses of *this* tick gather samples of the past. Their sum is 1 at every tick, so a
     reference at rest passes unchanged whatever the parameters do, and the last value is the reference's own.
-    All joints get the same impulses: a straight line in joint space stays one.
+    All joints get the same impulses: a straight line in joint space stays one. A curve stays one where its parameter is
+    shaped (`reset`).
 
     Attributes:
         shaper: The shaper.
@@ -150,7 +151,7 @@ class TvistFilter(Filter):
         return self.replace(estimator=estimator)
 
     def _start(self) -> None:
-        self._suppress(self.estimator.settle(self._q_star))
+        self._suppress(self.estimator.settle(self._angles(self._q_star)))
 
     def _suppress(self, modes: tuple[Floats, Floats]) -> None:
         """Impulses for these modes."""

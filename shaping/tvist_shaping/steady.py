@@ -283,7 +283,7 @@ class SteadyFilter(Filter):
         self._past, self._sums = self._past.copy(), self._sums.copy()
 
     def _start(self) -> None:
-        self._ask(self.estimator.settle(self._q_star), None)
+        self._ask(self.estimator.settle(self._angles(self._q_star)), None)
         self._past[:] = self._designed
         self._sums[:] = self._designed * self._smooth
         self._taps[:] = self._designed

@@ -10,7 +10,7 @@ import pytest
 from tvist_lab.safety import sequences, stops
 from tvist_lab.safety.report import Counts, broken, search
 from tvist_plant.description import load
-from tvist_server.trajectory import LineStop
+from tvist_server.trajectory import PathStop
 
 UR5E = load("ur5e")
 
@@ -32,16 +32,16 @@ def test_equal_numbers_are_equal_cases():
 
 def test_a_stop_that_overshoots_is_found(monkeypatch):
     """A stop that goes on at its first velocity for ten ticks breaks the promise, and every search says so."""
-    honest = LineStop.next
+    honest = PathStop.next
 
     def late(self):
         self._wasted = getattr(self, "_wasted", 0) + 1
         if self._wasted <= 10:
-            q, qd, _ = self.at(0.002)
-            return q + 0.002 * self._wasted * qd * 1.5
+            q, qd, _ = self.states(np.array([0.002]))
+            return q[0] + 0.002 * self._wasted * qd[0] * 1.5
         return honest(self)
 
-    monkeypatch.setattr(LineStop, "next", late)
+    monkeypatch.setattr(PathStop, "next", late)
     found = [stops.judge(UR5E, stops.draw(UR5E, number, ("plain", "power off"))) for number in range(8)]
     assert any(not outcome.kept for outcome in found)
 

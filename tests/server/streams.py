@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tvist_server.trajectory import DoubleS, Limits
+from tvist_server.trajectory import JointLine, Limits, quickest_motion
 
 from .robots import H
 
@@ -53,13 +53,16 @@ def peaks(out, limits):
 def there_and_back(limits: Limits, way=(1.4, -1.0, 0.8, -0.5, 0.3, 2.0), dwell=0.3):
     """A double-S there, a rest, and one back, again and again; positions by times."""
     target, start = np.array(way), np.zeros(len(way))
-    go, back = DoubleS(start, target, limits, H), DoubleS(target, start, limits, H)
+    go, back = (
+        quickest_motion(JointLine(start, target), limits, H),
+        quickest_motion(JointLine(target, start), limits, H),
+    )
     turn, cycle = go.duration + dwell, 2 * (go.duration + dwell)
 
     def at(time):
         time = max(time, 0.0) % cycle
         motion, since = (go, time) if time < turn else (back, time - turn)
-        return motion._trajectory.at_time(min(since, motion.duration))[0]
+        return motion._law.at(min(since, motion.duration))[0]
 
     return lambda times: np.array([at(time) for time in times])
 

@@ -12,6 +12,7 @@ from tvist_plant.model import link_frame, rigid_model
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_server.collision import CLEARANCE, CollisionModel
+from tvist_server.trajectory import JointLine
 
 from .robots import UR5E, Robot
 
@@ -77,8 +78,7 @@ def test_meetings_are_those_of_an_independent_geometry(model):
 
 def test_the_papers_motions_are_free(model):
     for start, end in ((Q1, Q2), (Q1, Q3), (Q3, Q1)):
-        way = end - start
-        assert model.on_way(lambda share, a=start, w=way: a + share * w, np.abs(way).sum()) is None
+        assert model.on_way(JointLine(start, end).whole) is None
 
 
 def test_a_way_that_is_found_free_is_free_by_small_steps(model):
@@ -86,7 +86,7 @@ def test_a_way_that_is_found_free_is_free_by_small_steps(model):
     free = 0
     for start, end in itertools.pairwise(poses):
         way = end - start
-        found = model.on_way(lambda share, a=start, w=way: a + share * w, np.abs(way).sum())
+        found = model.on_way(JointLine(start, end).whole)
         fine = [model.meeting(start + share * way) for share in np.linspace(0.0, 1.0, 400)]
         deepest = min((meeting.distance for meeting in fine if meeting is not None), default=CLEARANCE)
         if found is None:

@@ -6,7 +6,7 @@ import pytest
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RuntimeState
 from tvist_protocol.replies import Accepted, Done
-from tvist_server.trajectory import DoubleS, Limits
+from tvist_server.trajectory import JointLine, Limits, quickest_motion
 
 from .robots import PAPER, Q1, Q3, H, Robot
 
@@ -16,7 +16,7 @@ TOLERANCE = 1.002
 
 def played(speeds, limits=PAPER, most=20_000):
     """A motion from Q1 to Q3 with the speed given at each tick; positions, and rates after each tick."""
-    motion = DoubleS(Q1, Q3, limits, H)
+    motion = quickest_motion(JointLine(Q1, Q3), limits, H)
     q, rates = [Q1, Q1], []
     for tick in range(most):
         motion.speed = speeds(tick)

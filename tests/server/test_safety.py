@@ -10,7 +10,7 @@ from tvist_server.control.differentiator import Target
 from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.safety import GENTLEST_STOP, TORQUE_SHARE, StopTorque, acceleration_on_way, largest_torque
 from tvist_server.stops import STEP, StopPlanner
-from tvist_server.trajectory import DoubleS, Limits
+from tvist_server.trajectory import JointLine, Limits, quickest_motion
 
 from .robots import Q1, Q3, UR5E, H, Robot
 
@@ -147,8 +147,8 @@ def test_no_motion_takes_more_torque_than_the_bound_of_its_way(seed):
     start, target = random.uniform(-2, 2, (2, 6))
     limits = Limits(random.uniform(0.5, 3.1), random.uniform(1.0, 8.0), 2000.0)
     dynamics = InverseDynamics(UR5E, DISC)
-    bound = largest_torque(dynamics, start, target - start, limits.velocity, limits.acceleration)
-    motion, q = DoubleS(start, target, limits, H), [start, start]
+    bound = largest_torque(dynamics, JointLine(start, target), limits.velocity, limits.acceleration)
+    motion, q = quickest_motion(JointLine(start, target), limits, H), [start, start]
     while not motion.finished:
         q.append(motion.next())
     q = np.array(q)
@@ -161,6 +161,7 @@ def test_no_motion_takes_more_torque_than_the_bound_of_its_way(seed):
 def test_the_acceleration_that_a_way_leaves_is_that_at_which_its_bound_is_the_share():
     start, way = np.array(Q1), np.array([0.5, 0.4, -0.3, 0.0, 0.2, 0.0])
     dynamics, limits = InverseDynamics(UR5E, DISC), np.array(LIMITS.torque)
-    room = acceleration_on_way(dynamics, start, way, 0.5, limits)
-    bound = largest_torque(dynamics, start, way, 0.5, room)
+    line = JointLine(start, start + way)
+    room = acceleration_on_way(dynamics, line, start, way, 0.5, limits)
+    bound = largest_torque(dynamics, line, 0.5, room)
     assert (bound / limits).max() == pytest.approx(TORQUE_SHARE, rel=1e-6)

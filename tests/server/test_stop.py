@@ -6,7 +6,7 @@ import pytest
 from tvist_lab.safety.stops import draw, judge
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted
-from tvist_server.trajectory import DoubleS, Limits, LineStop, Stop
+from tvist_server.trajectory import JointLine, Limits, PathStop, Stop, quickest_motion
 
 from .robots import PAPER, Q1, Q2, Q3, ROUNDING, UR5E, H, Robot, calibration, stop, without_arm
 
@@ -169,7 +169,7 @@ def test_a_stop_on_a_line_is_at_no_moment_ahead_of_any_motion_within_its_limits(
     """Against the rest of a double S with lower limits, from a random moment of it."""
     random = np.random.default_rng(seed)
     limits = Limits(random.uniform(0.5, 3.0), random.uniform(1.0, 8.0), random.uniform(50.0, 2000.0))
-    motion, q = DoubleS(Q1, Q3, limits, H), [Q1, Q1]
+    motion, q = quickest_motion(JointLine(Q1, Q3), limits, H), [Q1, Q1]
     while not motion.finished:
         q.append(motion.next())
     q = np.array([*q, *[q[-1]] * 3])
@@ -178,7 +178,10 @@ def test_a_stop_on_a_line_is_at_no_moment_ahead_of_any_motion_within_its_limits(
         before, at, after = q[moment - 1 : moment + 2]
         qdd = (after - 2 * at + before) / H**2
         acceleration = random.uniform(1.0, 5.0) * limits.acceleration
-        stop = LineStop(after, after - at, qdd, direction, acceleration=acceleration, jerk=2000.0, period=H)
+        stop = PathStop(
+            JointLine(Q1, Q3), after, after - at, qdd,
+            acceleration=acceleration, braking=acceleration, jerk=2000.0, period=H,
+        )  # fmt: skip
         ahead = q[moment + 2 :]
         stopped = np.array([stop.next() for _ in ahead])
         leading = int(np.argmax(np.abs(direction)))

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tvist_server.trajectory import DoubleS, Limits, Rest
+from tvist_server.trajectory import JointLine, Limits, Motion, Rest, quickest_motion
 
 from .robots import PAPER, Q1, Q2, Q3, H
 
@@ -15,7 +15,7 @@ MOTIONS = [(Q1, Q2, 1.8172), (Q1, Q3, 2.5153), (Q3, Q1, 2.5153)]
 angles = st.floats(-6.28, 6.28)
 
 
-def played(motion: DoubleS, start) -> np.ndarray:
+def played(motion: Motion, start) -> np.ndarray:
     """All references, the start first and the target for some ticks at the end."""
     points = [start]
     while not motion.finished:
@@ -25,7 +25,7 @@ def played(motion: DoubleS, start) -> np.ndarray:
 
 @pytest.mark.parametrize(("start", "target", "duration"), MOTIONS)
 def test_durations_are_the_analytic_ones(start, target, duration):
-    assert DoubleS(start, target, PAPER, H).duration == pytest.approx(duration, abs=1e-3)
+    assert quickest_motion(JointLine(start, target), PAPER, H).duration == pytest.approx(duration, abs=1e-3)
 
 
 @pytest.mark.parametrize(("start", "target", "duration"), MOTIONS)
@@ -33,12 +33,14 @@ def test_duration_follows_the_textbook(start, target, duration):
     """Biagiotti and Melchiorri 2008, sec. 3.4, with the velocity limit reached."""
     way = np.abs(target - start).max()
     v, a, j = PAPER.velocity, PAPER.acceleration, PAPER.jerk
-    assert DoubleS(start, target, PAPER, H).duration == pytest.approx(way / v + v / a + a / j, rel=1e-12)
+    assert quickest_motion(JointLine(start, target), PAPER, H).duration == pytest.approx(
+        way / v + v / a + a / j, rel=1e-12
+    )
 
 
 @pytest.mark.parametrize(("start", "target", "duration"), MOTIONS)
 def test_on_the_tick_grid_the_target_is_reached_at_the_first_tick_after_the_end(start, target, duration):
-    points = played(DoubleS(start, target, PAPER, H), start)
+    points = played(quickest_motion(JointLine(start, target), PAPER, H), start)
     arrived = np.flatnonzero((points == target).all(axis=1))[0]
     assert arrived == ceil(duration / H)
     assert (points[arrived:] == target).all()
@@ -46,7 +48,7 @@ def test_on_the_tick_grid_the_target_is_reached_at_the_first_tick_after_the_end(
 
 @pytest.mark.parametrize(("start", "target"), [(Q1, Q3), (np.zeros(6), np.array([1, -2, 3, 0, 1e-3, -0.5]))])
 def test_joints_are_in_phase(start, target):
-    points = played(DoubleS(start, target, PAPER, H), start)
+    points = played(quickest_motion(JointLine(start, target), PAPER, H), start)
     share = (points - start) @ (target - start) / np.sum((target - start) ** 2)
     assert np.abs(points - (start + share[:, None] * (target - start))).max() < 1e-12
     assert (np.diff(share) > -1e-13).all()
@@ -66,7 +68,7 @@ def test_limits_hold_by_differences_and_the_end_is_exact(ends, velocity, acceler
     of ruckig's own polynomials is some ten times more.
     """
     start, target = np.array(ends).T
-    motion = DoubleS(start, target, Limits(velocity, acceleration, jerk), H)
+    motion = quickest_motion(JointLine(start, target), Limits(velocity, acceleration, jerk), H)
     assert motion.duration < 300.0
     points = played(motion, start)
     assert (points[-1] == target).all()
@@ -77,7 +79,7 @@ def test_limits_hold_by_differences_and_the_end_is_exact(ends, velocity, acceler
 
 
 def test_a_way_of_zero_length_is_over_at_once():
-    motion = DoubleS(Q1, Q1, PAPER, H)
+    motion = quickest_motion(JointLine(Q1, Q1), PAPER, H)
     assert motion.finished
     assert motion.duration == 0.0
     assert (motion.next() == Q1).all()
@@ -85,7 +87,7 @@ def test_a_way_of_zero_length_is_over_at_once():
 
 def test_a_motion_of_hours_is_an_error_with_the_limits_in_it():
     with pytest.raises(ValueError, match="velocity 1e-05, acceleration 2, jerk 100"):
-        DoubleS(Q1, Q2, Limits(1e-5, 2.0, 100.0), H)
+        quickest_motion(JointLine(Q1, Q2), Limits(1e-5, 2.0, 100.0), H)
 
 
 def test_rest_stays():

@@ -266,7 +266,7 @@ def test_limits_out_of_range_are_refused_by_name(limits):
 
 def test_filters_that_do_not_go_together_are_refused():
     one, two = (TvistFilter(shaper("zv"), Fixed([7.0], [0.1]), joints=joints) for joints in (1, 2))
-    with pytest.raises(ShapingError, match="shape"):
+    with pytest.raises(ShapingError, match="2 joints cannot go on from one of 1"):
         fade(one, two)
     slow = TvistFilter(shaper("zv"), Fixed([7.0], [0.1]), joints=1, period=0.004)
     with pytest.raises(FilterError, match="period"):

@@ -235,7 +235,9 @@ def test_a_program_of_the_dashboard_reaches_its_end_within_one_step_of_another_c
     told = [entry for entry in replayed(tmp_path / "run.mcap").journal if entry.kind == "command"]
     assert [entry.tick for entry in told if entry.message["type"] == "simulation.step"] == [1, 2]
     assert [entry.tick for entry in told if entry.message["type"] == "program.play"] == [2]
-    assert "move_j" not in {entry.message["type"] for entry in told}  # a replay makes the program's moves again
+    assert "move_j" not in {
+        entry.message["type"] for entry in told
+    }  # a replay makes the program's moves again
     started = [event["tick"] for event in stepper.received["event"] if event["kind"] == "motion_started"]
     assert started[0] == 2
     assert len(set(started)) == lines

@@ -4,7 +4,8 @@ from functools import cached_property
 
 import numpy as np
 
-from tvist_server.control.differentiator import Differentiator, Floats
+from tvist_server.control.differentiator import Floats
+from tvist_server.control.shaped_reference import ShapedReference
 from tvist_server.cycle import STILL, rests
 from tvist_server.line_filter import LineFilter
 from tvist_server.trajectory import Trajectory
@@ -19,14 +20,16 @@ class Ahead:
     Args:
         trajectory: What is followed; it is used up.
         line_filter: What shapes it, used up likewise; None for a stop, which bypasses it.
-        differentiator: Where the shaped reference is, used up likewise.
+        shaped: Where the shaped reference is, used up likewise.
     """
 
     def __init__(
-        self, trajectory: Trajectory, line_filter: LineFilter | None, differentiator: Differentiator
+        self, trajectory: Trajectory, line_filter: LineFilter | None, shaped: ShapedReference
     ) -> None:
-        self._trajectory, self._line_filter, self._differentiator = trajectory, line_filter, differentiator
-        self.references: list[Floats] = [differentiator.published.q, differentiator.position]
+        self._trajectory, self._line_filter, self._shaped = trajectory, line_filter, shaped
+        self.samples: list[Floats] = [shaped.along.published.q, shaped.along.position]
+        """Samples of the shaped reference: the parameter of its path, or as `references`; as many as these."""
+        self.references: list[Floats] = [shaped.joints.published.q, shaped.joints.position]
         """The two shaped references played last and those to come, one a tick, each of shape (n,) [rad]."""
         self.rests = False
         """Whether the last of them rests: then there are no more."""
@@ -35,12 +38,13 @@ class Ahead:
         """Run on until so many references to come are known, or they rest."""
         trajectory, line_filter = self._trajectory, self._line_filter
         while not self.rests and len(self.references) < ticks + 2:
-            reference = trajectory.next()
-            shaped = reference if line_filter is None else line_filter.filter(reference)
-            target = self._differentiator.update(shaped)
-            self.references.append(shaped)
+            x = trajectory.next()
+            x_star = x if line_filter is None else line_filter.filter(x)
+            target = self._shaped.update(x_star)
+            self.samples.append(x_star)
+            self.references.append(self._shaped.joints.position)
             settled = line_filter is None or line_filter.settled
-            self.rests = trajectory.standing and settled and rests(reference, target)
+            self.rests = trajectory.standing and settled and rests(self._shaped.posture(x), target)
 
     @cached_property
     def last(self) -> int:

@@ -1,7 +1,6 @@
 """Where the arm would meet itself or the floor: capsules of the robot file, distances by coal."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -12,6 +11,7 @@ import pinocchio as pin
 from tvist_plant.description import Body, Payload, RobotDescription
 from tvist_plant.model import FLANGE, link_frame, rigid_model
 from tvist_server.control.differentiator import Floats
+from tvist_server.trajectory import Way
 
 CLEARANCE = 0.005
 """Least distance between two bodies [m]."""
@@ -75,28 +75,21 @@ class CollisionModel:
         """
         return self._nearest(q) if self._within(self._fine, q) else None
 
-    def on_line(self, start: Floats, end: Floats) -> tuple[float, Meeting] | None:
-        """The first meeting on the straight line between two postures; see `on_way`."""
-        way = end - start
-        return self.on_way(lambda share: start + share * way, self.travel(way))
-
-    def on_way(
-        self, way: Callable[[float], Floats], travel: float, *, before: Floats | None = None
-    ) -> tuple[float, Meeting] | None:
+    def on_way(self, way: Way, *, before: Floats | None = None) -> tuple[float, Meeting] | None:
         """The first meeting on a way, found by long steps where everything is far apart and short ones elsewhere.
 
         Args:
-            way: Share of the way, 0 to 1, to joint positions of shape (n,) [rad].
-            travel: No point of the arm travels farther on it [m], nor on a part of it than this times the share.
+            way: Where it goes; `Path.whole` and `Path.way` give those of a path.
             before: Posture that the way begins from, shape (n,) [rad]: what is in a meeting there may move out of it.
                 None: the beginning of the way itself.
 
         Returns:
             Share of the way and the pair; None where it is free.
         """
-        share, escaping = 0.0, self.meeting(way(0.0) if before is None else before)
+        travel = self.travel(way.turned)
+        share, escaping = 0.0, self.meeting(way.at(0.0) if before is None else before)
         while True:
-            q = way(share)
+            q = way.at(share)
             step = FAR - CLEARANCE
             if self._within(self._coarse, q):
                 nearest = self._nearest(q)

@@ -11,10 +11,20 @@ from tvist_plant.plant import PERIOD, Measurement, Plant, check_measurement
 from tvist_server.control.differentiator import Differentiator, Floats, Target
 from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.control.joint_controllers import JointControllers
+from tvist_server.control.shaped_reference import ShapedReference
 from tvist_server.line_filter import LineFilter
 from tvist_server.look_ahead import LookAhead
 from tvist_server.safety import TorqueRoom
-from tvist_server.trajectory import DoubleS, Limits, Rest, SetpointStream, Stop, Trajectory
+from tvist_server.trajectory import (
+    JointLine,
+    Limits,
+    Motion,
+    Rest,
+    SetpointStream,
+    Stop,
+    Trajectory,
+    quickest_motion,
+)
 from tvist_shaping.base import Filter
 
 T = TypeVar("T", bound=Trajectory)
@@ -72,7 +82,7 @@ class ControlCycle:
         self._plant: Plant = FlexibleArm(description, carried) if plant is None else plant
         self.inverse_dynamics = InverseDynamics(description, declared)
         self._joint_controllers = JointControllers(description, PERIOD)
-        self._differentiator = Differentiator(q, PERIOD)
+        self._shaped = ShapedReference(q, PERIOD)
         self.trajectory: Trajectory = Rest(q)
         self.reference = q
         """Newest one before shaping, shape (n,) [rad]."""
@@ -104,12 +114,12 @@ class ControlCycle:
 
     def step(self) -> Sample:
         """One tick."""
-        reference = self.trajectory.next()  # q [rad]
-        shaped = reference if self.stopping else self.line_filter.filter(reference)  # q* [rad]
+        x = self.trajectory.next()  # a path's parameter, or q itself [rad]
+        x_star = x if self.stopping else self.line_filter.filter(x)  # x* [rad]
         if self.guard is not None:
-            reference, shaped = self._guarded(self.guard, reference, shaped)
-        self.reference = reference
-        target = self._differentiator.update(shaped)  # q*, q̇*, q̈* of the tick before
+            x, x_star = self._guarded(self.guard, x, x_star)
+        self.reference = reference = self._shaped.posture(x)  # q [rad]
+        target = self._shaped.update(x_star)  # q*, q̇*, q̈* of the tick before
         self.inverse_dynamics.advance()
         torque = self.inverse_dynamics.torque(target.q, target.qd, target.qdd)  # τ* [N m]
         gravity = self.inverse_dynamics.gravity(target.q)
@@ -119,8 +129,8 @@ class ControlCycle:
         return Sample(reference, target, torque, command.torque, measured)
 
     def _guarded(self, guard: LookAhead, reference: Floats, shaped: Floats) -> tuple[Floats, Floats]:
-        """What is played in place of a reference from which no stop would be clear."""
-        stop = None if self.stopping else guard(self._differentiator.after(shaped))
+        """What is played in place of a stream's reference from which no stop would be clear."""
+        stop = None if self.stopping else guard(self._shaped.joints.after(shaped))
         if stop is None:
             return reference, shaped
         self.bypass(stop)
@@ -147,18 +157,20 @@ class ControlCycle:
             return
         if not ((self.stopping or self.line_filter.settled) and rests(reference, target)):
             return
-        if self.stopping:  # the delay line starts anew from where the stop ended
+        leaves = self._shaped.posture_of is not None
+        if self.stopping or leaves:  # the delay line starts anew from where it ended
+            self._shaped.enter(None, reference)
             self.line_filter.begin(self.tvist, reference)
-        if not trajectory.finished:  # what ran out was paused: it goes no further
+        if leaves or not trajectory.finished:  # what ran out was paused: it goes no further
             self.trajectory = Rest(reference)
         self.at_rest, self.stopping, self.running_out, self.guard = True, False, False, None
 
     @property
     def position(self) -> Floats:
         """Where the shaped reference is, shape (n,) [rad]."""
-        return self._differentiator.position
+        return self._shaped.joints.position
 
-    def plan(self, target: Floats, limits: Limits, speed: float = 1.0) -> DoubleS:
+    def plan(self, target: Floats, limits: Limits, speed: float = 1.0) -> Motion:
         """A point-to-point motion from where the reference is; the arm must be at rest.
 
         Args:
@@ -169,7 +181,7 @@ class ControlCycle:
         Raises:
             ValueError: There is no such motion.
         """
-        return DoubleS(self.reference, target, limits, PERIOD, speed)
+        return quickest_motion(JointLine(self.reference, target), limits, PERIOD, speed)
 
     def stream(self, stream_period: float, limits: Limits) -> SetpointStream:
         """Start to follow set-points; the arm must be at rest."""
@@ -181,11 +193,14 @@ class ControlCycle:
         )
 
     def start(self, trajectory: T) -> T:
-        """Follow a trajectory that begins where the reference is."""
-        self.trajectory = trajectory
-        if isinstance(trajectory, DoubleS | SetpointStream):
+        """Follow a trajectory that begins where the reference is; one on another path than before begins at rest."""
+        path = trajectory.path
+        if path is not None and path.posture_of != self._shaped.posture_of:
+            self._shaped.enter(path.posture_of, path.start)
+            self.line_filter.begin(self.tvist, path.start, path.posture_of)
+        if trajectory.limits is not None:
             self.line_filter.limits = trajectory.limits
-        self.at_rest = False
+        self.trajectory, self.at_rest = trajectory, False
         return trajectory
 
     def end_of(self, stream: SetpointStream) -> Stop:
@@ -195,17 +210,17 @@ class ControlCycle:
 
     @property
     def newest(self) -> Target:
-        """State of motion of the newest shaped reference."""
-        return self._differentiator.newest
+        """State of motion of the joints at the newest shaped reference."""
+        return self._shaped.joints.newest
 
     @property
-    def published(self) -> Target:
-        """State of motion a tick before, as the last target says it."""
-        return self._differentiator.published
+    def along(self) -> Differentiator:
+        """State of motion of the filter's samples: of a path's parameter, or of the joints."""
+        return self._shaped.along
 
-    def fork(self) -> tuple[Trajectory, LineFilter, Differentiator]:
+    def fork(self) -> tuple[Trajectory, LineFilter, ShapedReference]:
         """Copies of the line's parts that make targets, to be run ahead."""
-        return self.trajectory.fork(), self.line_filter.fork(), self._differentiator.fork()
+        return self.trajectory.fork(), self.line_filter.fork(), self._shaped.fork()
 
     def run_out(self) -> None:
         """Come to rest by letting what is under way go on: where it is paused it goes no further."""
@@ -217,7 +232,9 @@ class ControlCycle:
         Args:
             stop: Continues the shaped reference.
         """
-        self.start(stop)
+        self.trajectory, self.at_rest = stop, False
+        if stop.path is None:
+            self._shaped.enter(None, self.position)
         self.line_filter.cut()
         self.stopping, self.running_out = True, False
 
@@ -227,7 +244,7 @@ class ControlCycle:
         self.at_rest, self.stopping, self.running_out, self.guard = True, False, False, None
         self.inverse_dynamics.settle()
         self.line_filter.begin(self.tvist, q)
-        self._differentiator.reset(q)
+        self._shaped.reset(q)
         self._joint_controllers.reset()
         still = np.zeros_like(q)
         torque = self.inverse_dynamics.gravity(q)

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 
 from tvist_server.control.differentiator import Floats
-from tvist_server.trajectory import Limits
+from tvist_server.trajectory import Limits, Posture
 from tvist_shaping.base import Filter
 from tvist_shaping.fade import Fade
 
@@ -53,7 +53,7 @@ class LineFilter:
         return self.tvist.peak if fade is None else max(self.tvist.peak, fade.old.peak, fade.new.peak)
 
     def filter(self, reference: Floats) -> Floats:
-        """Shaped reference, on the way from one filter to another where there is one."""
+        """Shaped sample, on the way from one filter to another where there is one."""
         fade = self._fade
         if fade is None:
             return self.tvist.filter(reference)
@@ -70,7 +70,7 @@ class LineFilter:
         While one change is under way the next waits for its turn; of several that wait the newest does.
 
         Args:
-            tvist: The filter to come; its joints and period are the present one's.
+            tvist: The filter to come; its joints and period are the present one's. It goes on with the present path.
         """
         fade = self._fade
         if fade is None or fade.share == 0.0:
@@ -83,10 +83,16 @@ class LineFilter:
         """Be bypassed: what fades is dropped, and the next use begins from rest."""
         self._fade = None
 
-    def begin(self, tvist: Filter, q: Floats) -> None:
-        """Use a filter from rest at q, shape (n,) [rad]."""
+    def begin(self, tvist: Filter, sample: Floats, posture_of: Posture | None = None) -> None:
+        """Use a filter from rest.
+
+        Args:
+            tvist: The filter.
+            sample: Where the reference rests: joint positions, shape (n,), or a path's parameter, shape (m,) [rad].
+            posture_of: From a path's parameter to joint positions; None: samples are joint positions.
+        """
         self.tvist, self._fade = tvist, None
-        tvist.reset(q)
+        tvist.reset(sample, posture_of)
 
     def fork(self) -> Self:
         """An independent copy that goes on from here."""
@@ -107,7 +113,7 @@ class LineFilter:
         self.begin(self.tvist, q)
 
     def window(self) -> Floats:
-        """Samples that the filters may still read, the oldest first, shape (k, n) [rad]."""
+        """Samples that the filters may still read, the oldest first, shape (k, m) [rad]."""
         filters = [self.tvist] if self._fade is None else [self._fade.old, self._fade.new, self.tvist]
         return np.concatenate([tvist.window() for tvist in filters])
 

@@ -1,12 +1,15 @@
 """Streams of set-points: nothing is played from which no stop would be clear."""
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from tvist_server.collision import CollisionModel, Meeting
 from tvist_server.control.differentiator import Floats, Target
 from tvist_server.safety import GENTLEST_STOP, TorqueRoom
 from tvist_server.stops import StopPlanner
-from tvist_server.trajectory import Stop
+from tvist_server.trajectory import Stop, Way
 
 MARGIN = 0.8
 """Share of the acceleration that the torque leaves where a stop begins, with which it is made: what it leaves changes
@@ -35,14 +38,14 @@ class LookAhead:
         self._centre: Floats | None = None
         self._room = 0.0
         self._carried = collisions.carried
-        self._before: tuple[Target, float | Stop] | None = None
+        self._before: tuple[Target, Callable[[], Stop]] | None = None
         self._acceleration, self._age = GENTLEST_STOP, FRESH
         self.met: Meeting | None = None
         """What the reference that was refused last would have led to."""
 
     def begin(self, state: Target) -> None:
         """Start from rest."""
-        self._before, self.met = (state, GENTLEST_STOP), None
+        self._before, self.met = (state, self._within(state, GENTLEST_STOP)), None
         self._acceleration, self._age = GENTLEST_STOP, FRESH
 
     def __call__(self, state: Target) -> Stop | None:
@@ -62,13 +65,12 @@ class LookAhead:
 
     def take(self, state: Target, stop: Stop) -> None:
         """From now on this is the stop that is known to be clear, from the state of the newest reference."""
-        self._before = state, stop
+        self._before = state, lambda: stop
 
     def fallback(self) -> Stop:
         """The stop from the state of motion of the reference that was played last, which is known to be clear."""
         assert self._before is not None, "begin comes first"
-        state, stop = self._before
-        return stop if isinstance(stop, Stop) else self._stops.stop(state, stop)
+        return self._before[1]()
 
     def clear(self, stop: Stop) -> bool:
         """Whether nothing meets on the whole way of a stop."""
@@ -81,26 +83,28 @@ class LookAhead:
     def meeting(self, stop: Stop) -> Meeting | None:
         """The first pair that meets on the way of a stop."""
         _, qd, qdd = stop.at(0.0)
-        travel = self._collisions.travel(_fastest(qd, qdd, stop.jerk) * stop.duration)
+        turned = _fastest(qd, qdd, stop.jerk) * stop.duration
         before = None if self._before is None else self._before[0].q
-        found = self._collisions.on_way(
-            lambda share: stop.at(share * stop.duration)[0], travel, before=before
-        )
+        way = Way(lambda share: stop.at(share * stop.duration)[0], turned)
+        found = self._collisions.on_way(way, before=before)
         return None if found is None else found[1]
 
-    def _permitted(self, state: Target) -> float | Stop | None:
-        """The limit of a stop that is clear, or the stop; None where there is none."""
+    def _within(self, state: Target, acceleration: float) -> Callable[[], Stop]:
+        """Makes a stop, once it is wanted."""
+        return partial(self._stops.stop, state, acceleration)
+
+    def _permitted(self, state: Target) -> Callable[[], Stop] | None:
+        """Gives a stop that is clear; None where there is none."""
         self._age += 1
         if self._age <= FRESH and self._is_spacious_for(state):
-            return self._acceleration
+            return self._within(state, self._acceleration)
         allowed = MARGIN * self._torque.acceleration(state.q, state.qd)
         self._acceleration, self._age = min(max(allowed, GENTLEST_STOP), self._stops.highest), 0
         if self._is_spacious_for(state):
-            return self._acceleration
+            return self._within(state, self._acceleration)
         stop = self._stops.stop(state, self._acceleration)
-        if self.clear(stop):
-            return stop
-        return self._stops.by_joints(state, None, self.clear)
+        found = stop if self.clear(stop) else self._stops.by_joints(state, None, self.clear)
+        return None if found is None else lambda: found
 
     def _is_spacious_for(self, state: Target) -> bool:
         return self.is_spacious(state.q, self.turned(state.qd, state.qdd, self._acceleration))

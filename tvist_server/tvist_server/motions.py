@@ -42,8 +42,8 @@ class Motions:
     def begin(self, planned: PlannedMove) -> int:
         """Start a motion; its number."""
         trajectory = planned.trajectory
-        self._cycle.tvist.aim(trajectory.target)
         self._cycle.start(trajectory)
+        self._cycle.tvist.aim(trajectory.path.end)
         self._started += 1
         move = self._move = Move(self._started, trajectory, planned.velocity, self._cycle)
         self._emit("motion_started", id=move.number)

@@ -4,7 +4,7 @@ import numpy as np
 
 from tvist_server.cycle import STILL, ControlCycle
 from tvist_server.safety import acceleration_on_way
-from tvist_server.trajectory import DoubleS
+from tvist_server.trajectory import Motion
 
 PAUSE_SHARE = 0.95
 """Share of the acceleration that torque leaves on the way that a pause uses: the filter may add a little [-]."""
@@ -22,7 +22,7 @@ class Move:
         cycle: The control line.
     """
 
-    def __init__(self, number: int, trajectory: DoubleS, velocity: float, cycle: ControlCycle) -> None:
+    def __init__(self, number: int, trajectory: Motion, velocity: float, cycle: ControlCycle) -> None:
         self.number, self.velocity = number, velocity
         self._trajectory, self._cycle = trajectory, cycle
         self._held = False
@@ -38,17 +38,20 @@ class Move:
             self._trajectory.speed = rate
 
     def hold(self) -> None:
-        """Slow down to a standstill within the torque, where that ends it sooner; see `DoubleS.hold`."""
+        """Slow down to a standstill within the torque, where that ends it sooner; see `Motion.hold`."""
         if self._held:
             return
         trajectory, cycle = self._trajectory, self._cycle
         most = trajectory.limits.acceleration
-        speed = max(trajectory.velocity, float(np.abs(cycle.newest.qd).max()))
-        left = trajectory.target - cycle.position
+        newest = cycle.along.newest
+        speed = max(trajectory.velocity, float(np.abs(newest.qd).max()))
+        left = trajectory.path.end - newest.q
         farthest = float(np.abs(left).max())
         way = left * min(speed * speed / (most * max(farthest, STILL)), 1.0)
         limits = np.array(cycle.description.limits.torque)
-        room = PAUSE_SHARE * acceleration_on_way(cycle.inverse_dynamics, cycle.position, way, speed, limits)
+        room = PAUSE_SHARE * acceleration_on_way(
+            cycle.inverse_dynamics, trajectory.path, newest.q, way, speed, limits
+        )
         if not trajectory.steady:  # the slider has it brake or hurry already, with all that it may
             room = most
         self._held = room > LEAST_PAUSE * most and trajectory.hold(min(room, most))

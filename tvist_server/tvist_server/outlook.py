@@ -10,7 +10,7 @@ from tvist_server.ahead import MOST_AHEAD, Ahead
 from tvist_server.control.differentiator import Floats
 from tvist_server.cycle import ControlCycle
 from tvist_server.stops import StopPlan, StopPlanner
-from tvist_server.trajectory import Line, LineStop, Stop, Trajectory
+from tvist_server.trajectory import Forecast, PathStop, Stop, Trajectory
 from tvist_shaping.base import Filter
 
 EVEN = 1e-12
@@ -52,11 +52,11 @@ class Outlook:
     def _ahead(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Ahead:
         """As `foresee`, to be run as far as one likes."""
         stopping = self._cycle.stopping
-        present, line_filter, differentiator = self._cycle.fork()
+        present, line_filter, shaped = self._cycle.fork()
         trajectory = present if trajectory is None else trajectory.fork()
         if tvist is not None and not stopping:
             line_filter.use(tvist.fork())
-        return Ahead(trajectory, None if stopping else line_filter, differentiator)
+        return Ahead(trajectory, None if stopping else line_filter, shaped)
 
     def stop(self, deceleration: float | None) -> StopPlan | None:
         """Come to rest as soon as is permitted.
@@ -91,64 +91,63 @@ class Outlook:
 
     def plan_stop(self, deceleration: float | None) -> StopPlan | None:
         """The quickest permitted stop from here; as `stop`, but nothing is done."""
-        line = self._cycle.trajectory.line
-        return self._by_joints(deceleration) if line is None else self._on_line(line, deceleration)
+        forecast = self._cycle.trajectory.forecast
+        return self._by_joints(deceleration) if forecast is None else self._on_path(forecast, deceleration)
 
     def _by_joints(self, deceleration: float | None) -> StopPlan | None:
         cycle, guard, present = self._cycle, self._cycle.guard, self._cycle.trajectory
         stop = self.stops.by_joints(cycle.newest, deceleration, _anywhere if guard is None else guard.clear)
-        if cycle.stopping and (
-            stop is None or (isinstance(present, Stop) and stop.acceleration <= present.acceleration)
-        ):
+        if cycle.stopping and (stop is None or stop.acceleration <= present.acceleration):
             return None
         if stop is None:  # none is clear and keeps the torque
             hardest = self.stops.highest
             stop = self.stops.stop(cycle.newest, hardest) if guard is None else guard.fallback()
         return self._plan(stop, deceleration, stop.duration, stop.end)
 
-    def _on_line(self, line: Line, deceleration: float | None) -> StopPlan | None:
-        cycle, line = self._cycle, self._shaped(line)
-        stop = self.stops.on_line(cycle.published, cycle.position, line, deceleration)
+    def _on_path(self, forecast: Forecast, deceleration: float | None) -> StopPlan | None:
+        cycle, forecast = self._cycle, self._shaped(forecast)
+        state, newest = cycle.along.published, cycle.along.position
+        stop = self.stops.on_path(state, newest, forecast, deceleration)
         lets_run_out = StopPlan(None, None, deceleration is not None, None, None)
         ahead = None
         if stop is None:
             ahead = self._ahead()
             # What goes no way back need be run ahead no further than a stop lasts.
-            ahead.until(MOST_AHEAD if line.turns else 0)
-            stop = self.stops.under(ahead, cycle.published, line, deceleration)
+            ahead.until(MOST_AHEAD if forecast.turns else 0)
+            stop = self.stops.under(ahead, state, forecast, deceleration)
         if stop is None and ahead is not None:
             ahead.until(MOST_AHEAD)
             if not ahead.rests:  # it lasts for so long that any stop is sooner
-                stop = self.stops.on_line(cycle.published, cycle.position, line, deceleration, certain=False)
+                stop = self.stops.on_path(state, newest, forecast, deceleration, certain=False)
             else:
                 last, asked = ahead.last, self.stops.asked(np.array(ahead.references))
-                stop = self.stops.under(ahead, cycle.published, line, deceleration, asked)
+                stop = self.stops.under(ahead, state, forecast, deceleration, asked)
                 lets_run_out = self._plan(None, deceleration, (last - 1) * PERIOD, ahead.references[-1])
         if stop is not None:
             return self._plan(stop, deceleration, stop.duration, stop.end)
         return None if cycle.stopping else lets_run_out
 
     def _plan(
-        self, stop: Stop | LineStop | None, wanted: float | None, duration: float, end: Floats
+        self, stop: Stop | PathStop | None, wanted: float | None, duration: float, end: Floats
     ) -> StopPlan:
         kept = None if stop is None else stop.acceleration
         way = float(np.abs(end - self._cycle.position).max())
         return StopPlan(stop, kept, wanted is not None and kept != wanted, max(duration, 0.0), way)
 
-    def _shaped(self, line: Line) -> Line:
-        """What is known of a line after the filter."""
+    def _shaped(self, forecast: Forecast) -> Forecast:
+        """What is known of a motion after the filter."""
         cycle = self._cycle
         if cycle.stopping:
-            return line
-        peak = cycle.line_filter.peak
-        known = peak == 1.0 and not cycle.line_filter.fading and line.steady > 0.0
+            return forecast
+        peak, direction = cycle.line_filter.peak, forecast.path.direction
+        known = peak == 1.0 and not cycle.line_filter.fading and forecast.steady > 0.0
         if known:  # the filter gives back late what it was given, also how it was slowed down before
-            steps = np.diff(cycle.line_filter.window() @ line.direction)
-            known = bool((np.diff(steps) >= -EVEN * float(line.direction @ line.direction)).all())
+            steps = np.diff(cycle.line_filter.window() @ direction)
+            known = bool((np.diff(steps) >= -EVEN * float(direction @ direction)).all())
         return replace(
-            line,
-            braking=peak * line.braking,
-            jerk=peak * line.jerk,
-            steady=line.steady if known else 0.0,
+            forecast,
+            braking=peak * forecast.braking,
+            jerk=peak * forecast.jerk,
+            steady=forecast.steady if known else 0.0,
             turns=peak > 1.0,
         )

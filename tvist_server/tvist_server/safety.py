@@ -8,7 +8,7 @@ import numpy as np
 from tvist_plant.description import RobotDescription
 from tvist_server.control.differentiator import Floats, Target, central_differences
 from tvist_server.control.inverse_dynamics import InverseDynamics
-from tvist_server.trajectory import LineStop, Stop
+from tvist_server.trajectory import Path, PathStop, Stop
 
 TORQUE_SHARE = 0.9
 """Share of the joints' torque that a stop or a stream may ask for [-]."""
@@ -76,7 +76,7 @@ class StopTorque:
         self._share, self._most = np.maximum(TORQUE_SHARE * limits, asked), np.maximum(limits, asked)
         self._before = dynamics.torque(state.q, state.qd, state.qdd) - dynamics.gravity(state.q)
 
-    def holds(self, stop: Stop | LineStop, *, rebound: bool = True) -> bool:
+    def holds(self, stop: Stop | PathStop, *, rebound: bool = True) -> bool:
         """Whether a stop keeps to it.
 
         The very start is what the motion already asks for: only what follows is the stop's own doing. Thirty-two
@@ -95,7 +95,7 @@ class StopTorque:
             stop, times, rebound=rebound
         )
 
-    def _holds(self, stop: Stop | LineStop, times: Floats, *, rebound: bool) -> bool:
+    def _holds(self, stop: Stop | PathStop, times: Floats, *, rebound: bool) -> bool:
         dynamics = self._dynamics
         q, qd, qdd = stop.states(times)
         torque = dynamics.torques(q, qd, qdd)
@@ -113,57 +113,57 @@ class StopTorque:
         return bool((np.maximum(begun, ended) <= self._most).all())
 
 
-def largest_torque(
-    dynamics: InverseDynamics, start: Floats, way: Floats, velocity: float, acceleration: float
-) -> Floats:
-    """Upper bound of the torques of a straight motion, whatever its profile, shape (n,) [N m].
+def largest_torque(dynamics: InverseDynamics, path: Path, velocity: float, acceleration: float) -> Floats:
+    """Upper bound of the torques of a motion along a path, whatever its profile, shape (n,) [N m].
 
-    Along q(s) = start + s way the torque is m(s) s̈ + c(s) ṡ² + g(s): it is largest at one of the corners of the
-    range of ṡ² and s̈. Seventeen places on the way are looked at.
+    Along q(x) the torque is m(x) ẍ + c(x) ẋ² + g(x): it is largest at one of the corners of the range of ẋ² and ẍ.
+    Seventeen places on the way are looked at.
 
     Args:
         dynamics: Inverse dynamics with the declared payload.
-        start: Joint positions, shape (n,) [rad].
-        way: To the end, shape (n,) [rad].
-        velocity: Limit for every joint [rad/s].
-        acceleration: Limit for every joint [rad/s^2].
+        path: Where it goes.
+        velocity: Limit for the path's parameter [rad/s].
+        acceleration: Likewise [rad/s^2].
     """
-    most = np.zeros_like(start)
-    for resting, pushed in _on_way(dynamics, start, way, velocity, acceleration):
+    most = np.zeros(len(path.posture(path.start)))
+    way = path.end - path.start
+    for resting, pushed in _on_way(dynamics, path, path.start, way, velocity, acceleration):
         most = np.maximum(most, resting + acceleration * pushed)
     return most
 
 
 def acceleration_on_way(
-    dynamics: InverseDynamics, start: Floats, way: Floats, velocity: float, limits: Floats
+    dynamics: InverseDynamics, path: Path, start: Floats, way: Floats, velocity: float, limits: Floats
 ) -> float:
-    """Largest acceleration of the joint that turns most with which torques stay within their share [rad/s^2].
+    """Largest acceleration of a path's parameter with which torques stay within their share [rad/s^2].
 
     Args:
         dynamics: Inverse dynamics with the declared payload.
-        start: Joint positions, shape (n,) [rad].
-        way: To the end of a straight way, shape (n,) [rad].
+        path: Where the motion goes.
+        start: Parameter where it is looked at first, shape (m,) [rad].
+        way: From there to where it is looked at last, shape (m,) [rad].
         velocity: Largest there [rad/s].
         limits: Of the joints' torque, shape (n,) [N m].
     """
     room = math.inf
-    for resting, pushed in _on_way(dynamics, start, way, velocity, math.inf):
+    for resting, pushed in _on_way(dynamics, path, start, way, velocity, math.inf):
         room = min(room, float(((TORQUE_SHARE * limits - resting) / np.maximum(pushed, 1e-9)).min()))
     return max(room, 0.0)
 
 
 def _on_way(
-    dynamics: InverseDynamics, start: Floats, way: Floats, velocity: float, acceleration: float
+    dynamics: InverseDynamics, path: Path, start: Floats, way: Floats, velocity: float, acceleration: float
 ) -> Iterator[tuple[Floats, Floats]]:
-    """Torques at places on a straight way: without acceleration, and more for each rad/s^2 [N m]."""
+    """Torques at places on a path: without acceleration, and more for each rad/s^2 of the parameter [N m]."""
     farthest, still = float(np.abs(way).max()), np.zeros_like(start)
     along = way / farthest if farthest > 0.0 else still
     speed = min(velocity, math.sqrt(acceleration * farthest)) * along
     for share in np.linspace(0.0, 1.0, 17):
-        q = start + share * way
+        x = start + share * way
+        q = path.posture(x)
         gravity = dynamics.gravity(q)
-        resting = np.maximum(np.abs(gravity), np.abs(dynamics.torque(q, speed, still)))
-        yield resting, np.abs(dynamics.torque(q, still, along) - gravity)
+        resting = np.maximum(np.abs(gravity), np.abs(dynamics.torque(*path.states(x, speed, still))))
+        yield resting, np.abs(dynamics.torque(*path.states(x, still, along)) - gravity)
 
 
 def torque_along(dynamics: InverseDynamics, references: Floats, period: float) -> Floats:

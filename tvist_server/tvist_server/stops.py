@@ -12,9 +12,9 @@ from tvist_plant.description import RobotDescription
 from tvist_server.control.differentiator import Floats, Target
 from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.safety import GENTLEST_STOP, StopTorque, torque_along
-from tvist_server.trajectory import Line, LineStop, Stop
+from tvist_server.trajectory import Forecast, Limits, PathStop, Stop
 
-S = TypeVar("S", Stop, LineStop)
+S = TypeVar("S", Stop, PathStop)
 
 STEP = 0.8
 """From one deceleration that is tried to the next [-]."""
@@ -34,8 +34,9 @@ ROUNDING = 1e-12
 class References(Protocol):
     """References of a motion that are still to come."""
 
-    references: list[Floats]
-    """The two shaped references played last and those to come that are known, one a tick, each of shape (n,) [rad]."""
+    samples: list[Floats]
+    """The path's parameter at the two shaped references played last and at those to come that are known, one a tick,
+    each of shape (m,) [rad]."""
     rests: bool
     """Whether they are known until they rest."""
 
@@ -51,7 +52,7 @@ class References(Protocol):
 class StopPlan:
     """A stop and what limits it."""
 
-    trajectory: Stop | LineStop | None
+    trajectory: Stop | PathStop | None
     """None: what is under way runs out by itself."""
     acceleration: float | None
     """Limit it keeps [rad/s^2]; None: the motion's own."""
@@ -81,78 +82,77 @@ class StopPlanner:
         self.period = period
         """Tick [s]."""
 
-    def on_line(
-        self, state: Target, newest: Floats, line: Line, wanted: float | None, *, certain: bool = True
-    ) -> LineStop | None:
-        """The quickest stop along the line of a motion that is certain to be permitted.
+    def on_path(
+        self, state: Target, newest: Floats, forecast: Forecast, wanted: float | None, *, certain: bool = True
+    ) -> PathStop | None:
+        """The quickest stop along the path of a motion that is certain to be permitted.
 
         Never ahead of the motion, and never later at rest, is a stop that brakes harder than the motion ever will,
         with more jerk; and a gentler one that is over before the motion, braking as hard as it may, could be.
 
         Args:
-            state: A tick before the newest shaped reference.
-            newest: That, shape (n,) [rad].
-            line: What is known of the motion.
+            state: Of the path's parameter, a tick before the newest shaped reference.
+            newest: The parameter there, shape (m,) [rad].
+            forecast: What is known of the motion.
             wanted: Deceleration asked for [rad/s^2]; None for as much as possible.
             certain: False: take the quickest that keeps the torque, for a motion that will not rest for long.
 
         Returns:
             None where none is certain, or the motion is about to rest by itself.
         """
-        leading = int(np.argmax(np.abs(line.direction)))
-        sign = float(np.sign(line.direction[leading]))
-        speed, rise = sign * float(state.qd[leading]), sign * float(state.qdd[leading])
-        in_time = line.steady + COUNTED * max(speed, 0.0) / line.braking
+        speed, rise = forecast.path.forwards(state.qd), forecast.path.forwards(state.qdd)
+        hardest = self._keeping(state, forecast, self.highest)
+        if hardest is None:
+            return None
+        in_time = forecast.steady + COUNTED * max(speed, 0.0) / forecast.braking
         # What hardly moves may turn back a little, what brakes with as much jerk as a stop may be as quick, and what is
         # about to rest is quicker than anything within the limits.
         creeps = speed < SLOW
-        jerks = HARDER * line.jerk > self.jerk and line.steady < SOON
-        rests = rise < 0.0 and speed <= 1.1 * rise * rise / (2.0 * self.jerk)
-        if certain and (creeps or jerks or rests or line.turns):
+        jerks = HARDER * forecast.jerk > hardest.jerk and forecast.steady < SOON
+        rests = rise < 0.0 and speed <= 1.1 * rise * rise / (2.0 * hardest.jerk)
+        if certain and (creeps or jerks or rests or forecast.turns):
             return None
 
-        def permitted(stop: LineStop) -> bool:
-            return not certain or stop.acceleration >= HARDER * line.braking or stop.duration <= in_time
+        def permitted(stop: PathStop) -> bool:
+            return not certain or stop.braking >= HARDER * forecast.braking or stop.duration <= in_time
 
-        return self._quickest_on_line(state, newest, line, wanted, np.zeros_like(state.q), permitted)
+        return self._quickest_on_path(state, newest, forecast, wanted, permitted)
 
     def under(
         self,
         ahead: References,
         state: Target,
-        line: Line,
+        forecast: Forecast,
         wanted: float | None,
         asked: Floats | None = None,
-    ) -> LineStop | None:
-        """The quickest stop along the line of a motion that is run ahead.
+    ) -> PathStop | None:
+        """The quickest stop along the path of a motion that is run ahead.
 
         Args:
             ahead: The motion; it is run ahead as far as a stop lasts. One that may turn back is known until it rests.
-            state: As in `on_line`.
-            line: As in `on_line`.
-            wanted: As in `on_line`.
+            state: As in `on_path`.
+            forecast: As in `on_path`.
+            wanted: As in `on_path`.
             asked: Largest torques that the motion itself would ask for from now on, shape (n,) [N m]; None: they are
                 not known, and a stop may ask for its share alone.
 
         Returns:
             None where none is permitted but to let the motion run out.
         """
-        leading = int(np.argmax(np.abs(line.direction)))
-        sign, newest = float(np.sign(line.direction[leading])), ahead.references[1]
+        newest = ahead.samples[1]
         along: list[float] = []  # how far it has come at each tick that is known
 
-        def permitted(stop: LineStop) -> bool:
+        def permitted(stop: PathStop) -> bool:
             ticks = math.ceil(stop.duration / self.period)
             ahead.until(ticks + 1)
-            news = ahead.references[2 + len(along) :]
-            along.extend(sign * float(q[leading] - newest[leading]) for q in news)
+            news = ahead.samples[2 + len(along) :]
+            along.extend(forecast.path.forwards(x - newest) for x in news)
             if ahead.rests and ticks > ahead.last - 1:
                 return False
             shares = (stop.share((number + 1) * self.period) for number in range(len(along)))
             return all(share <= limit + ROUNDING for share, limit in zip(shares, along, strict=True))
 
-        none = np.zeros_like(newest) if asked is None else asked
-        return self._quickest_on_line(state, newest, line, wanted, none, permitted)
+        return self._quickest_on_path(state, newest, forecast, wanted, permitted, asked)
 
     def asked(self, ahead: Floats) -> Floats:
         """Largest torques that a motion asks for from now on, shape (n,) [N m].
@@ -185,24 +185,37 @@ class StopPlanner:
             state.q, state.qd, state.qdd, acceleration=acceleration, jerk=self.jerk, period=self.period
         )
 
-    def _quickest_on_line(
+    def _quickest_on_path(
         self,
         state: Target,
         newest: Floats,
-        line: Line,
+        forecast: Forecast,
         wanted: float | None,
-        asked: Floats,
-        permitted: Callable[[LineStop], bool],
-    ) -> LineStop | None:
-        torque = StopTorque(self._dynamics, state, self._torque, asked)
+        permitted: Callable[[PathStop], bool],
+        asked: Floats | None = None,
+    ) -> PathStop | None:
+        path = forecast.path
+        joints = Target(*path.states(state.q, state.qd, state.qdd))
+        none = np.zeros_like(joints.q) if asked is None else asked
+        torque = StopTorque(self._dynamics, joints, self._torque, none)
         stops = (
-            LineStop(
-                newest, newest - state.q, state.qdd, line.direction,
-                acceleration=acceleration, jerk=self.jerk, period=self.period,
+            PathStop(
+                path, newest, newest - state.q, state.qdd,
+                acceleration=acceleration, braking=kept.acceleration, jerk=kept.jerk, period=self.period,
             )
             for acceleration in self._ladder(wanted)
+            if (kept := self._keeping(state, forecast, acceleration)) is not None
         )  # fmt: skip
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
+
+    def _keeping(self, state: Target, forecast: Forecast, acceleration: float) -> Limits | None:
+        """Limits of a stop's parameter with which no joint passes an acceleration [rad/s^2], nor the jerk of any stop.
+
+        The velocity is the highest that the stop may have, while it takes the present acceleration back.
+        """
+        speed, rise = abs(forecast.path.forwards(state.qd)), abs(forecast.path.forwards(state.qdd))
+        fastest = speed + self.period * rise + rise * rise / self.jerk
+        return forecast.path.keeping(Limits(fastest, acceleration, self.jerk), fastest)
 
     def _ladder(self, wanted: float | None) -> Iterator[float]:
         """Decelerations in the order in which they are tried: down from the wanted one, then up from it."""

@@ -1,7 +1,5 @@
 """The rest of what moves: whether it stays clear, and how long it lasts."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from tvist_plant.description import Payload
@@ -15,7 +13,7 @@ from tvist_server.outlook import Outlook
 from tvist_server.refusal import RefusalError
 from tvist_server.safety import TorqueRoom
 from tvist_server.stops import StopPlan
-from tvist_server.trajectory import SetpointStream, Stop
+from tvist_server.trajectory import Stop, Way
 from tvist_shaping.base import Filter
 
 
@@ -81,16 +79,16 @@ class WayAhead:
         if cycle.at_rest:
             return None
         trajectory = cycle.trajectory
-        if isinstance(trajectory, SetpointStream) and not cycle.stopping:
+        if not trajectory.foreseeable:
             stop = self._outlook.stops.by_joints(cycle.newest, None, self._guard.clear)
             if stop is None:
                 return self._guard.met
             self._guard.take(cycle.newest, stop)
             return None
-        line = trajectory.line
-        if line is None:
+        forecast = trajectory.forecast
+        if forecast is None:
             return self._on(self._outlook.foresee(tvist))
-        found = collisions.on_line(cycle.position, line.end)
+        found = collisions.on_way(forecast.path.way(cycle.along.position, forecast.end))
         return None if found is None else found[1]
 
     def check_payload(self, payload: Payload, tvist: Filter | None) -> None:
@@ -121,7 +119,7 @@ class WayAhead:
             RefusalError: Something would meet.
         """
         cycle = self._cycle
-        if cycle.guard is None or cycle.stopping or isinstance(cycle.trajectory, SetpointStream):
+        if cycle.guard is None or cycle.stopping or not cycle.trajectory.foreseeable:
             return
         met = self.rest_of_way(tvist)
         if met is not None:
@@ -143,6 +141,5 @@ class WayAhead:
             return None
         steps = np.abs(np.diff(ahead, axis=0)).max(axis=0)
         last = len(ahead) - 1
-        way: Callable[[float], Floats] = lambda share: ahead[round(share * last)]  # noqa: E731
-        found = self._collisions.on_way(way, self._collisions.travel(steps * last))
+        found = self._collisions.on_way(Way(lambda share: ahead[round(share * last)], steps * last))
         return None if found is None else found[1]

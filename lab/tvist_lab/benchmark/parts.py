@@ -18,7 +18,7 @@ from tvist_server.control.inverse_dynamics import InverseDynamics
 from tvist_server.cycle import ControlCycle
 from tvist_server.gateways.loopback import LoopbackHost
 from tvist_server.setup import Setup, body
-from tvist_server.trajectory import DoubleS, Limits
+from tvist_server.trajectory import JointLine, Limits, quickest_motion
 from tvist_shaping import TvistFilter, shaper
 
 TICKS = 1250
@@ -56,7 +56,9 @@ def parts(tell: Callable[[str], None]) -> dict[str, float]:
 
 
 def _motion(setup: Setup) -> list[np.ndarray[Any, Any]]:
-    trajectory = DoubleS(np.array(pose("Q1")), np.array(pose("Q3")), Limits(1.5, 2.0, 100.0), PERIOD)
+    trajectory = quickest_motion(
+        JointLine(np.array(pose("Q1")), np.array(pose("Q3"))), Limits(1.5, 2.0, 100.0), PERIOD
+    )
     return [np.array(setup.q), *(trajectory.next() for _ in range(TICKS))]
 
 

@@ -16,7 +16,7 @@ from tvist_plant.plant import PERIOD, Plant
 from tvist_server.control.differentiator import Target
 from tvist_server.cycle import STILL, ControlCycle
 from tvist_server.reporting import truth_of
-from tvist_server.trajectory import DoubleS, Limits, Trajectory
+from tvist_server.trajectory import JointLine, Limits, Trajectory, quickest_motion
 from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.filter import TvistFilter
@@ -67,7 +67,7 @@ class Played(Trajectory):
 
 def point_to_point(start: Floats, target: Floats, limits: Limits = PAPER) -> Floats:
     """Reference of a double S from the first sample that may move to the one at the target, shape (T, n) [rad]."""
-    trajectory = DoubleS(start, target, limits, PERIOD)
+    trajectory = quickest_motion(JointLine(start, target), limits, PERIOD)
     samples = []
     while not trajectory.finished:
         samples.append(trajectory.next())
@@ -107,7 +107,7 @@ def lengthened(start: Floats, target: Floats, ticks: int, limits: Limits = PAPER
     for _ in range(30):  # the lower the jerk, the longer it takes
         middle = 0.5 * (low + high)
         slower = Limits(limits.velocity, limits.acceleration, float(np.exp(middle)))
-        if DoubleS(start, target, slower, PERIOD).duration > ticks * PERIOD:
+        if quickest_motion(JointLine(start, target), slower, PERIOD).duration > ticks * PERIOD:
             low = middle
         else:
             high = middle

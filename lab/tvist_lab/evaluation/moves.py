@@ -19,6 +19,7 @@ from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import Angle, Mass
 from tvist_server.collision import CollisionModel
 from tvist_server.setup import body, paper_payload
+from tvist_server.trajectory import JointLine
 
 LEAST = 1e-4
 """A move whose joints turn by less than this goes nowhere [rad]."""
@@ -155,7 +156,7 @@ def is_free(collision: CollisionModel, move: Move) -> bool:
 def meeting(collision: CollisionModel, move: Move) -> str | None:
     """What meets what on a move, in words; None where nothing does."""
     start, target = np.array(move.start), np.array(move.target)
-    found = collision.on_line(start, target)
+    found = collision.on_way(JointLine(start, target).whole)
     if found is None:
         return None
     share, pair = found

@@ -10,7 +10,7 @@ from tvist_plant.plant import PERIOD
 from tvist_server import calibrations
 from tvist_server.calibrations.modal import modal_estimator
 from tvist_server.setup import paper_payload
-from tvist_server.trajectory import DoubleS, Limits
+from tvist_server.trajectory import JointLine, Limits, quickest_motion
 from tvist_shaping import BUILT_IN
 from tvist_shaping.base import Filter
 
@@ -61,7 +61,7 @@ def mean_delay_figure() -> Figure:
 
 def _shape(tvist: Filter, start: Floats, end: Floats) -> tuple[Floats, Floats]:
     """Mean delay [s] and shaped reference [rad] at each tick of a motion, shapes (N,) and (N, joints)."""
-    motion = DoubleS(start, end, LIMITS, PERIOD)
+    motion = quickest_motion(JointLine(start, end), LIMITS, PERIOD)
     tvist.reset(start)
     delays: list[float] = []
     references: list[Floats] = []

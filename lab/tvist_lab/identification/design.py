@@ -16,7 +16,7 @@ from tvist_lab.identification.ring_downs import SAMPLES, SKIPPED, Jog, Ringing
 from tvist_lab.identification.unknowns import Arm
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
-from tvist_server.trajectory import DoubleS, Limits
+from tvist_server.trajectory import JointLine, Limits, quickest_motion
 
 NOISE = 0.03
 """rms that is counted on, an axis [m/s^2]."""
@@ -85,7 +85,7 @@ def predicted(arm: Arm, q: Floats, payload: int, jog: Jog) -> Ringing:
 def _pushes(rows: Floats, rigid: Floats, jog: Floats) -> Floats:
     """What drives do to their motors during and after a jog, shape (ticks, n) [N m]."""
     _, B, K_d, K_p, _ = rows
-    motion = DoubleS(np.zeros_like(jog), jog, LIMITS, PERIOD)
+    motion = quickest_motion(JointLine(np.zeros_like(jog), jog), LIMITS, PERIOD)
     way = []
     while not motion.finished:
         way.append(motion.next())

@@ -110,7 +110,7 @@ class Sequence:
     def _foresee(self) -> Ahead | None:
         """What comes if nothing is commanded, where it goes along a line."""
         motion, cycle = self.robot.controller.motion, self.robot.controller.cycle
-        if cycle.at_rest or cycle.trajectory.line is None:
+        if cycle.at_rest or cycle.trajectory.path is None:
             return None
         ahead = motion.outlook.foresee()
         return None if ahead is None else Ahead(ahead[1:], self.robot.controller.tick_number)

@@ -15,6 +15,7 @@ from tvist_server.ahead import resting_after
 from tvist_server.collision import CLEARANCE, CollisionModel
 from tvist_server.safety import TORQUE_SHARE
 from tvist_server.setup import body, paper_payload
+from tvist_server.trajectory import JointLine
 
 EARLY = 17
 """Tick before which some moves are stopped: those that have barely begun."""
@@ -114,7 +115,7 @@ def draw(description: RobotDescription, seed: int, kinds: tuple[str, ...] = tupl
         start, target = two_postures(random, n)
         if random.random() < 0.3:  # short moves have no cruise
             target = start + random.uniform(0.02, 0.3) * (target - start)
-        if collisions.meeting(start) is None and collisions.on_line(start, target) is None:
+        if collisions.meeting(start) is None and collisions.on_way(JointLine(start, target).whole) is None:
             break
     case = Case(
         seed=seed,

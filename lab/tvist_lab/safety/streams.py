@@ -13,6 +13,7 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_server.collision import CLEARANCE, CollisionModel
 from tvist_server.setup import body, paper_payload
+from tvist_server.trajectory import JointLine
 
 LENGTH = 3.0
 """How long a stream lasts unless something ends it [s]."""
@@ -85,7 +86,7 @@ def draw(description: RobotDescription, seed: int) -> StreamCase:
             towards[1] = start[1] + random.choice([-1.0, 1.0]) * random.uniform(1.0, 3.0)
         if collisions.meeting(start) is not None:
             continue
-        if random.random() < 0.2 or collisions.on_line(start, towards) is not None:
+        if random.random() < 0.2 or collisions.on_way(JointLine(start, towards).whole) is not None:
             break
     return StreamCase(
         seed=seed,

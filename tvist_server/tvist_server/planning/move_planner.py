@@ -8,15 +8,16 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
 from tvist_server.ahead import MOST_AHEAD, Ahead
 from tvist_server.collision import CLEARANCE, CollisionModel
-from tvist_server.control.differentiator import Differentiator, Floats
+from tvist_server.control.differentiator import Floats
 from tvist_server.control.inverse_dynamics import InverseDynamics
+from tvist_server.control.shaped_reference import ShapedReference
 from tvist_server.line_filter import LineFilter
 from tvist_server.planning.basis import MotionBasis
 from tvist_server.planning.filter_planner import FilterPlanner
 from tvist_server.refusal import RefusalError
 from tvist_server.safety import largest_torque, torque_along
 from tvist_server.setup import Setup, body
-from tvist_server.trajectory import DoubleS, Limits
+from tvist_server.trajectory import JointLine, Limits, Motion, Path, quickest_motion
 
 LOOKS = 64
 """Moments of a motion at which its torque is looked at before it is run ahead."""
@@ -28,7 +29,7 @@ BLUNTED = 1.05
 class PlannedMove:
     """A motion that may begin."""
 
-    trajectory: DoubleS
+    trajectory: Motion
     """Its reference."""
     velocity: float
     """Limit that was asked for [rad/s]."""
@@ -58,33 +59,44 @@ class MovePlanner:
             RefusalError: There is no such motion, or something would meet on its way.
         """
         limits = Limits(command.velocity, command.acceleration, command.jerk)
+        return self.along(JointLine(basis.q, np.array(command.q, dtype=float)), limits, basis)
+
+    def along(self, path: Path, limits: Limits, basis: MotionBasis) -> PlannedMove:
+        """Plan a motion along a path, from rest to rest.
+
+        Args:
+            path: Where to go; it begins where the reference rests.
+            limits: That every joint is to keep.
+            basis: What it depends on.
+
+        Raises:
+            RefusalError: There is no such motion, or something would meet on its way.
+        """
         spared = replace(limits, acceleration=limits.acceleration * (1.0 - basis.excess))
         rate = basis.speed if basis.slowest is None else min(basis.speed, basis.slowest / limits.velocity)
         try:
-            trajectory = DoubleS(basis.q, np.array(command.q, dtype=float), spared, PERIOD, rate)
+            motion = quickest_motion(path, spared, PERIOD, rate)
         except ValueError as error:
             raise RefusalError("out_of_range", "velocity", str(error)) from error
-        self._check_clear(trajectory, basis)
-        return PlannedMove(trajectory, limits.velocity, self._excess_of_torque(trajectory, basis))
+        self._check_clear(motion, basis)
+        return PlannedMove(motion, limits.velocity, self._excess_of_torque(motion, basis))
 
-    def _check_clear(self, trajectory: DoubleS, basis: MotionBasis) -> None:
+    def _check_clear(self, motion: Motion, basis: MotionBasis) -> None:
         if self._collisions.carried is not basis.carried:
             self._collisions.carry(basis.carried)
-        found = self._collisions.on_line(basis.q, trajectory.target)
+        found = self._collisions.on_way(motion.path.whole)
         if found is not None:
             share, meeting = found
-            time = trajectory.time_at(share)
+            time = motion.time_at(share)
             raise RefusalError("collision", "q", f"{meeting} {time:.2f} s after the start", CLEARANCE)
 
-    def _excess_of_torque(self, trajectory: DoubleS, basis: MotionBasis) -> str | None:
-        dynamics, allowed, start, limits = self._dynamics, self._torque, basis.q, trajectory.limits
+    def _excess_of_torque(self, motion: Motion, basis: MotionBasis) -> str | None:
+        dynamics, allowed, limits = self._dynamics, self._torque, motion.limits
         dynamics.believe(basis.bodies)
-        bound = largest_torque(
-            dynamics, start, trajectory.target - start, limits.velocity, limits.acceleration
-        )
-        if (bound <= allowed).all() or (BLUNTED * self._before_shaping(trajectory) <= allowed).all():
+        bound = largest_torque(dynamics, motion.path, limits.velocity, limits.acceleration)
+        if (bound <= allowed).all() or (BLUNTED * self._before_shaping(motion) <= allowed).all():
             return None
-        ahead = self._shaped(trajectory, basis)
+        ahead = self._shaped(motion, basis)
         if ahead is None:
             return None
         most = torque_along(dynamics, ahead, PERIOD)
@@ -97,17 +109,19 @@ class MovePlanner:
             f"limit of {limit:g}: ask for less acceleration"
         )
 
-    def _before_shaping(self, trajectory: DoubleS) -> Floats:
+    def _before_shaping(self, motion: Motion) -> Floats:
         """Largest torques that the motion would take without a filter, shape (n,) [N m]."""
-        most: Floats = np.max([self._dynamics.effort(*state) for state in trajectory.states(LOOKS)], axis=0)
+        most: Floats = np.max([self._dynamics.effort(*state) for state in motion.states(LOOKS)], axis=0)
         return most
 
-    def _shaped(self, trajectory: DoubleS, basis: MotionBasis) -> Floats | None:
+    def _shaped(self, motion: Motion, basis: MotionBasis) -> Floats | None:
         """References of the shaped motion, shape (k, n) [rad]; None where it lasts for too long to know."""
         tvist = self._filters.present(basis.filter)
-        tvist.reset(basis.q)
-        tvist.aim(trajectory.target)
-        line_filter = LineFilter(tvist, trajectory.limits)
-        ahead = Ahead(trajectory.fork(), line_filter, Differentiator(basis.q, PERIOD))
+        path, shaped = motion.path, ShapedReference(basis.q, PERIOD)
+        shaped.enter(path.posture_of, path.start)
+        line_filter = LineFilter(tvist, motion.limits)
+        line_filter.begin(tvist, path.start, path.posture_of)
+        tvist.aim(path.end)
+        ahead = Ahead(motion.fork(), line_filter, shaped)
         ahead.until(MOST_AHEAD)
         return np.array(ahead.references) if ahead.rests else None

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from tvist_server.trajectory.base import Floats
+from tvist_server.trajectory.limits import Floats
 
 
 def linear(points: Sequence[Floats], u: float) -> tuple[Floats, Floats]:

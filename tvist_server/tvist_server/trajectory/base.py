@@ -5,36 +5,25 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Self
 
-import numpy as np
-import numpy.typing as npt
-
-Floats = npt.NDArray[np.float64]
+from tvist_server.trajectory.limits import Floats, Limits
+from tvist_server.trajectory.path import Path
 
 
 @dataclass(frozen=True)
-class Limits:
-    """One number each, for every joint."""
+class Forecast:
+    """What is known of a trajectory along a path without running it: how soon and how hard it will brake.
 
-    velocity: float
-    """[rad/s]."""
-    acceleration: float
-    """[rad/s^2]."""
-    jerk: float
-    """[rad/s^3]."""
+    All of it is said of the path's parameter, which for a straight joint line is the posture.
+    """
 
-
-@dataclass(frozen=True)
-class Line:
-    """What is known of a trajectory along a straight line without running it: how soon and how hard it will brake."""
-
-    direction: Floats
-    """Of the line in joint space; its largest entry is 1 or -1, shape (n,)."""
+    path: Path
+    """The path that it goes along."""
     end: Floats
-    """Where the trajectory ends if it is let go on, shape (n,) [rad]."""
+    """Parameter where it ends if it is let go on, shape (m,) [rad]."""
     braking: float
-    """Largest deceleration to come, of the joint that turns most [rad/s^2]."""
+    """Largest deceleration to come, of the entry that goes farthest [rad/s^2]."""
     jerk: float
-    """Largest jerk to come, of that joint [rad/s^3]."""
+    """Largest jerk to come, of that entry [rad/s^3]."""
     steady: float
     """Time for which it does not slow down yet [s]; 0 where that is not known."""
     turns: bool = False
@@ -42,16 +31,25 @@ class Line:
 
 
 class Trajectory(ABC):
-    """A reference, one position a tick."""
+    """A reference, one sample a tick: the parameter of its path, or where it has none the joint positions."""
+
+    path: Path | None = None
+    """The path that it goes along; None where every joint goes by itself: in streams, and stops of every joint."""
+    limits: Limits | None = None
+    """What its samples keep; None: it bypasses the filter, or rests."""
+    acceleration: float = 0.0
+    """Of a stop: the limit that every joint keeps in it [rad/s^2]; 0 for what is no stop."""
+    foreseeable: bool = True
+    """Whether it can be run ahead; False: somebody leads it from outside."""
 
     @abstractmethod
     def next(self) -> Floats:
-        """Reference of the next tick, shape (n,) [rad]. Not to be written to."""
+        """Sample of the next tick, shape (m,) or (n,) [rad]. Not to be written to."""
 
     @property
     @abstractmethod
     def finished(self) -> bool:
-        """Whether the last reference was the final one: from now on it stays where it is."""
+        """Whether the last sample was the final one: from now on it stays where it is."""
 
     @property
     def standing(self) -> bool:
@@ -59,8 +57,8 @@ class Trajectory(ABC):
         return self.finished
 
     @property
-    def line(self) -> Line | None:
-        """The straight line that it goes along; None where it goes along none."""
+    def forecast(self) -> Forecast | None:
+        """What is known of its way; None where it has no path."""
         return None
 
     def fork(self) -> Self:

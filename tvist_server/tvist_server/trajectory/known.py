@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from tvist_server.trajectory.base import Floats, Trajectory
+from tvist_server.trajectory.base import Trajectory
+from tvist_server.trajectory.limits import Floats
 
 
 class Known(Trajectory):

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import ruckig
 
-from tvist_server.trajectory.base import Floats, Limits
+from tvist_server.trajectory.limits import Floats, Limits
 
 Bools = npt.NDArray[np.bool_]
 

@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 import ruckig
 
-from tvist_server.trajectory.base import Floats, Limits
+from tvist_server.trajectory.limits import Floats, Limits
 
 QUICKEST = 20.0
 """Largest change of the rate in a second [1/s]: from standstill to full speed in a twentieth."""

@@ -3,7 +3,7 @@
 import math
 from collections import deque
 
-from tvist_server.trajectory.base import Limits
+from tvist_server.trajectory.limits import Limits
 
 WINDOW = 128
 """Set-points over which lateness is remembered, in four parts."""

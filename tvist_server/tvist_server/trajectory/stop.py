@@ -3,7 +3,8 @@
 import numpy as np
 import ruckig
 
-from tvist_server.trajectory.base import Floats, Trajectory
+from tvist_server.trajectory.base import Trajectory
+from tvist_server.trajectory.limits import Floats
 
 
 class Stop(Trajectory):

@@ -6,8 +6,9 @@ from collections import deque
 import numpy as np
 
 from tvist_server.trajectory.b_spline import cubic, linear
-from tvist_server.trajectory.base import Floats, Limits, Trajectory
+from tvist_server.trajectory.base import Trajectory
 from tvist_server.trajectory.limiter import Limiter, TorqueRoom
+from tvist_server.trajectory.limits import Floats, Limits
 from tvist_server.trajectory.play_out import PlayOut
 from tvist_server.trajectory.stop import Stop
 
@@ -34,6 +35,9 @@ class SetpointStream(Trajectory):
         reach: Joints' range either way, shape (n,) [rad]; None for no end.
         torque: What torque leaves to acceleration; None for enough.
     """
+
+    limits: Limits
+    foreseeable = False
 
     def __init__(
         self,

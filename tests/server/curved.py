@@ -1,0 +1,70 @@
+"""Robots that move along curves, of which the wire has none yet."""
+
+import numpy as np
+
+from tvist_lab.safety.stops import SHAPERS
+from tvist_lab.safety.subject import Subject
+from tvist_protocol import commands as c
+from tvist_server.collision import CollisionModel
+from tvist_server.planning.filter_planner import FilterPlanner
+from tvist_server.planning.move_planner import MovePlanner
+from tvist_server.setup import body, paper_payload
+from tvist_server.trajectory import Limits
+
+from .curves import random_arc, tool_circle
+from .robots import PAPER, UR5E, setup
+
+DISC = paper_payload(UR5E, 5.0)
+ON = 1e-9
+"""Distance from a curve that is none [rad]."""
+BACK = 1e-6
+"""By so much interpolation in the filter may undershoot where a motion hardly moves, on straight lines too [rad]."""
+EXCESS = 1.01
+"""Share of a limit that a filter whose weights vary may reach [-]."""
+POSITIVE = [name for name in SHAPERS if not name.startswith("um_")]
+
+
+def free(curve) -> bool:
+    return CollisionModel(UR5E, body(DISC)).on_way(curve.whole) is None
+
+
+def curve_of(seed: int):
+    """A tool circle now and then, else an arc that is clear."""
+    random = np.random.default_rng([seed, 3])
+    if seed % 4 == 0:
+        return tool_circle()
+    while True:
+        curve = random_arc(random)
+        if free(curve):
+            return curve
+
+
+def moving(curve, shaper: str, limits: Limits, speed: float = 1.0) -> Subject:
+    """A robot that has just begun a motion along a curve."""
+    robot = Subject(UR5E, curve.posture(curve.start), DISC, shaper=shaper)
+    robot.send(c.SetSpeed, fraction=speed)
+    start(robot, curve, limits)
+    return robot
+
+
+def start(robot: Subject, curve, limits: Limits = PAPER) -> None:
+    """Begin a motion along a curve, as a command for it would."""
+    own = setup(payload=DISC)
+    basis = robot.controller.basis.motion
+    planned = MovePlanner(own, FilterPlanner(own)).along(curve, limits, basis)
+    robot.controller.motion.move(planned)
+
+
+def played(robot: Subject, ticks: int = 200) -> np.ndarray:
+    """All references until it rests, and some more ticks."""
+    robot.until_rest()
+    robot.tick(ticks)
+    return np.array(robot.references)
+
+
+def random_limits(random) -> Limits:
+    return Limits(
+        float(random.uniform(0.5, 3.14)),
+        float(random.uniform(1.0, 8.0)),
+        float(random.choice([100.0, 500.0, 2000.0])),
+    )

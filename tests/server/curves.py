@@ -1,0 +1,110 @@
+"""Curved paths for tests: an arc in joint space, and a circle of the flange approximated by a spline of joints."""
+
+from functools import cache
+
+import numpy as np
+import pinocchio as pin
+from scipy.interpolate import make_interp_spline
+from scipy.optimize import least_squares
+
+from tvist_plant.description import Payload
+from tvist_plant.model import FLANGE, rigid_model
+from tvist_server.trajectory import Bends, Curve
+
+from .robots import Q1, UR5E
+
+BENT = np.array([0.2, -1.4, 1.7, -1.8, -1.5, 0.3])
+"""A posture far from any singular one [rad]."""
+ENOUGH = 1.02
+"""What a bound by sampling is widened by."""
+
+
+class Arc(Curve):
+    """q(s) = c + R (u cos s/R + v sin s/R): a circle's arc, in a plane of joint space that u and v span."""
+
+    def __init__(self, start, u, v, radius: float, angle: float) -> None:
+        swing = np.hypot(u, v)
+        self.u, self.v, self.radius = u / swing.max(), v / swing.max(), radius
+        self.centre = np.array(start) - radius * self.u
+        slope = swing / swing.max()
+        super().__init__(radius * angle, Bends(slope, 1.0 / radius, 1.0 / radius**2))
+
+    def derivatives(self, s):
+        angle = s[:, None] / self.radius
+        sine, cosine = np.sin(angle), np.cos(angle)
+        return (
+            self.centre + self.radius * (self.u * cosine + self.v * sine),
+            self.v * cosine - self.u * sine,
+            -(self.u * cosine + self.v * sine) / self.radius,
+        )
+
+
+class JointSpline(Curve):
+    """A spline of degree five through postures, scaled so that no joint turns farther than its parameter goes."""
+
+    def __init__(self, postures) -> None:
+        chords = np.abs(np.diff(postures, axis=0)).max(axis=1)
+        u = np.concatenate([[0.0], np.cumsum(chords)])
+        fine = np.linspace(0.0, u[-1], 4000)
+        spline = make_interp_spline(u, postures, k=5)
+        scale = ENOUGH * np.abs(spline(fine, 1)).max()
+        self._splines = [make_interp_spline(scale * u, postures, k=5).derivative(k) for k in range(3)]
+        third = self._splines[2].derivative()(scale * fine)
+        bends = Bends(
+            ENOUGH * np.abs(self._splines[1](scale * fine)).max(axis=0),
+            ENOUGH * float(np.abs(self._splines[2](scale * fine)).max()),
+            ENOUGH * float(np.abs(third).max()),
+        )
+        super().__init__(float(scale * u[-1]), bends)
+
+    def derivatives(self, s):
+        q, slope, second = (spline(s, extrapolate=True) for spline in self._splines)
+        return q, slope, second
+
+
+def random_arc(random, start=Q1) -> Arc:
+    u, v = random.uniform(-1.0, 1.0, (2, 6)) * [0.6, 0.6, 0.6, 1.0, 1.0, 1.0]
+    return Arc(start, u, v, float(random.uniform(0.2, 0.8)), float(random.uniform(0.8, 4.0)))
+
+
+@cache
+def tool_circle(radius: float = 0.08, points: int = 41) -> JointSpline:
+    """Most of a circle of the flange in a vertical plane, its orientation held."""
+    model = rigid_model(UR5E, Payload())
+    data, frame = model.createData(), model.getFrameId(FLANGE)
+
+    def flange(q):
+        pin.framesForwardKinematics(model, data, q)
+        return data.oMf[frame].copy()
+
+    placed, q, postures = flange(BENT), BENT, []
+    for angle in np.linspace(0.0, 1.6 * np.pi, points):
+        centre = np.array([0.0, 0.0, -radius])
+        goal = pin.SE3(
+            placed.rotation,
+            placed.translation + centre + radius * np.array([np.sin(angle), 0.0, np.cos(angle)]),
+        )
+        found = least_squares(
+            lambda q, goal=goal: np.array(pin.log6(goal.actInv(flange(q))).vector),
+            q,
+            xtol=1e-15,
+            ftol=1e-15,
+            gtol=1e-15,
+        )
+        assert np.abs(found.fun).max() < 1e-9
+        q = found.x
+        postures.append(q)
+    return JointSpline(np.array(postures))
+
+
+def progress(curve: Curve, references) -> tuple[np.ndarray, float]:
+    """Where references are on a curve, by what is nearest, and the farthest that they are off it [rad]."""
+    length = float(curve.end[0])
+    places = np.linspace(0.0, length, 800)
+    coarse = curve.derivatives(places)[0]
+    found = np.array([places[np.argmin(((coarse - q) ** 2).sum(axis=1))] for q in references])
+    for _ in range(30):  # Gauss and Newton; a curve that crosses itself would need more care
+        q, slope, _ = curve.derivatives(found)
+        step = ((references - q) * slope).sum(axis=1) / (slope**2).sum(axis=1)
+        found = found + np.clip(step, -0.01, 0.01)
+    return found, float(np.abs(curve.derivatives(found)[0] - references).max())

@@ -1,0 +1,197 @@
+"""Stops and refusals of motions along curves, compared with the curve and with the same motion left alone."""
+
+import numpy as np
+import pytest
+
+from tvist_lab.safety import sequences
+from tvist_lab.safety.sequences import Sequence
+from tvist_lab.safety.stops import KINDS, PAUSES, SHAPERS
+from tvist_lab.safety.subject import Subject, torques
+from tvist_plant.description import Payload
+from tvist_protocol import commands as c
+from tvist_protocol import values
+from tvist_protocol.replies import Accepted, Done
+from tvist_server.ahead import resting_after
+from tvist_server.collision import CollisionModel
+from tvist_server.refusal import RefusalError
+from tvist_server.safety import TORQUE_SHARE
+from tvist_server.setup import body, paper_payload
+from tvist_server.trajectory import JointLine, Limits, quickest_motion
+
+from .curved import DISC, EXCESS, ON, curve_of, moving, played, random_limits, start
+from .curves import Arc, progress, random_arc
+from .robots import PAPER, UR5E, H
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_every_kind_of_stop_stays_on_the_curve_behind_the_motion_and_rests_no_later(seed):
+    random, curve = np.random.default_rng([seed, 5]), curve_of(seed)
+    limits, shaper = random_limits(random), str(random.choice(SHAPERS))
+    speed = float(random.choice([1.0, 1.0, random.uniform(0.1, 1.0)]))
+    kind = str(random.choice(list(KINDS)))
+    alone = played(moving(curve, shaper, limits, speed))
+    moment = int(random.integers(1, max(resting_after(alone), 2)))
+    robot = moving(curve, shaper, limits, speed)
+    robot.tick(moment)
+    KINDS[kind](robot, random)
+    stopped = played(robot)
+    longest = max(len(alone), len(stopped))
+    alone, stopped = (np.vstack([q, np.repeat(q[-1:], longest - len(q), axis=0)]) for q in (alone, stopped))
+    (free_shares, _), (shares, off) = progress(curve, alone), progress(curve, stopped)
+    case = (seed, kind, shaper, moment, limits)
+    assert off < ON, case
+    assert (shares - free_shares)[moment:].max() <= ON, case
+    assert resting_after(stopped) <= resting_after(alone), case
+    most = TORQUE_SHARE * np.array(UR5E.limits.torque)
+    asked, taken = (np.abs(torques(UR5E, DISC, q[moment - 1 :])).max(axis=0) for q in (alone, stopped))
+    assert (taken / np.maximum(most, asked)).max() <= 1.001, case
+    # A stop keeps the limits of the joints; whoever paused goes on within those of the motion.
+    hardest = np.abs(np.diff(stopped[moment - 2 :], 2, axis=0)).max() / H**2
+    present = np.abs(np.diff(alone, 2, axis=0)).max() / H**2
+    assert hardest <= max(EXCESS * min(UR5E.limits.acceleration), present), case
+    if kind not in PAUSES:
+        event = next(event for event in robot.events if event.kind == "motion_stopped")
+        if event.duration is not None:
+            lasted = (resting_after(stopped) - moment) * H
+            assert event.duration == pytest.approx(max(lasted, 0.0), abs=3 * H), case
+
+
+def test_stops_of_curves_are_stops_and_not_only_the_motion_let_run_out():
+    sooner = []
+    for seed in range(1, 12):
+        curve = curve_of(seed)
+        alone = resting_after(played(moving(curve, "zv", PAPER)))
+        robot = moving(curve, "zv", PAPER)
+        robot.tick(alone // 3)
+        robot.send(c.Stop)
+        sooner.append(1.0 - resting_after(played(robot)) / alone)
+    assert min(sooner) > 0.3
+
+
+@pytest.mark.parametrize("wanted", [9.0, None])
+def test_a_stop_keeps_every_joint_within_the_deceleration_that_it_tells(wanted):
+    """The curve's own part of the acceleration counted: both are as large here as they get."""
+    hardest = []
+    for seed in (1, 2, 3, 5, 6, 7):
+        curve = curve_of(seed)
+        robot = moving(curve, "none", Limits(3.14, 8.0, 2000.0))
+        cycle = robot.controller.cycle
+        while cycle.trajectory.share < 0.5:
+            robot.tick()
+        plan = robot.controller.motion.outlook.plan_stop(wanted)
+        x = [cycle.along.published.q, cycle.along.position]
+        while not plan.trajectory.finished:
+            x.append(plan.trajectory.next())
+        q = np.array([curve.posture(each) for each in x])
+        hardest.append(np.abs(np.diff(q, 2, axis=0)).max() / H**2 / plan.acceleration)
+    assert max(hardest) <= 1.0 + 1e-6
+    assert max(hardest) > 0.6
+
+
+class OnCurves(Sequence):
+    """Random commands as ever, of which every second move goes along a curve."""
+
+    curve = None
+
+    def move(self):
+        motion = self.robot.controller.basis.motion
+        if motion is None or self._random.random() < 0.5:
+            reply = super().move()
+            self.curve = None if isinstance(reply, Accepted) else self.curve
+            return reply
+        for _ in range(20):
+            curve = random_arc(self._random, motion.q)
+            if (np.abs(curve.posture(curve.end)) < np.array(UR5E.limits.position)).all():
+                break
+        try:
+            start(self.robot, curve, Limits(**self._limits()))
+        except RefusalError as refusal:
+            return refusal.reply
+        self.curve = curve
+        return None
+
+    def _watch_way(self, ahead, q):
+        if self.curve is None:
+            super()._watch_way(ahead, q)
+            return
+        tick = self.robot.controller.tick_number - ahead.since
+        there = ahead.references[min(tick, len(ahead.references) - 1)]
+        (reached, bound), off = progress(self.curve, np.array([q, there]))
+        creeps = 1e-6 if tick >= len(ahead.references) else 0.0
+        if off > ON:
+            raise self._broken("a stop leaves the curve")
+        if reached > bound + ON + creeps:
+            raise self._broken("a stop is ahead of what the motion along a curve would have done")
+        if tick > len(ahead.references) + 1 and not self.robot.resting:
+            raise self._broken("a stop lasts longer than the motion along a curve would have")
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_whatever_is_sent_the_promises_hold_on_curves(number, monkeypatch):
+    monkeypatch.setitem(sequences._SENT, "move", (14.0, OnCurves.move))
+    OnCurves(UR5E, number).run()
+
+
+def over_the_floor():
+    """An arc whose ends are clear, and the straight line between them too, while the arc passes through the floor."""
+    lowest = np.array([0.0, 1.2, 0.0, 0.0, 0.0, 0.0])
+    aside = np.array([0.8, 0.0, 0.0, 0.0, 0.0, 0.0])
+    start = np.array([0.0, -0.5, 0.3, -1.5, -1.5, 0.0])
+    return Arc(start, -aside, lowest, 0.6, np.pi)
+
+
+def test_a_curve_that_meets_something_on_its_way_is_refused_with_the_moment():
+    curve = over_the_floor()
+    model = CollisionModel(UR5E, Payload())
+    ends = curve.posture(curve.start), curve.posture(curve.end)
+    assert model.on_way(JointLine(*ends).whole) is None
+    share, meeting = model.on_way(curve.whole)
+    assert model.meeting(curve.posture(share * curve.end)) is not None
+    robot = Subject(UR5E, ends[0], paper_payload(UR5E, 0.0))
+    time = quickest_motion(curve, PAPER, H).time_at(share)
+    with pytest.raises(
+        RefusalError, match=f"{meeting.first} and {meeting.second} .* {time:.1f}. s after the start"
+    ):
+        start(robot, curve)
+    assert robot.controller.cycle.at_rest
+
+
+def test_a_payload_that_would_meet_something_on_the_rest_of_the_curve_is_refused():
+    """It would where the curve goes, and not on the straight line to its end."""
+    curve = Arc(
+        np.array([0.0, -0.5, 0.3, -1.5, -1.5, 0.0]),
+        np.array([-0.8, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        np.array([0.0, 1.2, 0.0, 0.0, 0.0, 0.0]) * 0.25,
+        0.6,
+        np.pi,
+    )
+    robot = Subject(UR5E, curve.posture(curve.start), paper_payload(UR5E, 0.0))
+    start(robot, curve)
+    robot.tick(100)
+    q, x = robot.references[-1], robot.controller.cycle.along.position
+    for far in np.linspace(0.05, 0.9, 40):
+        fields = {"mass": 1.0, "com": (0.0, 0.0, float(far)), "inertia": (0.01, 0, 0, 0.01, 0, 0.01)}
+        reply = robot.send(c.SetPayload, **fields)
+        if reply != Done():
+            break
+    assert reply.code == "collision"
+    model = CollisionModel(UR5E, body(values.Payload(**fields)))
+    assert model.on_way(curve.way(x, curve.end)) is not None
+    assert model.on_way(JointLine(q, curve.posture(curve.end)).whole) is None
+    assert robot.controller.motion.collisions.on_way(curve.way(x, curve.end)) is None
+
+
+def test_brakes_leave_the_curve_and_the_next_motion_begins_where_they_held():
+    curve = curve_of(2)
+    robot = moving(curve, "zv", Limits(3.0, 8.0, 2000.0))
+    robot.tick(200)
+    robot.send(c.SimulationInject, fault="power_loss")
+    q = played(robot)
+    assert np.abs(np.diff(q, axis=0)).max() < 4.0 * H
+    held = q[-1]
+    robot.send(c.SimulationInject, fault="normal")
+    robot.send(c.RestartSafety)
+    robot.send(c.PowerOn)
+    back = Arc(held, -curve.u, curve.v, 0.3, 0.5)
+    start(robot, back)
+    assert progress(back, played(robot)[len(q) :])[1] < ON
