@@ -135,14 +135,6 @@ class MotionControl:
         """What the safety system allows."""
         return self.safety.mode(self.activity)
 
-    def reduce(self, *, reduced: bool) -> None:
-        """Slow motions down on their way, or let them go on; a stream, whose time is its client's, is stopped."""
-        self.safety.reduced = reduced
-        self.motions.keep_rate()
-        stream = self.streams.stream
-        if reduced and stream is not None and stream.limits.velocity > self.motions.reduced_velocity:
-            self.stop(None, "speed was reduced", "limit_velocity")
-
     def power_on(self, *, release_brakes: bool = True) -> None:
         """Power the arm and release its brakes.
 
@@ -169,10 +161,6 @@ class MotionControl:
             plan = StopPlan(None, None, limited=False, duration=stop.duration, way=way)
             self.outlook.brake(stop)
         self._tell_end(plan, why, None, "safety_stop", 0)
-
-    def power_off(self) -> None:
-        """Stop what moves, then take the power; the brakes hold the arm where it is."""
-        self.end("power_off", "power_off was commanded", category=1)
 
     def protect(self, why: str, code: Code | None = None) -> None:
         """Make a protective stop; nothing happens where the brakes hold the arm or power is on its way out."""
@@ -345,19 +333,13 @@ class MotionControl:
         refused = stream is not None and self.cycle.trajectory is not stream
         if refused or (self.cycle.stopping and self.activity is Activity.ENDING):
             self.end("interruption", str(self.ahead.met), "collision")
-        if self.cycle.at_rest and self.activity.moving:
-            self._arrive()
+        if self.cycle.at_rest and self.activity.moving and (target := after(self.activity, "at_rest")):
+            self.activity = target
+            self.motions.done()
         if self.activity.robot_mode is RobotMode.RUNNING:
             for danger in self._protection.dangers(sample):
                 self.protect(danger.why, danger.code)
         return sample
-
-    def _arrive(self) -> None:
-        """The shaped reference rests."""
-        target = after(self.activity, "at_rest")
-        if target is not None:
-            self.activity = target
-            self.motions.done()
 
     def _end_stream(self, why: str, code: Code | None = None, **told: Unpack[Told]) -> None:
         if self.streams.end():

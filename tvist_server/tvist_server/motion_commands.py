@@ -29,7 +29,7 @@ class MotionCommands:
             Row(c.Resume, lambda _: motion.resume()),
             Row(c.SetSpeed, self._set_speed, changes_io=True),
             Row(c.PowerOn, self._power_on),
-            Row(c.PowerOff, lambda _: motion.power_off()),
+            Row(c.PowerOff, lambda _: motion.end("power_off", "power_off was commanded", category=1)),
             Row(c.UnlockProtectiveStop, lambda _: motion.unlock()),
             Row(c.RestartSafety, lambda _: motion.safety.restart()),
         )

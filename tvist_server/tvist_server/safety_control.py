@@ -21,11 +21,15 @@ class SafetyControl:
         """Whether the motion that a safeguard has paused goes on by itself when that is released."""
 
     def reduce(self, *, reduced: bool) -> None:
-        """Reduce the speed, or allow all of it again."""
+        """Slow motions down on their way, or let them go on; a stream, whose time is its client's, is stopped."""
         motion, system = self._motion, self._motion.safety
         if reduced == system.reduced:
             return
-        motion.reduce(reduced=reduced)
+        system.reduced = reduced
+        motion.motions.keep_rate()
+        stream = motion.streams.stream
+        if reduced and stream is not None and stream.limits.velocity > motion.motions.reduced_velocity:
+            motion.stop(None, "speed was reduced", "limit_velocity")
         share = f"{100 * REDUCED_SHARE:g} % of the joints' limits" if reduced else "no longer reduced"
         self._emit("warning", why=f"safety_mode is {motion.safety_mode.name}: speed is {share}")
 
