@@ -61,7 +61,7 @@ class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
     """Its line that is carried out, or comes next when it is played on, counted from 1; 0: none."""
     actual_TCP_force: list[float] | None = None
     """Force and torque at the tool centre point that explain the torques measured in the tick before, base frame
-    [N, N m]; zero while the arm is braked. It is computed when `io` is told, and does not have it told of itself."""
+    [N, N m]; zero while the arm is braked. Told once a second; null where `io` is told since something changed."""
 
 
 DigitalBits = Annotated[int, Meta(ge=0, le=2**18 - 1)]

@@ -239,14 +239,18 @@ class Controller:
             missed_ticks=self.counters.missed_ticks,
         )
 
-    def io(self) -> Io:
-        """Inputs, outputs and registers as they are for the next tick."""
+    def io(self, *, wrench: bool = True) -> Io:
+        """Inputs, outputs and registers as they are for the next tick.
+
+        Args:
+            wrench: Whether to find the wrench at the tool, which takes a third of a tick.
+        """
         return self.peripherals.io(
             self.tick_number + 1,
             self.declared,
             self.motion.motions.wanted_speed,
             self.programs,
-            self.wrench(),
+            self.wrench() if wrench else None,
         )
 
     def wrench(self) -> list[float]:
@@ -261,7 +265,7 @@ class Controller:
         if not self._io_changed:
             return None
         self._io_changed = False
-        return self.io()
+        return self.io(wrench=False)
 
     def truth(self) -> Truth:
         """What no robot can know, after a tick.

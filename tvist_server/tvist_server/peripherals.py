@@ -134,7 +134,7 @@ class Peripherals:
             self._doubles[bank][first:last] = [_double(k, value, bank) for k, value in enumerate(values)]
 
     def io(
-        self, tick: int, payload: Payload, speed: float, program: LoadedProgram, wrench: list[float]
+        self, tick: int, payload: Payload, speed: float, program: LoadedProgram, wrench: list[float] | None
     ) -> Io:
         """What is told of all that.
 
@@ -143,7 +143,7 @@ class Peripherals:
             payload: Declared.
             speed: The speed slider [-].
             program: The one that is loaded.
-            wrench: At the tool centre point in the last tick, base frame [N, N m].
+            wrench: At the tool centre point in the last tick, base frame [N, N m]; None: it is not told.
         """
         return Io(
             tick=tick,

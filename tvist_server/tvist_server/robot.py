@@ -128,7 +128,7 @@ class ServedRobot:
     def tell_telemetry(self, clock: Clock) -> None:
         """Put the server's own figures on this robot, from the controller's thread."""
         punctuality = clock.punctuality(self.driven)
-        self.driven.post(lambda: self._outlet.telemetry(self._telemetry(punctuality)))
+        self.driven.post(lambda: self._outlet.telemetry(self._telemetry(punctuality), self.controller.io()))
 
     def _telemetry(self, punctuality: Punctuality | None) -> Telemetry:
         controller, counters, reception = self.controller, self.controller.counters, self.reception
