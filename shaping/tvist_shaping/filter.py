@@ -166,10 +166,12 @@ class TvistFilter(Filter):
 
     def _train(self) -> Impulses:
         """What the shaper gives for the present modes."""
-        give = self.shaper.impulses
-        trains = [give(f, z) for f, z in zip(self.f_d.tolist(), self.zeta.tolist(), strict=True)]
-        impulses = trains[0] if len(trains) == 1 else product(trains)
-        if impulses.duration > self._longest * (1.0 + ROUNDING):
+        give, f_d, zeta = self.shaper.impulses, self.f_d, self.zeta
+        if len(f_d) == 1:  # one mode is what most have, and without lists it is quicker
+            impulses = give(f_d.item(), zeta.item())
+        else:
+            impulses = product([give(f, z) for f, z in zip(f_d.tolist(), zeta.tolist(), strict=True)])
+        if impulses.tau.item(-1) > self._longest * (1.0 + ROUNDING):
             raise ShaperFailureError(
                 self.name, f"gives impulses that last {impulses.duration:g} s, beyond {self._longest:g} s"
             )
