@@ -47,7 +47,6 @@ class Outlet(Sink):
         self._wake: Callable[[], None] = _nobody
         self._queue: deque[Message | Callable[[], None]] = deque()
         self._room = threading.Event()
-        self._io: Io | None = None
         self.dropped = 0
         """Messages of a tick that found no room."""
 
@@ -92,13 +91,11 @@ class Outlet(Sink):
 
     def io(self, io: Io) -> None:
         """Queue inputs, outputs and registers."""
-        self._io = io
         self._offer(io)
 
-    def telemetry(self, telemetry: Telemetry) -> None:
-        """Queue the server's own figures, and tell inputs, outputs and registers again."""
-        if self._io is not None:
-            self._put(self._io)
+    def telemetry(self, telemetry: Telemetry, io: Io) -> None:
+        """Queue the server's own figures, and tell the present inputs, outputs and registers again."""
+        self._put(io)
         self._put(telemetry)
 
     def answer(self, call: Callable[[], None]) -> None:
@@ -107,7 +104,6 @@ class Outlet(Sink):
 
     def repeat(self, state: State, io: Io) -> None:
         """Tell the present state, inputs, outputs and registers again, for those who come late."""
-        self._io = io
         self._put(io)
         self._put(state)
 
