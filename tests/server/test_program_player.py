@@ -256,6 +256,43 @@ def test_a_safeguard_holds_the_motion_and_the_program_waits_with_it(robot):
     assert reached(robot) == [Q2.tolist()]
 
 
+def test_a_safeguard_between_two_lines_has_the_next_one_wait(robot):
+    play(robot, "paper.urp")
+    until(robot, lambda: len(reached(robot)) == 1)
+    assert robot.controller.cycle.at_rest
+    robot.send(c.SimulationInject, fault="safeguard_stop")
+    robot.tick(100)
+    assert state(robot) == ("paper.urp", "PLAYING", 2)
+    robot.send(c.SimulationInject, fault="normal")
+    until(robot, stopped(robot))
+    assert reached(robot) == [q.tolist() for q in (Q1, Q2, Q3, Q2, Q1)]
+
+
+def test_a_pause_of_the_program_leaves_a_motion_that_is_not_its_own(robot):
+    play(robot, "wait_program.urp")
+    own = robot.send(c.MoveJ, q=tuple(Q2)).id
+    robot.tick(100)
+    assert robot.send(ProgramPause) == Done()
+    robot.tick(LONG)
+    assert [(event.kind, event.id) for event in robot.events] == [
+        ("motion_started", own),
+        ("motion_done", own),
+    ]
+    assert state(robot)[1] == "PAUSED"
+    assert robot.send(ProgramPlay) == Done()
+
+
+@pytest.mark.parametrize("playing", [True, False])
+def test_the_end_of_the_lease_has_io_told_where_it_ends_a_program(robot, playing):
+    robot.send(ProgramLoad, name="wait_program.urp")
+    if playing:
+        robot.send(ProgramPlay)
+    robot.tick()
+    assert robot.controller.changed_io() is not None
+    robot.send(c.ReleaseControl)
+    assert (robot.controller.changed_io() is not None) == playing
+
+
 def test_loading_another_stops_the_one_that_runs(robot):
     play(robot, "paper.urp")
     robot.tick(700)

@@ -288,8 +288,7 @@ class Controller:
 
     def _interrupt(self, why: str) -> None:
         """End what nobody has control of any longer."""
-        self.programs.end()
-        self._io_changed = True
+        self._io_changed |= self.programs.end()
         self.motion.interrupt(why)
 
     def _move_by_program(self, command: c.MoveJ) -> int:

@@ -76,7 +76,9 @@ class ProgramPlayer:
             self.end()
             return True
         lines = self._lines
-        if self.state == "PAUSED" or self._moving is not None or not lines:
+        # Between two lines a safeguard stop finds no motion to pause: the next line waits.
+        waits = self.state == "PAUSED" or self._motion.safety.safeguard
+        if waits or self._moving is not None or not lines:
             return False
         if self._next == len(lines):
             self.end()
@@ -106,9 +108,14 @@ class ProgramPlayer:
                 self.end()
         return (self.state, self._next) != before
 
-    def end(self) -> None:
-        """End the program; what moves is left to others."""
-        self.state, self._next, self._moving = "STOPPED", 0, None
+    def end(self) -> bool:
+        """End the program; what moves is left to others.
+
+        Returns:
+            Whether one was playing or paused.
+        """
+        before, self.state, self._next, self._moving = self.state, "STOPPED", 0, None
+        return before != "STOPPED"
 
     @property
     def _lines(self) -> tuple[Move, ...]:
@@ -139,10 +146,10 @@ class ProgramPlayer:
     def _pause(self, _: Call[ProgramPause]) -> None:
         if self.state != "PLAYING":
             raise RefusalError("wrong_mode", "", "no program is playing: there is nothing to pause")
-        # A motion that is about to end may not be paused: the next line then waits.
-        if self._motion.activity is Activity.MOVING:
+        # Between two lines nothing of the program moves: the next line then waits.
+        if self._moving is not None:
             self._motion.pause()
-        self._safety.stay_paused()
+            self._safety.stay_paused()
         self.state = "PAUSED"
 
     def _stop(self, _: Call[ProgramStop]) -> None:
