@@ -181,6 +181,40 @@ def test_a_program_that_waits_ends_with_power_and_control_too(robot, kind, field
     assert state(robot)[1] == "STOPPED"
 
 
+def test_no_line_begins_after_a_stop_that_was_sent_before_it(robot):
+    play(robot, "paper.urp")
+    assert robot.controller.receive(c.Stop()) == Done()  # before the tick in which the first line would begin
+    robot.tick(10)
+    assert robot.events == []
+    robot.send(ProgramPlay)
+    until(robot, lambda: len(reached(robot)) == 1)
+    robot.send(c.Stop)  # between two lines
+    robot.tick(10)
+    assert state(robot) == ("paper.urp", "STOPPED", 0)
+    assert [event.kind for event in robot.events] == ["motion_started", "motion_done"]
+
+
+@pytest.mark.parametrize("paused", [True, False])
+def test_no_program_survives_an_arm_without_power_though_it_has_it_again_before_the_next_tick(robot, paused):
+    play(robot, "paper.urp")
+    if paused:
+        robot.send(ProgramPause)
+    robot.send(c.PowerOff)
+    robot.send(c.PowerOn)
+    assert state(robot)[1] == "STOPPED"
+    robot.tick(10)
+    assert robot.events == []
+
+
+def test_a_program_that_waits_is_not_ended_by_a_stop_of_another_motion(robot):
+    play(robot, "wait_program.urp")
+    robot.send(c.MoveJ, q=tuple(Q2))
+    robot.tick(100)
+    robot.send(c.Stop)
+    robot.tick(LONG)
+    assert state(robot)[1] == "PLAYING"
+
+
 def test_a_program_ends_with_the_client_that_has_control():
     robot = Robot(clock="realtime", lease_s=0.5)
     play(robot, "paper.urp")

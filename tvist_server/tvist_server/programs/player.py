@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 from tvist_plant.description import RobotDescription
 from tvist_protocol.commands import MoveJ
-from tvist_protocol.modes import RobotMode
 from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramState, ProgramStop
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
@@ -72,9 +71,6 @@ class ProgramPlayer:
         """
         if self.state == "STOPPED":
             return False
-        if self._motion.activity.robot_mode is not RobotMode.RUNNING:
-            self.end()
-            return True
         lines = self._lines
         # Between two lines a safeguard stop finds no motion to pause: the next line waits.
         waits = self.state == "PAUSED" or self._motion.safety.safeguard
@@ -116,6 +112,11 @@ class ProgramPlayer:
         """
         before, self.state, self._next, self._moving = self.state, "STOPPED", 0, None
         return before != "STOPPED"
+
+    def stop_moving(self) -> None:
+        """End a program that moves the arm, also where its next motion has not begun: none begins after a stop."""
+        if self.state == "PLAYING" and self._lines:
+            self.end()
 
     @property
     def _lines(self) -> tuple[Move, ...]:
