@@ -231,11 +231,18 @@ def test_a_program_goes_on_for_the_client_that_control_is_handed_to(robot):
     assert len(reached(robot)) == 5
 
 
-def test_a_protective_stop_pauses_it_and_playing_goes_on_with_the_line_that_was_stopped(robot):
+def test_a_program_without_lines_is_at_none(robot):
+    play(robot, "wait_program.urp")
+    robot.tick(10)
+    assert state(robot) == ("wait_program.urp", "PLAYING", 0)
+
+
+@pytest.mark.parametrize("fault", ["protective_stop", "nan"])
+def test_a_protective_stop_pauses_it_and_playing_goes_on_with_the_line_that_was_stopped(robot, fault):
     play(robot, "paper.urp")
     until(robot, lambda: len(reached(robot)) == 1)
     robot.tick(300)
-    robot.send(c.SimulationInject, fault="protective_stop")
+    robot.send(c.SimulationInject, fault=fault)
     robot.tick(LONG)
     assert state(robot) == ("paper.urp", "PAUSED", 2)
     refused = robot.send(ProgramPlay)

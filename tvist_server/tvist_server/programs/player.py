@@ -61,7 +61,7 @@ class ProgramPlayer:
     @property
     def line(self) -> int:
         """The line that is carried out, or comes next when it is played on, counted from 1; 0: none."""
-        return 0 if self.state == "STOPPED" else self._next + 1
+        return 0 if self.state == "STOPPED" or self._next >= len(self._lines) else self._next + 1
 
     def advance(self) -> bool:
         """Begin the line that comes next, where it is its turn: first thing in every tick.
@@ -100,7 +100,9 @@ class ProgramPlayer:
             if event.kind == "motion_done":
                 self._moving = None
                 self._next += 1
-            elif event.kind == "motion_stopped":
+            elif (
+                event.kind == "motion_stopped" and event.code != "plant_failure"
+            ):  # a protective stop follows that
                 self.end()
         return (self.state, self._next) != before
 
