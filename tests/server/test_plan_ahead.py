@@ -6,7 +6,9 @@ from collections import deque
 import pytest
 
 from tvist_protocol import commands as c
+from tvist_protocol.channels import tag
 from tvist_protocol.codec import encode
+from tvist_protocol.programs import ProgramStop
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.values import Payload
 from tvist_server.controller import Controller
@@ -157,15 +159,16 @@ def test_one_client_s_commands_keep_their_order(served):
     assert served.host.controller.cycle.at_rest
 
 
+@pytest.mark.parametrize("stop", [c.Stop(), ProgramStop()])
 @pytest.mark.parametrize("waiting", [0, 12])
-def test_no_motion_that_was_sent_before_a_stop_outlives_it(served, waiting):
+def test_no_motion_that_was_sent_before_a_stop_outlives_it(served, waiting, stop):
     """Also where something moved when both were sent, and the motion is planned when that has come to rest."""
     served.ask(served.of(c.MoveJ, q=(*Q2[:5].tolist(), 0.05)))
     served.tick(40)
     for _ in range(waiting):
         served.send(served.of(c.SetShaper, name="zv"))
     served.send(served.of(c.MoveJ, q=tuple(Q3.tolist())))
-    served.send(c.Stop())
+    served.send(stop)
     served.empty(ticks=3)
     served.tick(60)
     controller = served.host.controller
@@ -173,15 +176,18 @@ def test_no_motion_that_was_sent_before_a_stop_outlives_it(served, waiting):
     assert not controller.motion.activity.moving
 
 
-def test_a_stop_of_what_moves_waits_for_no_plan(served):
+@pytest.mark.parametrize("stop", [c.Stop(), ProgramStop()])
+def test_a_stop_of_what_moves_waits_for_no_plan(served, stop):
     served.ask(served.of(c.MoveJ, q=tuple(Q2.tolist())))
     served.tick(100)
     for _ in range(10):
         served.send(served.of(c.SetShaper, name="auto"))
-    served.send(c.Stop())
+    served.send(stop)
     served.empty()
     kinds = [entry.message["type"] for entry in served.sink.entries]
-    assert kinds.index("stop") < len(kinds) - 5, "most of what was sent before it was still to be planned"
+    assert kinds.index(tag(type(stop))) < len(kinds) - 5, (
+        "most of what was sent before it was still to be planned"
+    )
 
 
 def test_refusals_are_told_in_their_turn(served):
@@ -262,6 +268,18 @@ def test_a_plan_that_fails_is_a_refusal_and_the_next_one_is_made(served, monkeyp
         assert served.ask(served.of(c.SetShaper, name="zvd")).code == "wrong_mode"
     assert "ZeroDivisionError" in caplog.text
     assert served.ask(served.of(c.SetShaper, name="zvd")) == Done()
+
+
+@pytest.mark.parametrize("stop", [c.Stop(), ProgramStop()])
+def test_a_stop_is_made_however_many_commands_wait(served, stop):
+    served.ask(served.of(c.MoveJ, q=tuple(Q2.tolist())))
+    served.tick(100)
+    for _ in range(MOST_WAITING):
+        served.send(served.of(c.SetShaper, name="auto"))
+    replies = []
+    served.reception.request(encode(stop), replies.append)
+    served.empty()
+    assert replies == [Done()]
 
 
 def test_at_its_end_what_waits_is_refused(served):

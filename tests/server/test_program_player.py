@@ -181,6 +181,40 @@ def test_a_program_that_waits_ends_with_power_and_control_too(robot, kind, field
     assert state(robot)[1] == "STOPPED"
 
 
+def test_no_line_begins_after_a_stop_that_was_sent_before_it(robot):
+    play(robot, "paper.urp")
+    assert robot.controller.receive(c.Stop()) == Done()  # before the tick in which the first line would begin
+    robot.tick(10)
+    assert robot.events == []
+    robot.send(ProgramPlay)
+    until(robot, lambda: len(reached(robot)) == 1)
+    robot.send(c.Stop)  # between two lines
+    robot.tick(10)
+    assert state(robot) == ("paper.urp", "STOPPED", 0)
+    assert [event.kind for event in robot.events] == ["motion_started", "motion_done"]
+
+
+@pytest.mark.parametrize("paused", [True, False])
+def test_no_program_survives_an_arm_without_power_though_it_has_it_again_before_the_next_tick(robot, paused):
+    play(robot, "paper.urp")
+    if paused:
+        robot.send(ProgramPause)
+    robot.send(c.PowerOff)
+    robot.send(c.PowerOn)
+    assert state(robot)[1] == "STOPPED"
+    robot.tick(10)
+    assert robot.events == []
+
+
+def test_a_program_that_waits_is_not_ended_by_a_stop_of_another_motion(robot):
+    play(robot, "wait_program.urp")
+    robot.send(c.MoveJ, q=tuple(Q2))
+    robot.tick(100)
+    robot.send(c.Stop)
+    robot.tick(LONG)
+    assert state(robot)[1] == "PLAYING"
+
+
 def test_a_program_ends_with_the_client_that_has_control():
     robot = Robot(clock="realtime", lease_s=0.5)
     play(robot, "paper.urp")
@@ -197,11 +231,18 @@ def test_a_program_goes_on_for_the_client_that_control_is_handed_to(robot):
     assert len(reached(robot)) == 5
 
 
-def test_a_protective_stop_pauses_it_and_playing_goes_on_with_the_line_that_was_stopped(robot):
+def test_a_program_without_lines_is_at_none(robot):
+    play(robot, "wait_program.urp")
+    robot.tick(10)
+    assert state(robot) == ("wait_program.urp", "PLAYING", 0)
+
+
+@pytest.mark.parametrize("fault", ["protective_stop", "nan"])
+def test_a_protective_stop_pauses_it_and_playing_goes_on_with_the_line_that_was_stopped(robot, fault):
     play(robot, "paper.urp")
     until(robot, lambda: len(reached(robot)) == 1)
     robot.tick(300)
-    robot.send(c.SimulationInject, fault="protective_stop")
+    robot.send(c.SimulationInject, fault=fault)
     robot.tick(LONG)
     assert state(robot) == ("paper.urp", "PAUSED", 2)
     refused = robot.send(ProgramPlay)
@@ -254,6 +295,43 @@ def test_a_safeguard_holds_the_motion_and_the_program_waits_with_it(robot):
     robot.send(c.SimulationInject, fault="normal")
     until(robot, stopped(robot))
     assert reached(robot) == [Q2.tolist()]
+
+
+def test_a_safeguard_between_two_lines_has_the_next_one_wait(robot):
+    play(robot, "paper.urp")
+    until(robot, lambda: len(reached(robot)) == 1)
+    assert robot.controller.cycle.at_rest
+    robot.send(c.SimulationInject, fault="safeguard_stop")
+    robot.tick(100)
+    assert state(robot) == ("paper.urp", "PLAYING", 2)
+    robot.send(c.SimulationInject, fault="normal")
+    until(robot, stopped(robot))
+    assert reached(robot) == [q.tolist() for q in (Q1, Q2, Q3, Q2, Q1)]
+
+
+def test_a_pause_of_the_program_leaves_a_motion_that_is_not_its_own(robot):
+    play(robot, "wait_program.urp")
+    own = robot.send(c.MoveJ, q=tuple(Q2)).id
+    robot.tick(100)
+    assert robot.send(ProgramPause) == Done()
+    robot.tick(LONG)
+    assert [(event.kind, event.id) for event in robot.events] == [
+        ("motion_started", own),
+        ("motion_done", own),
+    ]
+    assert state(robot)[1] == "PAUSED"
+    assert robot.send(ProgramPlay) == Done()
+
+
+@pytest.mark.parametrize("playing", [True, False])
+def test_the_end_of_the_lease_has_io_told_where_it_ends_a_program(robot, playing):
+    robot.send(ProgramLoad, name="wait_program.urp")
+    if playing:
+        robot.send(ProgramPlay)
+    robot.tick()
+    assert robot.controller.changed_io() is not None
+    robot.send(c.ReleaseControl)
+    assert (robot.controller.changed_io() is not None) == playing
 
 
 def test_loading_another_stops_the_one_that_runs(robot):

@@ -103,8 +103,8 @@ class Controller:
         self._payload = DeclaredPayload(setup.payload, self.motion, self.filters, self._emit)
         self.peripherals = Peripherals(self._reporter.set_tcp)
         parts = (
-            self._authority, MotionCommands(self.motion, safety), self.filters, self._payload, self.peripherals,
-            self._faults, self.programs, self,
+            self._authority, MotionCommands(self.motion, safety, self.programs), self.filters, self._payload,
+            self.peripherals, self._faults, self.programs, self,
         )  # fmt: skip
         self._rows = {row.message: row for part in parts for row in part.rows}
         self.latest = self._state(self.cycle.standing)
@@ -292,8 +292,7 @@ class Controller:
 
     def _interrupt(self, why: str) -> None:
         """End what nobody has control of any longer."""
-        self.programs.end()
-        self._io_changed = True
+        self._io_changed |= self.programs.end()
         self.motion.interrupt(why)
 
     def _move_by_program(self, command: c.MoveJ) -> int:

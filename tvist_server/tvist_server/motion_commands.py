@@ -4,6 +4,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Reply
 from tvist_server.command_row import Call, Row
 from tvist_server.motion import MotionControl
+from tvist_server.programs.player import ProgramPlayer
 from tvist_server.refusal import check_content, check_motion
 from tvist_server.safety_control import SafetyControl
 from tvist_server.trajectory import Limits
@@ -15,21 +16,22 @@ class MotionCommands:
     Args:
         motion: What the robot is doing.
         safety: What its safety system does.
+        programs: The program, which no stop and no loss of power lets go on.
     """
 
-    def __init__(self, motion: MotionControl, safety: SafetyControl) -> None:
-        self._motion, self._safety = motion, safety
+    def __init__(self, motion: MotionControl, safety: SafetyControl, programs: ProgramPlayer) -> None:
+        self._motion, self._safety, self._programs = motion, safety, programs
         self._description = motion.cycle.description
         self.rows = (
             Row(c.MoveJ, self._move_j),
             Row(c.ServoStart, self._servo_start),
             Row(c.ServoStop, lambda _: motion.end_stream()),
-            Row(c.Stop, self._stop, lease="if named"),
+            Row(c.Stop, self._stop, lease="if named", changes_io=True),
             Row(c.Pause, self._pause),
             Row(c.Resume, lambda _: motion.resume()),
             Row(c.SetSpeed, self._set_speed, changes_io=True),
             Row(c.PowerOn, self._power_on),
-            Row(c.PowerOff, lambda _: motion.end("power_off", "power_off was commanded", category=1)),
+            Row(c.PowerOff, self._power_off, changes_io=True),
             Row(c.UnlockProtectiveStop, lambda _: motion.unlock()),
             Row(c.RestartSafety, lambda _: motion.safety.restart()),
         )
@@ -46,6 +48,7 @@ class MotionCommands:
         self._motion.follow(command.period, limits, call.now)
 
     def _stop(self, call: Call[c.Stop]) -> None:
+        self._programs.stop_moving()
         self._motion.stop(call.command.deceleration, "a stop was commanded")
 
     def _pause(self, _: Call[c.Pause]) -> None:
@@ -57,3 +60,7 @@ class MotionCommands:
 
     def _power_on(self, call: Call[c.PowerOn]) -> None:
         self._motion.power_on(release_brakes=call.command.release_brakes)
+
+    def _power_off(self, _: Call[c.PowerOff]) -> None:
+        self._programs.end()
+        self._motion.end("power_off", "power_off was commanded", category=1)

@@ -94,7 +94,7 @@ class Outlet(Sink):
         self._offer(io)
 
     def telemetry(self, telemetry: Telemetry, io: Io) -> None:
-        """Queue the server's own figures, and tell inputs, outputs and registers again."""
+        """Queue the server's own figures, and tell the present inputs, outputs and registers again."""
         self._put(io)
         self._put(telemetry)
 

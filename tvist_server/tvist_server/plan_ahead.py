@@ -7,6 +7,7 @@ from queue import SimpleQueue
 from typing import NamedTuple
 
 from tvist_protocol.commands import PowerOff, Stop
+from tvist_protocol.programs import ProgramStop
 from tvist_protocol.replies import Refused, Reply
 from tvist_server.admission import Admitted
 from tvist_server.gateways.base import Answer
@@ -23,7 +24,7 @@ CLOSE_WAIT = 1.0
 """How long the plan that is being made may take at close [s]."""
 
 
-STOPPING = (Stop, PowerOff)
+STOPPING = (Stop, PowerOff, ProgramStop)
 """Commands that stop the arm."""
 _BUSY = Refused(
     code="busy",

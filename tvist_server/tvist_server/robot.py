@@ -128,7 +128,12 @@ class ServedRobot:
     def tell_telemetry(self, clock: Clock) -> None:
         """Put the server's own figures on this robot, from the controller's thread."""
         punctuality = clock.punctuality(self.driven)
-        self.driven.post(lambda: self._outlet.telemetry(self._telemetry(punctuality), self.controller.io()))
+
+        def tell() -> None:
+            # As io is now, and not as it was told last: a program may have been played since, before the next tick.
+            self._outlet.telemetry(self._telemetry(punctuality), self.controller.io())
+
+        self.driven.post(tell)
 
     def _telemetry(self, punctuality: Punctuality | None) -> Telemetry:
         controller, counters, reception = self.controller, self.controller.counters, self.reception

@@ -79,6 +79,14 @@ def test_what_other_clients_load_and_play_is_told_too(programs, robot):
     assert titles(robot) == [STARTED, STOPPED]
 
 
+def test_one_that_ends_because_another_is_loaded_is_told_to_have_stopped_under_its_own_name(programs, robot):
+    programs.io(io(program="Q2.urp", program_state="PLAYING", program_line=1))
+    programs.io(io(program="Q3.urp"))
+    programs.io(io(program="Q1.urp", program_state="PLAYING", program_line=1))
+    assert titles(robot) == [STARTED, STOPPED, STARTED]
+    assert [one.values["text"] for one in told(robot)] == ["Q2", "Q2", "Q1"]
+
+
 def test_folders_do_not_matter(programs, control):
     assert load(programs, "/ursim/programs/wait_program.urp", control)
     assert (programs.path, programs.name) == ("/ursim/programs/wait_program.urp", "wait_program.urp")

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 from tvist_plant.description import RobotDescription
 from tvist_protocol.commands import MoveJ
-from tvist_protocol.modes import RobotMode
 from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramState, ProgramStop
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
@@ -62,7 +61,7 @@ class ProgramPlayer:
     @property
     def line(self) -> int:
         """The line that is carried out, or comes next when it is played on, counted from 1; 0: none."""
-        return 0 if self.state == "STOPPED" else self._next + 1
+        return 0 if self.state == "STOPPED" or self._next >= len(self._lines) else self._next + 1
 
     def advance(self) -> bool:
         """Begin the line that comes next, where it is its turn: first thing in every tick.
@@ -72,11 +71,10 @@ class ProgramPlayer:
         """
         if self.state == "STOPPED":
             return False
-        if self._motion.activity.robot_mode is not RobotMode.RUNNING:
-            self.end()
-            return True
         lines = self._lines
-        if self.state == "PAUSED" or self._moving is not None or not lines:
+        # Between two lines a safeguard stop finds no motion to pause: the next line waits.
+        waits = self.state == "PAUSED" or self._motion.safety.safeguard
+        if waits or self._moving is not None or not lines:
             return False
         if self._next == len(lines):
             self.end()
@@ -102,13 +100,25 @@ class ProgramPlayer:
             if event.kind == "motion_done":
                 self._moving = None
                 self._next += 1
-            elif event.kind == "motion_stopped":
+            elif (
+                event.kind == "motion_stopped" and event.code != "plant_failure"
+            ):  # a protective stop follows that
                 self.end()
         return (self.state, self._next) != before
 
-    def end(self) -> None:
-        """End the program; what moves is left to others."""
-        self.state, self._next, self._moving = "STOPPED", 0, None
+    def end(self) -> bool:
+        """End the program; what moves is left to others.
+
+        Returns:
+            Whether one was playing or paused.
+        """
+        before, self.state, self._next, self._moving = self.state, "STOPPED", 0, None
+        return before != "STOPPED"
+
+    def stop_moving(self) -> None:
+        """End a program that moves the arm, also where its next motion has not begun: none begins after a stop."""
+        if self.state == "PLAYING" and self._lines:
+            self.end()
 
     @property
     def _lines(self) -> tuple[Move, ...]:
@@ -139,10 +149,10 @@ class ProgramPlayer:
     def _pause(self, _: Call[ProgramPause]) -> None:
         if self.state != "PLAYING":
             raise RefusalError("wrong_mode", "", "no program is playing: there is nothing to pause")
-        # A motion that is about to end may not be paused: the next line then waits.
-        if self._motion.activity is Activity.MOVING:
+        # Between two lines nothing of the program moves: the next line then waits.
+        if self._moving is not None:
             self._motion.pause()
-        self._safety.stay_paused()
+            self._safety.stay_paused()
         self.state = "PAUSED"
 
     def _stop(self, _: Call[ProgramStop]) -> None:

@@ -141,6 +141,7 @@ class Programs:
     def io(self, io: Io) -> None:
         """The controller says how it stands."""
         if io.program is not None and io.program != self.name:
+            self._become("STOPPED")  # the one before, under its own name
             self.path = f"{FOLDER}/{io.program}"
         self._become(io.program_state)
 

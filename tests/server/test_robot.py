@@ -1,0 +1,51 @@
+"""What a served robot tells between two ticks."""
+
+from tvist_protocol import commands as c
+from tvist_protocol.codec import encode
+from tvist_protocol.io import Io
+from tvist_protocol.programs import ProgramLoad, ProgramPlay
+from tvist_protocol.replies import Done
+from tvist_server.robot import ServedRobot
+
+from .robots import setup
+
+
+class NoLateness:
+    """A clock whose ticks are not watched."""
+
+    def punctuality(self, _robot):
+        return None
+
+
+class IoGateway:
+    """Keeps what is told of inputs, outputs, registers and programs."""
+
+    dropped = setpoints_refused = 0
+
+    def __init__(self):
+        self.told = []
+
+    def publish(self, _topic, message, _data):
+        if isinstance(message, Io):
+            self.told.append(message)
+
+
+def test_with_the_telemetry_io_is_told_as_it_is_and_not_as_it_was_before_the_last_commands(tmp_path):
+    robot, gateway, replies = ServedRobot(setup(clock="lockstep"), None, tmp_path), IoGateway(), []
+    robot.open([gateway])
+
+    def send(command):
+        robot.reception.request(encode(command), replies.append)
+        robot.driven.jobs.do_waiting()
+        robot.hand_on()
+        return replies[-1]
+
+    token = send(c.TakeControl(client="a")).token
+    assert send(c.SimulationStep(token=token, ticks=1)) == Done(tick=1)
+    assert gateway.told[-1].program_state == "STOPPED"
+    assert send(ProgramLoad(name="paper.urp")) == Done()
+    assert send(ProgramPlay(token=token)) == Done()
+    robot.tell_telemetry(NoLateness())
+    robot.driven.jobs.do_waiting()
+    robot.hand_on()
+    assert [(io.program, io.program_state) for io in gateway.told[1:]] == [("paper.urp", "PLAYING")]
