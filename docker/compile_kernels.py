@@ -1,10 +1,10 @@
 """Have every kernel compiled that a served robot calls, by driving one in process. Run while an image is built."""  # noqa: INP001  a script
 
+from tvist_controller.loopback import LoopbackHost
 from tvist_protocol.codec import decode_reply, encode
 from tvist_protocol.commands import MoveJ, SimulationStep, TakeControl
 from tvist_protocol.replies import Accepted, Done, Reply
 from tvist_server.config import from_mapping
-from tvist_server.gateways.loopback import LoopbackHost
 
 host = LoopbackHost(from_mapping({"clock": "lockstep", "truth": True}, "configuration").setup())
 

@@ -7,9 +7,9 @@ from msgspec.structs import replace
 
 from tvist_client.robot import Robot
 from tvist_client.transports.loopback import LoopbackTransport
+from tvist_controller.loopback import LoopbackHost
+from tvist_controller.setup import Setup
 from tvist_server.config import ServeConfig
-from tvist_server.gateways.loopback import LoopbackHost
-from tvist_server.setup import Setup
 
 
 def free_setup(config: ServeConfig | None = None, **changes: object) -> Setup:

@@ -5,17 +5,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from tvist_controller.controller import Controller
+from tvist_controller.own_shapers import OwnShaper, RecordedShaper
+from tvist_controller.presence import Presence
+from tvist_controller.setup import Setup
 from tvist_lab.mcap_file import RecordingFile
 from tvist_protocol.commands import HandOver, Setpoint, TakeControl
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError, TvistError
 from tvist_protocol.journal import Entry, message_of
 from tvist_protocol.stream import Event, State, Truth
-from tvist_server.controller import Controller
-from tvist_server.own_shapers import OwnShaper, RecordedShaper
-from tvist_server.presence import Presence
 from tvist_server.recording import Recorder
-from tvist_server.setup import Setup
 
 
 class ReplayError(TvistError):

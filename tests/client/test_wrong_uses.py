@@ -20,9 +20,9 @@ from tvist_client import (
 )
 from tvist_client.blocking import Robot as BlockingRobot
 from tvist_client.transports.loopback import LoopbackTransport
+from tvist_controller.loopback import LoopbackHost
 from tvist_lab.in_process import free_setup
 from tvist_protocol.keys import check_robot_name
-from tvist_server.gateways.loopback import LoopbackHost
 
 Q1 = (0.0, -3.1, 0.0, -1.57, 0.0, 0.0)
 MSGSPEC = re.compile(r"Expected `|Object (missing|contains)|Invalid enum|at `\$")

@@ -6,6 +6,11 @@ import math
 import numpy as np
 import pytest
 
+from tvist_controller import calibrations
+from tvist_controller.collision import CollisionModel
+from tvist_controller.cycle import ControlCycle
+from tvist_controller.refusal import RefusalError
+from tvist_controller.setup import body, paper_payload
 from tvist_lab.evaluation.baselines import EQUAL_DURATION, baselines
 from tvist_lab.evaluation.evaluate import WORTH, Job, Judged, Made, evaluate, interval, judge, report
 from tvist_lab.evaluation.line import (
@@ -21,11 +26,6 @@ from tvist_lab.evaluation.moves import Move, MovesError, draw_moves, is_free, re
 from tvist_lab.evaluation.recipes import Mistaken, Recipe, RecipeError
 from tvist_plant.description import load
 from tvist_plant.plant import PERIOD
-from tvist_server import calibrations
-from tvist_server.collision import CollisionModel
-from tvist_server.cycle import ControlCycle
-from tvist_server.refusal import RefusalError
-from tvist_server.setup import body, paper_payload
 from tvist_shaping.estimators.fixed import Fixed
 
 

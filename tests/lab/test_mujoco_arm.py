@@ -9,6 +9,8 @@ pytest.importorskip("mujoco")
 
 from tvist_client.blocking import Robot
 from tvist_client.transports.loopback import LoopbackTransport
+from tvist_controller.loopback import LoopbackHost
+from tvist_controller.setup import body
 from tvist_lab.in_process import free_setup
 from tvist_lab.mujoco_arm import MujocoArm
 from tvist_plant.description import Payload, load
@@ -17,8 +19,6 @@ from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PlantError
 from tvist_protocol.codec import decode_state
 from tvist_protocol.errors import RefusedError
-from tvist_server.gateways.loopback import LoopbackHost
-from tvist_server.setup import body
 
 TARGET = [0.4, -2.9, 0.3, -1.4, 0.0, 0.1]
 

@@ -7,10 +7,10 @@ import sys
 import numpy as np
 import pytest
 
+from tvist_controller.trajectory import PathStop
 from tvist_lab.safety import sequences, stops
 from tvist_lab.safety.report import Counts, broken, search
 from tvist_plant.description import load
-from tvist_server.trajectory import PathStop
 
 UR5E = load("ur5e")
 

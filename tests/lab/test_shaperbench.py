@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tvist_controller.calibrations import load as load_calibration
 from tvist_lab.evaluation.arms import ARMS
 from tvist_lab.evaluation.candidates import Named, Task
 from tvist_lab.evaluation.causality import check_causal
@@ -29,7 +30,6 @@ from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.imperfections import Imperfections, YieldingBase
 from tvist_plant.integrator import relaxed
 from tvist_plant.plant import PERIOD
-from tvist_server.calibrations import load as load_calibration
 
 HONEST = """
     import numpy as np

@@ -5,8 +5,8 @@ import pytest
 from tvist_client import LoopbackTransport, Robot
 from tvist_client.readiness import look
 from tvist_client.unlock import make_ready
+from tvist_controller.loopback import LoopbackHost
 from tvist_lab.in_process import free_setup
-from tvist_server.gateways.loopback import LoopbackHost
 
 
 @pytest.fixture

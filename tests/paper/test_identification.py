@@ -6,12 +6,12 @@ import msgspec
 import numpy as np
 import pytest
 
+from tvist_controller.calibrations import estimator_of
 from tvist_lab.identification.fit import FitError, fit_polynomials
 from tvist_lab.identification.identify import Plan, identify
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_lab.paper.published import pose
 from tvist_protocol.calibration import calibration_from_json, calibration_to_json
-from tvist_server.calibrations import estimator_of
 
 
 def measured(plan: Plan):

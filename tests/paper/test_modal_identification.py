@@ -6,6 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tvist_controller.calibrations.modal import modal_estimator
+from tvist_controller.collision import CollisionModel
+from tvist_controller.setup import body, paper_payload
 from tvist_lab.identification import modal
 from tvist_lab.identification.design import choose, predicted
 from tvist_lab.identification.identify import IdentificationError
@@ -16,9 +19,6 @@ from tvist_lab.identification.unknowns import Arm
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_plant.description import load
 from tvist_protocol.calibration import calibration_from_json, calibration_to_json
-from tvist_server.calibrations.modal import modal_estimator
-from tvist_server.collision import CollisionModel
-from tvist_server.setup import body, paper_payload
 
 ROBOT = load("ur5e")
 PAYLOADS = (paper_payload(ROBOT, 0.0), paper_payload(ROBOT, 5.0))

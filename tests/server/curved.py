@@ -2,14 +2,14 @@
 
 import numpy as np
 
+from tvist_controller.collision import CollisionModel
+from tvist_controller.planning.filter_planner import FilterPlanner
+from tvist_controller.planning.move_planner import MovePlanner
+from tvist_controller.setup import body, paper_payload
+from tvist_controller.trajectory import Limits
 from tvist_lab.safety.stops import SHAPERS
 from tvist_lab.safety.subject import Subject
 from tvist_protocol import commands as c
-from tvist_server.collision import CollisionModel
-from tvist_server.planning.filter_planner import FilterPlanner
-from tvist_server.planning.move_planner import MovePlanner
-from tvist_server.setup import body, paper_payload
-from tvist_server.trajectory import Limits
 
 from .curves import random_arc, tool_circle
 from .robots import PAPER, UR5E, setup

@@ -7,9 +7,9 @@ import pinocchio as pin
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import least_squares
 
+from tvist_controller.trajectory import Bends, Curve
 from tvist_plant.description import Payload
 from tvist_plant.model import FLANGE, rigid_model
-from tvist_server.trajectory import Bends, Curve
 
 from .robots import Q1, UR5E
 

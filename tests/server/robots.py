@@ -3,15 +3,15 @@
 import msgspec
 import numpy as np
 
+from tvist_controller.controller import Controller
+from tvist_controller.cycle import ControlCycle
+from tvist_controller.outlook import Outlook
+from tvist_controller.setup import Setup, body, paper_payload
+from tvist_controller.trajectory import Limits
 from tvist_plant.description import RobotDescription, load
 from tvist_plant.plant import PERIOD, Measurement, Plant
 from tvist_protocol import commands as c
 from tvist_protocol.calibration import Calibration, calibration_of
-from tvist_server.controller import Controller
-from tvist_server.cycle import ControlCycle
-from tvist_server.outlook import Outlook
-from tvist_server.setup import Setup, body, paper_payload
-from tvist_server.trajectory import Limits
 from tvist_shaping.catalogue import SHAPERS, shaper
 from tvist_shaping.estimators.polynomial import Polynomial
 from tvist_shaping.filter import TvistFilter

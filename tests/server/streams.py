@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tvist_server.trajectory import JointLine, Limits, quickest_motion
+from tvist_controller.trajectory import JointLine, Limits, quickest_motion
 
 from .robots import H
 

@@ -4,12 +4,12 @@ import msgpack
 import msgspec
 import pytest
 
+from tvist_controller.admission import admit, admit_setpoint
+from tvist_controller.session import Lease
 from tvist_protocol import commands as c
 from tvist_protocol.codec import MAX_BYTES, encode
 from tvist_protocol.explain import EXPLAINED_BYTES
 from tvist_protocol.replies import Refused
-from tvist_server.admission import admit, admit_setpoint
-from tvist_server.session import Lease
 
 LEASE = Lease("anna", "anna#1", 30.0, 30.0, None)
 Q = (0.0,) * 6

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from tvist_controller.calibrations import load
+from tvist_controller.setup import paper_payload
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Done
 from tvist_protocol.values import Payload
-from tvist_server.calibrations import load
-from tvist_server.setup import paper_payload
 
 from .robots import PAPER, Q1, Q2, Q3, UR5E, H, Robot
 

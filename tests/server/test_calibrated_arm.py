@@ -3,11 +3,11 @@
 import msgspec
 import pytest
 
+from tvist_controller.about import info_of
+from tvist_controller.calibrations import available, load
 from tvist_plant.fingerprint import fingerprint
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Done
-from tvist_server.about import info_of
-from tvist_server.calibrations import available, load
 
 from .robots import UR5E, Robot, calibration
 

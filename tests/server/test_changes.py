@@ -4,15 +4,15 @@ import msgspec
 import numpy as np
 import pytest
 
+from tvist_controller.collision import CollisionModel
+from tvist_controller.control.inverse_dynamics import SLEW, InverseDynamics
+from tvist_controller.cycle import STILL
+from tvist_controller.outlook import Outlook
+from tvist_controller.safety import TORQUE_SHARE
+from tvist_controller.setup import body, paper_payload
+from tvist_controller.trajectory import Limits
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Done
-from tvist_server.collision import CollisionModel
-from tvist_server.control.inverse_dynamics import SLEW, InverseDynamics
-from tvist_server.cycle import STILL
-from tvist_server.outlook import Outlook
-from tvist_server.safety import TORQUE_SHARE
-from tvist_server.setup import body, paper_payload
-from tvist_server.trajectory import Limits
 from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.estimators.polynomial import Polynomial

@@ -6,13 +6,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tvist_controller.collision import CLEARANCE, CollisionModel
+from tvist_controller.trajectory import JointLine
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import Payload
 from tvist_plant.model import link_frame, rigid_model
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done, Refused
-from tvist_server.collision import CLEARANCE, CollisionModel
-from tvist_server.trajectory import JointLine
 
 from .robots import UR5E, Robot
 

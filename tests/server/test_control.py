@@ -4,12 +4,12 @@ import msgspec
 import numpy as np
 import pytest
 
+from tvist_controller.control.differentiator import Differentiator, Target
+from tvist_controller.control.inverse_dynamics import InverseDynamics
+from tvist_controller.control.joint_controllers import JointControllers
+from tvist_controller.control.kinematics import ForwardKinematics, rotation_vector
+from tvist_controller.setup import body, paper_payload
 from tvist_plant.description import Payload
-from tvist_server.control.differentiator import Differentiator, Target
-from tvist_server.control.inverse_dynamics import InverseDynamics
-from tvist_server.control.joint_controllers import JointControllers
-from tvist_server.control.kinematics import ForwardKinematics, rotation_vector
-from tvist_server.setup import body, paper_payload
 
 from .robots import Q1, Q2, Q3, UR5E, H, cut
 

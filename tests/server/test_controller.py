@@ -4,16 +4,16 @@ import msgspec
 import numpy as np
 import pytest
 
+from tvist_controller.about import info_of
+from tvist_controller.controller import Controller
+from tvist_controller.cycle import STILL
+from tvist_controller.setup import body, paper_payload
+from tvist_controller.streaming import TIMEOUT
 from tvist_protocol import commands as c
 from tvist_protocol.codec import check, encode
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.stream import Telemetry
 from tvist_protocol.values import Payload
-from tvist_server.about import info_of
-from tvist_server.controller import Controller
-from tvist_server.cycle import STILL
-from tvist_server.setup import body, paper_payload
-from tvist_server.streaming import TIMEOUT
 
 from .robots import PAPER, Q1, Q2, Q3, ROUNDING, UR5E, H, Robot, calibration, cut, setup
 

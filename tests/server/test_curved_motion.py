@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from tvist_controller.trajectory import Bends, JointLine, Limits, quickest_motion
 from tvist_lab.safety.stops import SHAPERS
 from tvist_lab.safety.subject import Subject, torques
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done
-from tvist_server.trajectory import Bends, JointLine, Limits, quickest_motion
 
 from .curved import BACK, DISC, EXCESS, ON, POSITIVE, curve_of, moving, played, random_limits, start
 from .curves import Arc, progress, tool_circle

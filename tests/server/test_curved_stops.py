@@ -3,6 +3,12 @@
 import numpy as np
 import pytest
 
+from tvist_controller.ahead import resting_after
+from tvist_controller.collision import CollisionModel
+from tvist_controller.refusal import RefusalError
+from tvist_controller.safety import TORQUE_SHARE
+from tvist_controller.setup import body, paper_payload
+from tvist_controller.trajectory import JointLine, Limits, quickest_motion
 from tvist_lab.safety import sequences
 from tvist_lab.safety.sequences import Sequence
 from tvist_lab.safety.stops import KINDS, PAUSES, SHAPERS
@@ -11,12 +17,6 @@ from tvist_plant.description import Payload
 from tvist_protocol import commands as c
 from tvist_protocol import values
 from tvist_protocol.replies import Accepted, Done
-from tvist_server.ahead import resting_after
-from tvist_server.collision import CollisionModel
-from tvist_server.refusal import RefusalError
-from tvist_server.safety import TORQUE_SHARE
-from tvist_server.setup import body, paper_payload
-from tvist_server.trajectory import JointLine, Limits, quickest_motion
 
 from .curved import DISC, EXCESS, ON, curve_of, moving, played, random_limits, start
 from .curves import Arc, progress, random_arc

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from tvist_server.control.inverse_dynamics import SLEW
-from tvist_server.cycle import STILL
-from tvist_server.setup import body, paper_payload
-from tvist_server.trajectory import Limits
+from tvist_controller.control.inverse_dynamics import SLEW
+from tvist_controller.cycle import STILL
+from tvist_controller.setup import body, paper_payload
+from tvist_controller.trajectory import Limits
 from tvist_shaping.estimators.fixed import Fixed
 
 from .robots import FITTING, PAPER, Q1, Q2, Q3, UR5E, H, cycle, without_arm

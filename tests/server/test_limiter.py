@@ -8,8 +8,8 @@ import ruckig
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tvist_server.trajectory import Limits
-from tvist_server.trajectory.limiter import Limiter
+from tvist_controller.trajectory import Limits
+from tvist_controller.trajectory.limiter import Limiter
 
 from .robots import PAPER, ROUNDING, H
 from .streams import there_and_back

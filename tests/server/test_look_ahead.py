@@ -5,15 +5,15 @@ import itertools
 import numpy as np
 import pytest
 
+from tvist_controller.about import info_of
+from tvist_controller.ahead import MOST_AHEAD, resting_after
+from tvist_controller.collision import CLEARANCE, CollisionModel
+from tvist_controller.cycle import STILL
+from tvist_controller.outlook import Outlook
 from tvist_lab.safety import changes, streams
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done, Refused
-from tvist_server.about import info_of
-from tvist_server.ahead import MOST_AHEAD, resting_after
-from tvist_server.collision import CLEARANCE, CollisionModel
-from tvist_server.cycle import STILL
-from tvist_server.outlook import Outlook
 
 from .robots import FITTING, PAPER, Q3, UR5E, H, Robot, without_arm
 

@@ -4,6 +4,9 @@ import msgspec
 import numpy as np
 import pytest
 
+from tvist_controller.calibrations import available, estimator_of, fits, load
+from tvist_controller.calibrations.modal import modal_estimator
+from tvist_controller.setup import body, paper_payload
 from tvist_plant.description import load as load_robot
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_protocol.calibration import (
@@ -13,9 +16,6 @@ from tvist_protocol.calibration import (
     calibration_to_json,
 )
 from tvist_protocol.errors import ProtocolError
-from tvist_server.calibrations import available, estimator_of, fits, load
-from tvist_server.calibrations.modal import modal_estimator
-from tvist_server.setup import body, paper_payload
 from tvist_shaping.errors import EstimatorError
 
 ROBOT = load_robot("ur5e")

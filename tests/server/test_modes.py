@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from tvist_controller.overload import TICKS, Overload
+from tvist_controller.safety import REDUCED_SHARE
+from tvist_controller.session import NoControlError, Session
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.transitions import TRANSITIONS, Activity, Control, after
 from tvist_protocol.values import Payload
-from tvist_server.overload import TICKS, Overload
-from tvist_server.safety import REDUCED_SHARE
-from tvist_server.session import NoControlError, Session
 from tvist_shaping.catalogue import SHAPERS
 
 from .robots import Q1, Q2, Q3, UR5E, H, Robot

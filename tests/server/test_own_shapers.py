@@ -6,6 +6,10 @@ import pickle
 import numpy as np
 import pytest
 
+from tvist_controller.about import info_of
+from tvist_controller.own_shapers import OwnShaper, OwnShaperError, is_file, load_own
+from tvist_controller.planning.planner import Planner
+from tvist_controller.setup import Setup
 from tvist_lab.mcap_file import RecordingFile
 from tvist_lab.replay import ReplayError, replay_file
 from tvist_plant.user_file import UserFileError
@@ -14,11 +18,7 @@ from tvist_protocol.journal import entry_of
 from tvist_protocol.modes import SafetyMode
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.values import Frequency
-from tvist_server.about import info_of
 from tvist_server.config import ConfigError, from_mapping, read_toml
-from tvist_server.own_shapers import OwnShaper, OwnShaperError, is_file, load_own
-from tvist_server.planning.planner import Planner
-from tvist_server.setup import Setup
 from tvist_shaping import FirShaper, Impulses, Shaper, zv
 from tvist_shaping.own import TRIED_F_D
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from tvist_controller.trajectory import JointLine, Limits, quickest_motion
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RuntimeState
 from tvist_protocol.replies import Accepted, Done
-from tvist_server.trajectory import JointLine, Limits, quickest_motion
 
 from .robots import PAPER, Q1, Q3, H, Robot
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from tvist_controller.collision import CollisionModel
+from tvist_controller.cycle import ControlCycle
+from tvist_controller.payload_monitor import TOLERATED, PayloadMonitor
+from tvist_controller.setup import body, paper_payload
+from tvist_controller.trajectory import Limits
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_plant.description import load
-from tvist_server.collision import CollisionModel
-from tvist_server.cycle import ControlCycle
-from tvist_server.payload_monitor import TOLERATED, PayloadMonitor
-from tvist_server.setup import body, paper_payload
-from tvist_server.trajectory import Limits
 from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.filter import TvistFilter

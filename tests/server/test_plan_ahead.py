@@ -5,16 +5,16 @@ from collections import deque
 
 import pytest
 
+from tvist_controller.controller import Controller
+from tvist_controller.host import Host
+from tvist_controller.planning.planner import Planner
 from tvist_protocol import commands as c
 from tvist_protocol.channels import tag
 from tvist_protocol.codec import encode
 from tvist_protocol.programs import ProgramStop
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.values import Payload
-from tvist_server.controller import Controller
-from tvist_server.host import Host
 from tvist_server.plan_ahead import MOST_WAITING, PlanAhead
-from tvist_server.planning.planner import Planner
 from tvist_server.reception import Reception
 
 from .robots import Q2, Q3, Robot, calibration, setup

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
+from tvist_controller.controller import Controller
+from tvist_controller.setup import body, paper_payload
 from tvist_plant.description import Payload
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import Measurement, PlantError
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done, Refused
-from tvist_server.controller import Controller
-from tvist_server.setup import body, paper_payload
 
 from .robots import Q2, UR5E, NoArm, Robot, setup
 

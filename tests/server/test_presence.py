@@ -2,8 +2,8 @@
 
 import pytest
 
-from tvist_server.presence import Presence
-from tvist_server.session import NoControlError
+from tvist_controller.presence import Presence
+from tvist_controller.session import NoControlError
 
 
 @pytest.fixture

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tvist_controller.programs.built_in import built_in
 from tvist_protocol import commands as c
 from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramStop
 from tvist_protocol.replies import Accepted, Done, Refused
-from tvist_server.programs.built_in import built_in
 
 from .robots import Q1, Q2, Q3, UR5E, Robot
 

@@ -5,11 +5,11 @@ import math
 import msgspec
 import pytest
 
+from tvist_controller.choices import choose_filter, choose_source, make_estimator, wanted_modes
+from tvist_controller.refusal import RefusalError, check_body, check_joints, check_motion
+from tvist_controller.setup import paper_payload
 from tvist_protocol.commands import SetEstimator
 from tvist_protocol.values import Payload
-from tvist_server.choices import choose_filter, choose_source, make_estimator, wanted_modes
-from tvist_server.refusal import RefusalError, check_body, check_joints, check_motion
-from tvist_server.setup import paper_payload
 from tvist_shaping import BUILT_IN
 from tvist_shaping.estimators.fixed import Fixed
 

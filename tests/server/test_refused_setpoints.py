@@ -5,13 +5,13 @@ import math
 import msgspec
 import pytest
 
+from tvist_controller.controller import Controller
+from tvist_controller.host import Host
+from tvist_controller.streaming import TIMEOUT
 from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
 from tvist_protocol.journal import Entry
 from tvist_protocol.replies import Done
-from tvist_server.controller import Controller
-from tvist_server.host import Host
-from tvist_server.streaming import TIMEOUT
 
 from .robots import UR5E, H, setup
 

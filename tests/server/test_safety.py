@@ -4,13 +4,19 @@ import msgspec
 import numpy as np
 import pytest
 
+from tvist_controller.control.differentiator import Target
+from tvist_controller.control.inverse_dynamics import InverseDynamics
+from tvist_controller.safety import (
+    GENTLEST_STOP,
+    TORQUE_SHARE,
+    StopTorque,
+    acceleration_on_way,
+    largest_torque,
+)
+from tvist_controller.stops import STEP, StopPlanner
+from tvist_controller.trajectory import JointLine, Limits, quickest_motion
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c
-from tvist_server.control.differentiator import Target
-from tvist_server.control.inverse_dynamics import InverseDynamics
-from tvist_server.safety import GENTLEST_STOP, TORQUE_SHARE, StopTorque, acceleration_on_way, largest_torque
-from tvist_server.stops import STEP, StopPlanner
-from tvist_server.trajectory import JointLine, Limits, quickest_motion
 
 from .robots import Q1, Q3, UR5E, H, Robot
 

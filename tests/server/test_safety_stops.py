@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from tvist_controller.brakes import brake
+from tvist_controller.control.differentiator import Target
+from tvist_controller.instruments.status import _SAFETY_BITS
+from tvist_controller.setup import body, paper_payload
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import Accepted, Done, Refused
-from tvist_server.brakes import brake
-from tvist_server.control.differentiator import Target
-from tvist_server.instruments.status import _SAFETY_BITS
-from tvist_server.setup import body, paper_payload
 
 from .robots import Q1, Q2, Q3, UR5E, H, Robot
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tvist_server.session import NoControlError, Session
+from tvist_controller.session import NoControlError, Session
 
 
 @pytest.fixture

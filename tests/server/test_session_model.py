@@ -17,12 +17,12 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
+from tvist_controller.controller import Controller
+from tvist_controller.streaming import TIMEOUT
 from tvist_protocol import commands as c
 from tvist_protocol.modes import SafetyMode
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.transitions import Activity, after
-from tvist_server.controller import Controller
-from tvist_server.streaming import TIMEOUT
 
 from .robots import Q1, setup
 

@@ -37,7 +37,7 @@ def test_an_arm_that_was_put_elsewhere_is_told_to_stand_there_at_the_same_tick()
 
 
 def test_who_subscribes_in_process_is_told_at_once_and_the_run_stays_the_same():
-    from tvist_server.gateways.loopback import LoopbackHost
+    from tvist_controller.loopback import LoopbackHost
 
     told = []
     asked, unasked = LoopbackHost(free_setup()), LoopbackHost(free_setup())

@@ -5,20 +5,20 @@ import pytest
 
 from tvist_client.blocking import Robot
 from tvist_client.transports.loopback import LoopbackTransport
+from tvist_controller.admission import Admitted, admit
+from tvist_controller.controller import Controller
+from tvist_controller.host import Host
+from tvist_controller.loopback import LoopbackHost
+from tvist_controller.session import Lease, NoControlError
+from tvist_controller.stepping import ClockHold, Stepping, check_step_token, may_step
 from tvist_lab.in_process import free_setup
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_reply, encode
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.explain import EXPLAINED_BYTES
 from tvist_protocol.replies import Accepted, Refused
-from tvist_server.admission import Admitted, admit
-from tvist_server.controller import Controller
-from tvist_server.gateways.loopback import LoopbackHost
-from tvist_server.host import Host
 from tvist_server.jobs import Jobs
 from tvist_server.reception import Reception
-from tvist_server.session import Lease, NoControlError
-from tvist_server.stepping import ClockHold, Stepping, check_step_token, may_step
 
 from .robots import UR5E, setup
 

@@ -12,14 +12,14 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
 
+from tvist_controller.admission import Admitted, admit
+from tvist_controller.controller import Controller
+from tvist_controller.host import Host
 from tvist_lab.replay import replay
 from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
 from tvist_protocol.io import SetRegisters
 from tvist_protocol.replies import Accepted, Done, Refused
-from tvist_server.admission import Admitted, admit
-from tvist_server.controller import Controller
-from tvist_server.host import Host
 
 from .robots import setup
 

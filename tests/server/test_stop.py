@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from tvist_controller.trajectory import JointLine, Limits, PathStop, Stop, quickest_motion
 from tvist_lab.safety.stops import draw, judge
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted
-from tvist_server.trajectory import JointLine, Limits, PathStop, Stop, quickest_motion
 
 from .robots import PAPER, Q1, Q2, Q3, ROUNDING, UR5E, H, Robot, calibration, stop, without_arm
 

@@ -2,10 +2,10 @@
 
 import pytest
 
+from tvist_controller.about import info_of
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.replies import Done
-from tvist_server.about import info_of
 
 from .robots import Q2, Robot
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tvist_server.trajectory import Limits, SetpointStream
+from tvist_controller.trajectory import Limits, SetpointStream
 
 from .robots import PAPER, ROUNDING, H
 from .streams import network, peaks, there_and_back

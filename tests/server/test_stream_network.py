@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tvist_server.trajectory import Limits, SetpointStream
+from tvist_controller.trajectory import Limits, SetpointStream
 
 from .robots import PAPER, H
 from .streams import minimum_jerk, network, peaks, played, swinging, there_and_back

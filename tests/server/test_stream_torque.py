@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from tvist_server.control.inverse_dynamics import InverseDynamics
-from tvist_server.safety import GENTLEST_STOP, TORQUE_SHARE, TorqueRoom
-from tvist_server.setup import body, paper_payload
-from tvist_server.trajectory import Limits
+from tvist_controller.control.inverse_dynamics import InverseDynamics
+from tvist_controller.safety import GENTLEST_STOP, TORQUE_SHARE, TorqueRoom
+from tvist_controller.setup import body, paper_payload
+from tvist_controller.trajectory import Limits
 
 from .robots import PAPER, Q1, Q3, UR5E, H, without_arm
 from .streams import swinging

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tvist_server.trajectory import JointLine, Limits, Motion, Rest, quickest_motion
+from tvist_controller.trajectory import JointLine, Limits, Motion, Rest, quickest_motion
 
 from .robots import PAPER, Q1, Q2, Q3, H
 

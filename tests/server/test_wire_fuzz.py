@@ -16,10 +16,10 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from tests.protocol.test_fuzz import changed, damaged, fields, keys, values
 
+from tvist_controller.loopback import LoopbackHost
 from tvist_protocol.codec import decode_reply, decode_state, encode
 from tvist_protocol.commands import ReleaseControl, SimulationReset, Stop, TakeControl
 from tvist_protocol.replies import Accepted, Refused
-from tvist_server.gateways.loopback import LoopbackHost
 
 from .robots import Q1, setup
 

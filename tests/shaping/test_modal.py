@@ -8,10 +8,10 @@ import msgspec
 import numpy as np
 import pytest
 
+from tvist_controller.calibrations.modal import mass_matrix
 from tvist_plant.description import load
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.model import flexible_model
-from tvist_server.calibrations.modal import mass_matrix
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators import modal
 from tvist_shaping.estimators.modal import Drivetrain, Modal

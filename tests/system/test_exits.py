@@ -268,7 +268,7 @@ class TestCalibrationFile:
         from importlib import resources
 
         content = json.loads(
-            (resources.files("tvist_server.calibrations") / "ur5e_5kg.json").read_text("utf-8")
+            (resources.files("tvist_controller.calibrations") / "ur5e_5kg.json").read_text("utf-8")
         )
         change(content)
         path = tmp_path / "mine.json"
@@ -317,7 +317,7 @@ def test_a_controller_that_fails_ends_the_server_with_exit_code_1_and_a_readable
     program = """
 import sys
 from tvist_cli.main import main
-from tvist_server.controller import Controller
+from tvist_controller.controller import Controller
 tick = Controller.tick
 def failing(self):
     if self.tick_number == 100:

@@ -15,10 +15,10 @@ import pytest
 from tests.conformance.served import PATIENCE, Served
 from tests.conformance.wire import Q1, Wire
 
+from tvist_controller.instruments.snapshot import Instruments
 from tvist_lab.mcap_file import read
 from tvist_plant.description import load
 from tvist_protocol.io import Io
-from tvist_server.instruments.snapshot import Instruments
 
 pytest.importorskip("rtde_receive")
 

@@ -11,10 +11,10 @@ from tests.conformance.served import PATIENCE, Served
 from tests.conformance.wire import Wire
 from tests.server.ur import decoders, rtde_client
 
+from tvist_controller.programs.built_in import PAPER, built_in
 from tvist_lab.mcap_file import read
 from tvist_lab.replay import replay_file
 from tvist_plant.description import load
-from tvist_server.programs.built_in import PAPER, built_in
 
 BOOTED, TICK = 40.0, 0.002
 FAR = [0.6, -2.9, 0.3, -1.4, 0.2, 0.4]

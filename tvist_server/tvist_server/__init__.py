@@ -1,1 +1,1 @@
-"""The controller: trajectories, TVIST filter, control, session, and the server around them."""
+"""What is around a controller: clock, gateways, recordings and processes."""

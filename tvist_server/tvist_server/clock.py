@@ -12,7 +12,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
-from tvist_server.host import Host
+from tvist_controller.host import Host
 from tvist_server.jobs import Do, Jobs
 from tvist_server.lateness import Lateness, Punctuality
 from tvist_server.schedule import Schedule

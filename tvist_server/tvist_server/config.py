@@ -9,16 +9,16 @@ from typing import Annotated
 from msgspec import Meta, Struct
 from msgspec.structs import replace
 
+from tvist_controller import calibrations
+from tvist_controller.setup import Setup, check_rating, paper_payload
 from tvist_plant import user_file
 from tvist_plant.description import RobotDescription, load
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Clock
 from tvist_protocol.values import RobotName, Seed
-from tvist_server import calibrations
 from tvist_server.fleet import members
 from tvist_server.initial import read_state, shaped_by
-from tvist_server.setup import Setup, check_rating, paper_payload
 from tvist_server.ur_ports import Door, UrPorts
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"

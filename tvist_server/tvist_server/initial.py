@@ -7,12 +7,12 @@ from typing import Annotated, Any
 
 from msgspec import Meta, Struct
 
+from tvist_controller.own_shapers import is_file, load_own
+from tvist_controller.setup import Setup
 from tvist_plant.user_file import read_bytes, read_toml
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import Joints, Payload, ResetMode, Seed
-from tvist_server.own_shapers import is_file, load_own
-from tvist_server.setup import Setup
 
 ShaperChoice = Annotated[str, Meta(min_length=1, max_length=4096)]
 

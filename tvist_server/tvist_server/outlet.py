@@ -9,11 +9,11 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 
+from tvist_controller.sink import Sink, Topic
 from tvist_protocol.codec import encode
 from tvist_protocol.io import Io
 from tvist_protocol.stream import Event, State, Telemetry, Truth
-from tvist_server.gateways.base import Gateway, Message, Topic
-from tvist_server.sink import Sink
+from tvist_server.gateways.base import Gateway, Message
 
 log = logging.getLogger(__name__)
 

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from queue import SimpleQueue
 from typing import NamedTuple
 
+from tvist_controller.admission import Admitted
+from tvist_controller.host import Host
+from tvist_controller.planning.planner import PLANNED, Plan, Planner
 from tvist_protocol.commands import PowerOff, Stop
 from tvist_protocol.programs import ProgramStop
 from tvist_protocol.replies import Refused, Reply
-from tvist_server.admission import Admitted
 from tvist_server.gateways.base import Answer
-from tvist_server.host import Host
-from tvist_server.planning.planner import PLANNED, Plan, Planner
 
 log = logging.getLogger(__name__)
 

@@ -4,13 +4,13 @@ import threading
 from collections.abc import Callable
 from typing import Protocol
 
+from tvist_controller.admission import Admitted, admit, admit_command, admit_setpoint
+from tvist_controller.host import Host
+from tvist_controller.presence import Presence
+from tvist_controller.session import NoControlError
 from tvist_protocol.commands import Command, HandOver, TakeClock, TakeControl
 from tvist_protocol.replies import Refused, Reply
-from tvist_server.admission import Admitted, admit, admit_command, admit_setpoint
 from tvist_server.gateways.base import Answer, Desk
-from tvist_server.host import Host
-from tvist_server.presence import Presence
-from tvist_server.session import NoControlError
 
 
 class Post(Protocol):

@@ -3,21 +3,21 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from tvist_controller.about import info_of
+from tvist_controller.admission import Admitted
+from tvist_controller.controller import Controller
+from tvist_controller.host import Host
+from tvist_controller.planning.planner import Planner
+from tvist_controller.setup import Setup
 from tvist_protocol.stream import Telemetry
-from tvist_server.about import info_of
-from tvist_server.admission import Admitted
 from tvist_server.clock import Clock, Driven
-from tvist_server.controller import Controller
 from tvist_server.gateways.base import Answer, Gateway
-from tvist_server.host import Host
 from tvist_server.lateness import Punctuality
 from tvist_server.outlet import Outlet
 from tvist_server.plan_ahead import PlanAhead
-from tvist_server.planning.planner import Planner
 from tvist_server.reception import Reception
 from tvist_server.recording.black_box import BlackBox
 from tvist_server.recording.recorder import Recorder
-from tvist_server.setup import Setup
 
 
 class ServedRobot:

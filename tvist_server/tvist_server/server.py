@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from threading import Thread
 
+from tvist_controller.setup import Setup
 from tvist_plant.plant import PERIOD
 from tvist_server.clock import Clock, Lockstep, Realtime
 from tvist_server.config import ConfigError, ServeConfig
@@ -21,7 +22,6 @@ from tvist_server.gateways.exposure import ExposureError, guarded, guarded_doors
 from tvist_server.gateways.network import Network
 from tvist_server.gateways.ur.doors import UrDoors
 from tvist_server.robot import ServedRobot
-from tvist_server.setup import Setup
 from tvist_server.ur_ports import Door
 
 LEAVE = 0.6

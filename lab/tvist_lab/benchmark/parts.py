@@ -6,6 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from tvist_controller.control.inverse_dynamics import InverseDynamics
+from tvist_controller.cycle import ControlCycle
+from tvist_controller.loopback import LoopbackHost
+from tvist_controller.setup import Setup, body
+from tvist_controller.trajectory import JointLine, Limits, quickest_motion
 from tvist_lab.in_process import free_setup
 from tvist_lab.paper.published import pose
 from tvist_lab.second_opinion import SecondOpinion
@@ -14,11 +19,6 @@ from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD, Plant
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import MoveJ, SimulationReset, SimulationStep, TakeControl
-from tvist_server.control.inverse_dynamics import InverseDynamics
-from tvist_server.cycle import ControlCycle
-from tvist_server.gateways.loopback import LoopbackHost
-from tvist_server.setup import Setup, body
-from tvist_server.trajectory import JointLine, Limits, quickest_motion
 from tvist_shaping import TvistFilter, shaper
 
 TICKS = 1250

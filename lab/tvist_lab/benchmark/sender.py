@@ -11,12 +11,12 @@ import zenoh
 from zenoh.handlers import Callback
 
 from tvist_client.transports.session import open_session
+from tvist_controller.calibrations import DEFAULT, load
 from tvist_lab.benchmark.messages import Messages
 from tvist_protocol import keys
 from tvist_protocol.codec import decode_reply, encode
 from tvist_protocol.commands import TakeControl
 from tvist_protocol.replies import Accepted
-from tvist_server.calibrations import DEFAULT, load
 
 ROBOT = "ur5e"
 MADE = 500

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from tvist_controller.setup import body, paper_payload
 from tvist_lab.evaluation.baselines import Baseline
 from tvist_lab.evaluation.line import PAPER, control_line, point_to_point, shape, simulate
 from tvist_lab.evaluation.moves import Move
@@ -23,7 +24,6 @@ from tvist_lab.metrics import (
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
-from tvist_server.setup import body, paper_payload
 
 WORTH = 0.2
 """An unshaped peak below this is no vibration to reduce: the move is listed, but not in the percentages [m/s²]."""

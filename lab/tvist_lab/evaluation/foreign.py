@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from tvist_controller.setup import paper_payload
+from tvist_controller.trajectory import Limits
 from tvist_lab.evaluation.candidates import Candidate, Task
 from tvist_lab.evaluation.line import PAPER
 from tvist_lab.evaluation.recipes import Recipe
@@ -17,8 +19,6 @@ from tvist_lab.evaluation.running import ShaperFaultError
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
 from tvist_protocol.values import Payload
-from tvist_server.setup import paper_payload
-from tvist_server.trajectory import Limits
 from tvist_shaping.estimators.base import Estimator
 
 MODES = 4

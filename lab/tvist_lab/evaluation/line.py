@@ -10,13 +10,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from tvist_controller.control.differentiator import Target
+from tvist_controller.cycle import STILL, ControlCycle
+from tvist_controller.reporting import truth_of
+from tvist_controller.trajectory import JointLine, Limits, Trajectory, quickest_motion
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import PERIOD, Plant
-from tvist_server.control.differentiator import Target
-from tvist_server.cycle import STILL, ControlCycle
-from tvist_server.reporting import truth_of
-from tvist_server.trajectory import JointLine, Limits, Trajectory, quickest_motion
 from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.filter import TvistFilter

@@ -10,6 +10,9 @@ import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 
+from tvist_controller.collision import CollisionModel
+from tvist_controller.setup import body, paper_payload
+from tvist_controller.trajectory import JointLine
 from tvist_lab.recordings import Floats
 from tvist_lab.workspace import WORKSPACE, Region
 from tvist_plant.description import RobotDescription
@@ -17,9 +20,6 @@ from tvist_plant.user_file import read_bytes
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import Angle, Mass
-from tvist_server.collision import CollisionModel
-from tvist_server.setup import body, paper_payload
-from tvist_server.trajectory import JointLine
 
 LEAST = 1e-4
 """A move whose joints turn by less than this goes nowhere [rad]."""

@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass, replace
 
+from tvist_controller.choices import choose_filter, wanted_modes
+from tvist_controller.mode_source import ModeSource
+from tvist_controller.own_shapers import OwnShaper
+from tvist_controller.setup import paper_payload
+from tvist_controller.trajectory import Limits
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration
-from tvist_server.choices import choose_filter, wanted_modes
-from tvist_server.mode_source import ModeSource
-from tvist_server.own_shapers import OwnShaper
-from tvist_server.setup import paper_payload
-from tvist_server.trajectory import Limits
 from tvist_shaping.base import Filter
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.fixed import Fixed

@@ -7,10 +7,10 @@ from typing import Protocol
 
 import numpy as np
 
+from tvist_controller.cycle import STILL
 from tvist_lab.evaluation.line import LONGEST
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
-from tvist_server.cycle import STILL
 from tvist_shaping.base import Filter
 
 WATCHED = 0.5

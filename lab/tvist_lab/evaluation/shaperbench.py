@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
+from tvist_controller.setup import body, paper_payload
 from tvist_lab.evaluation.arms import ARMS
 from tvist_lab.evaluation.candidates import Candidate, Task
 from tvist_lab.evaluation.causality import check_causal
@@ -27,7 +28,6 @@ from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, rigid_model
 from tvist_plant.plant import PERIOD
-from tvist_server.setup import body, paper_payload
 
 PAYLOAD_ERRORS = (0.0, 0.1, -0.1)
 """Of the mass declared [-]."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from tvist_controller.own_shapers import OwnShaper
 from tvist_lab.evaluation.baselines import baselines, longest_mean_delay
 from tvist_lab.evaluation.candidates import Candidate, Held, Longer, Named, Shaping
 from tvist_lab.evaluation.foreign import FromFile
@@ -9,7 +10,6 @@ from tvist_lab.evaluation.recipes import Recipe
 from tvist_lab.evaluation.shaperbench import PAYLOAD_ERRORS
 from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration
-from tvist_server.own_shapers import OwnShaper
 
 OWN = (
     ("zv", 1, "TVIST-ZV, lowest mode"),

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import ruckig
 
+from tvist_controller.trajectory import Limits
 from tvist_lab.evaluation.line import PAPER
 from tvist_lab.evaluation.moves import WITH_WRISTS
 from tvist_lab.recordings import Floats
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.plant import PERIOD
-from tvist_server.trajectory import Limits
 from tvist_shaping.base import Filter
 
 RETARGETED = (0.1, 1.5)

@@ -3,14 +3,14 @@
 import numpy as np
 from matplotlib.figure import Figure
 
+from tvist_controller import calibrations
+from tvist_controller.calibrations.modal import modal_estimator
+from tvist_controller.setup import paper_payload
+from tvist_controller.trajectory import JointLine, Limits, quickest_motion
 from tvist_lab.figures.style import INK, SHAPED, UNSHAPED, legend, panels
 from tvist_lab.recordings import Floats
 from tvist_plant.description import load
 from tvist_plant.plant import PERIOD
-from tvist_server import calibrations
-from tvist_server.calibrations.modal import modal_estimator
-from tvist_server.setup import paper_payload
-from tvist_server.trajectory import JointLine, Limits, quickest_motion
 from tvist_shaping import BUILT_IN
 from tvist_shaping.base import Filter
 

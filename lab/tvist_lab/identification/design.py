@@ -11,12 +11,12 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import expm
 
+from tvist_controller.trajectory import JointLine, Limits, quickest_motion
 from tvist_lab.identification.modal_fit import information
 from tvist_lab.identification.ring_downs import SAMPLES, SKIPPED, Jog, Ringing
 from tvist_lab.identification.unknowns import Arm
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
-from tvist_server.trajectory import JointLine, Limits, quickest_motion
 
 NOISE = 0.03
 """rms that is counted on, an axis [m/s^2]."""

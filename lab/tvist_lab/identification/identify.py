@@ -9,6 +9,7 @@ import numpy as np
 from tvist_client.arm import Arm
 from tvist_client.errors import ClientError
 from tvist_client.robot import Robot
+from tvist_controller.calibrations import estimator_of
 from tvist_lab.collect import collect
 from tvist_lab.identification.fit import Fit, check_count, fit_polynomials, spread
 from tvist_lab.identification.ring_downs import Jog, measure
@@ -18,7 +19,6 @@ from tvist_lab.workspace import IDENTIFIED
 from tvist_protocol.calibration import Calibration, Provenance, Spread
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.info import Info
-from tvist_server.calibrations import estimator_of
 
 CONFIGURATIONS = 160
 REPEATS = 3

@@ -10,6 +10,9 @@ import numpy as np
 from tvist_client.arm import Arm as Control
 from tvist_client.errors import ClientError
 from tvist_client.robot import Robot
+from tvist_controller.calibrations.modal import modal_estimator
+from tvist_controller.collision import CollisionModel
+from tvist_controller.setup import body, paper_payload
 from tvist_lab.collect import collect
 from tvist_lab.identification.design import choose
 from tvist_lab.identification.fit import spread
@@ -32,9 +35,6 @@ from tvist_protocol.calibration import Calibration, ModalModel, Provenance, Ring
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.info import Info
 from tvist_protocol.values import Payload
-from tvist_server.calibrations.modal import modal_estimator
-from tvist_server.collision import CollisionModel
-from tvist_server.setup import body, paper_payload
 from tvist_shaping.errors import EstimatorError
 
 RING_DOWNS = 12

@@ -17,6 +17,8 @@ import pinocchio as pin
 
 from tvist_client.arm import Arm as Control
 from tvist_client.robot import Robot
+from tvist_controller.collision import CollisionModel
+from tvist_controller.setup import body, paper_payload
 from tvist_lab.collect import collect
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.ring_downs import reach
@@ -27,8 +29,6 @@ from tvist_plant.description import RobotDescription
 from tvist_plant.model import rigid_model
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.values import Payload
-from tvist_server.collision import CollisionModel
-from tvist_server.setup import body, paper_payload
 
 POSES = 6
 CANDIDATES = 60

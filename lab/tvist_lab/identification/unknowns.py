@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tvist_controller.calibrations.modal import drivetrain, mass_matrix
+from tvist_controller.setup import body
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import FlexibleModel, flexible_model
 from tvist_protocol.calibration import ModalParameter, Quantity, Status
 from tvist_protocol.values import Payload
-from tvist_server.calibrations.modal import drivetrain, mass_matrix
-from tvist_server.setup import body
 from tvist_shaping.estimators.modal import Drivetrain
 
 LARGE = 3

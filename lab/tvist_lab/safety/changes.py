@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tvist_controller.collision import CLEARANCE, CollisionModel
+from tvist_controller.setup import body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_lab.safety import stops, streams
 from tvist_lab.safety.subject import Subject
@@ -13,8 +15,6 @@ from tvist_protocol import commands as c
 from tvist_protocol.io import SetTcp
 from tvist_protocol.replies import Refused
 from tvist_protocol.values import Payload
-from tvist_server.collision import CLEARANCE, CollisionModel
-from tvist_server.setup import body, paper_payload
 
 Change = tuple[type, dict[str, object]]
 

@@ -2,9 +2,9 @@
 
 from typing import Any
 
+from tvist_controller.collision import CLEARANCE, FAR
+from tvist_controller.stopping import stopping
 from tvist_plant.description import load
-from tvist_server.collision import CLEARANCE, FAR
-from tvist_server.stopping import stopping
 
 
 def page(result: dict[str, Any], command: str) -> str:

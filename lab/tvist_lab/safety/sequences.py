@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tvist_controller.collision import CLEARANCE, CollisionModel
+from tvist_controller.cycle import STILL
+from tvist_controller.setup import body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_lab.safety.changes import far_payload
 from tvist_lab.safety.stops import SHAPERS
@@ -17,9 +20,6 @@ from tvist_protocol import commands as c
 from tvist_protocol.faults import FAULTS as FAULT_FIELDS
 from tvist_protocol.replies import Accepted, Refused
 from tvist_protocol.transitions import Activity
-from tvist_server.collision import CLEARANCE, CollisionModel
-from tvist_server.cycle import STILL
-from tvist_server.setup import body, paper_payload
 
 COMMANDS = 40
 """In a sequence."""

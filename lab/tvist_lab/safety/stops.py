@@ -5,17 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tvist_controller.ahead import resting_after
+from tvist_controller.collision import CLEARANCE, CollisionModel
+from tvist_controller.safety import TORQUE_SHARE
+from tvist_controller.setup import body, paper_payload
+from tvist_controller.trajectory import JointLine
 from tvist_lab.recordings import Floats
 from tvist_lab.safety.subject import CLIENT, SESSION, Subject, refused, torques
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
-from tvist_server.ahead import resting_after
-from tvist_server.collision import CLEARANCE, CollisionModel
-from tvist_server.safety import TORQUE_SHARE
-from tvist_server.setup import body, paper_payload
-from tvist_server.trajectory import JointLine
 
 EARLY = 17
 """Tick before which some moves are stopped: those that have barely begun."""

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tvist_controller.collision import CLEARANCE, CollisionModel
+from tvist_controller.setup import body, paper_payload
+from tvist_controller.trajectory import JointLine
 from tvist_lab.recordings import Floats
 from tvist_lab.safety.stops import SHAPERS, two_postures
 from tvist_lab.safety.subject import CLIENT, SESSION, Subject, refused
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
-from tvist_server.collision import CLEARANCE, CollisionModel
-from tvist_server.setup import body, paper_payload
-from tvist_server.trajectory import JointLine
 
 LENGTH = 3.0
 """How long a stream lasts unless something ends it [s]."""

@@ -5,6 +5,12 @@ from typing import Any
 
 import numpy as np
 
+from tvist_controller.calibrations import load
+from tvist_controller.control.differentiator import central_differences
+from tvist_controller.control.inverse_dynamics import InverseDynamics
+from tvist_controller.controller import Controller
+from tvist_controller.cycle import STILL
+from tvist_controller.setup import Setup, body
 from tvist_lab.recordings import Floats
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
@@ -14,12 +20,6 @@ from tvist_protocol.info import Clock
 from tvist_protocol.replies import Accepted, Refused, Reply
 from tvist_protocol.stream import Event
 from tvist_protocol.values import Payload as Declared
-from tvist_server.calibrations import load
-from tvist_server.control.differentiator import central_differences
-from tvist_server.control.inverse_dynamics import InverseDynamics
-from tvist_server.controller import Controller
-from tvist_server.cycle import STILL
-from tvist_server.setup import Setup, body
 
 CLIENT, SESSION = "searcher", "5e55"
 """Name and session of who has control."""

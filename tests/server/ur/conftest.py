@@ -7,15 +7,15 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import settings
 
+from tvist_controller.controller import Controller
+from tvist_controller.instruments.snapshot import Instruments
+from tvist_controller.setup import Setup, paper_payload
 from tvist_plant.description import load
 from tvist_protocol import commands as c
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.values import Payload
-from tvist_server.controller import Controller
 from tvist_server.gateways.ur.doors import UrDoors
-from tvist_server.instruments.snapshot import Instruments
-from tvist_server.setup import Setup, paper_payload
 
 from .desks import EVERYWHERE, Desk, until
 

@@ -4,9 +4,9 @@ import asyncio
 
 from tests.server.robots import Robot
 
+from tvist_controller.host import Host
+from tvist_controller.sink import Sink
 from tvist_protocol.codec import encode
-from tvist_server.host import Host
-from tvist_server.sink import Sink
 from tvist_server.ur_ports import UrPorts
 
 EVERYWHERE = dict.fromkeys(UrPorts().open(), 0)

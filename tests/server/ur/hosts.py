@@ -2,9 +2,9 @@
 
 from tests.server.robots import UR5E
 
+from tvist_controller.programs.built_in import built_in
 from tvist_server.gateways.ur.programs import Programs
 from tvist_server.gateways.ur.robot import NO_MODE
-from tvist_server.programs.built_in import built_in
 
 from .decoders import message
 

@@ -12,6 +12,9 @@ from random import Random
 import pytest
 from tests.server.robots import UR5E, Robot
 
+from tvist_controller.host import Host
+from tvist_controller.instruments.snapshot import Instruments
+from tvist_controller.sink import Sink
 from tvist_protocol.codec import encode
 from tvist_server.gateways.ur.dashboard.commands import COMMANDS
 from tvist_server.gateways.ur.dashboard.session import DashboardSession
@@ -20,9 +23,6 @@ from tvist_server.gateways.ur.primary.session import PrimarySession
 from tvist_server.gateways.ur.realtime import RealtimeSession
 from tvist_server.gateways.ur.robot import UrRobot
 from tvist_server.gateways.ur.rtde.session import RtdeSession
-from tvist_server.host import Host
-from tvist_server.instruments.snapshot import Instruments
-from tvist_server.sink import Sink
 
 from . import rtde_client
 from .decoders import split

@@ -8,11 +8,11 @@ import pytest
 from tests.plant.arms import chain
 from tests.server.robots import UR5E, cut
 
+from tvist_controller.instruments.snapshot import Snapshot
+from tvist_controller.setup import body, paper_payload
 from tvist_plant.model import FLANGE, rigid_model
 from tvist_protocol import commands as c
 from tvist_protocol.values import Payload
-from tvist_server.instruments.snapshot import Snapshot
-from tvist_server.setup import body, paper_payload
 
 from .rtde_client import OUTPUT_TYPES
 

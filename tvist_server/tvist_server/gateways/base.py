@@ -2,15 +2,14 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Literal, Protocol
+from typing import Protocol
 
+from tvist_controller.sink import Topic
 from tvist_protocol.commands import Command
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Reply
 from tvist_protocol.stream import Event, State, Telemetry, Truth
 
-Topic = Literal["state", "event", "truth", "telemetry", "io"]
-"""What is put without being asked for."""
 Message = State | Event | Truth | Telemetry | Io
 Answer = Callable[[Reply], None]
 """Takes the reply to a command, once, from any thread."""

@@ -6,8 +6,9 @@ import time
 from collections.abc import Callable, Sequence
 from queue import SimpleQueue
 
+from tvist_controller.sink import Topic
 from tvist_protocol.stream import Event, EventKind
-from tvist_server.gateways.base import Gateway, Message, Topic
+from tvist_server.gateways.base import Gateway, Message
 
 log = logging.getLogger(__name__)
 

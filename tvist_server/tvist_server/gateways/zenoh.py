@@ -12,10 +12,11 @@ from functools import partial
 import zenoh
 from zenoh.handlers import Callback
 
+from tvist_controller.sink import Topic
 from tvist_protocol import keys
 from tvist_protocol.codec import MAX_BYTES
 from tvist_protocol.replies import Refused, Reply
-from tvist_server.gateways.base import Desk, Gateway, Message, Topic
+from tvist_server.gateways.base import Desk, Gateway, Message
 from tvist_server.gateways.replies import ENCODING, Answers
 
 

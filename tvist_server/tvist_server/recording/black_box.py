@@ -8,12 +8,12 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
+from tvist_controller.sink import Sink
 from tvist_protocol.info import Info
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import Recorded
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.recording.recorder import Recorder, RecordingError
-from tvist_server.sink import Sink
 
 log = logging.getLogger(__name__)
 

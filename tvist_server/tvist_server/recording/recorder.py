@@ -13,6 +13,7 @@ from typing import Any, Self
 
 import msgspec
 
+from tvist_controller.sink import Sink
 from tvist_protocol.errors import TvistError
 from tvist_protocol.info import Info
 from tvist_protocol.journal import Entry
@@ -20,7 +21,6 @@ from tvist_protocol.recorded import Recorded, topics
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.recording.whereabouts import DeletedError, whereabouts
 from tvist_server.recording.writer import RecordingWriter, heading
-from tvist_server.sink import Sink
 
 QUEUE_SIZE = 8192
 """Messages that may wait. State, truth and a set-point every tick are 1500 a second: five seconds of a

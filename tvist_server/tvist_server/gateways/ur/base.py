@@ -4,10 +4,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Protocol
 
+from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.commands import Command
 from tvist_protocol.replies import Reply
 from tvist_protocol.stream import Event
-from tvist_server.instruments.snapshot import Snapshot
 
 Send = Callable[[bytes], None]
 """Sends an answer, which is never dropped."""

@@ -7,12 +7,12 @@ import socket
 from collections.abc import Callable
 from typing import cast
 
+from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.stream import Event
 from tvist_server.gateways.ur.base import Send, Session
 from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
 from tvist_server.gateways.ur.notices import Notices
 from tvist_server.gateways.ur.places import Places
-from tvist_server.instruments.snapshot import Snapshot
 
 log = logging.getLogger(__name__)
 

@@ -11,11 +11,13 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from weakref import WeakValueDictionary
 
+from tvist_controller.instruments.snapshot import Instruments
+from tvist_controller.sink import Topic
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol.io import Io
 from tvist_protocol.stream import Event, State
-from tvist_server.gateways.base import Desk, Gateway, GatewayError, Message, Topic
+from tvist_server.gateways.base import Desk, Gateway, GatewayError, Message
 from tvist_server.gateways.ur.base import Send, Session
 from tvist_server.gateways.ur.connection import Connection
 from tvist_server.gateways.ur.dashboard.session import DashboardSession
@@ -26,7 +28,6 @@ from tvist_server.gateways.ur.primary.session import PrimarySession
 from tvist_server.gateways.ur.realtime import RealtimeSession
 from tvist_server.gateways.ur.robot import UrRobot
 from tvist_server.gateways.ur.rtde.session import RtdeSession
-from tvist_server.instruments.snapshot import Instruments
 from tvist_server.ur_ports import Door
 
 log = logging.getLogger(__name__)

@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Protocol
 
+from tvist_controller.instruments.snapshot import Snapshot
+from tvist_controller.programs.built_in import Move
 from tvist_protocol.commands import Command
 from tvist_protocol.io import Io
 from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramState, ProgramStop
@@ -11,8 +13,6 @@ from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import Event
 from tvist_server.gateways.ur.base import Control
 from tvist_server.gateways.ur.primary import messages
-from tvist_server.instruments.snapshot import Snapshot
-from tvist_server.programs.built_in import Move
 
 FOLDER = "/programs"
 """Where a controller keeps programs; every other folder will do as well."""

@@ -6,11 +6,11 @@ One package of 1220 bytes: its length as an int32, then 152 doubles, big-endian.
 from struct import Struct
 from typing import Final
 
+from tvist_controller.instruments.snapshot import Snapshot
 from tvist_server.gateways.ur.base import Control, Send, Session
 from tvist_server.gateways.ur.primary.orders import Orders
 from tvist_server.gateways.ur.primary.scripts import Intake
 from tvist_server.gateways.ur.robot import UrRobot
-from tvist_server.instruments.snapshot import Snapshot
 
 LAYOUT: Final[tuple[tuple[str | None, int], ...]] = (
     ("timestamp", 1),

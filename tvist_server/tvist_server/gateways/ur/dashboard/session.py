@@ -4,12 +4,12 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final
 
+from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.modes import RuntimeState
 from tvist_server.gateways.ur.base import Control, Send, Session
 from tvist_server.gateways.ur.dashboard.commands import QUIT, Request, find
 from tvist_server.gateways.ur.dashboard.lines import Lines
 from tvist_server.gateways.ur.robot import UrRobot
-from tvist_server.instruments.snapshot import Snapshot
 
 GREETING: Final = "Connected: Universal Robots Dashboard Server"
 MOST_WAITING: Final = 1000

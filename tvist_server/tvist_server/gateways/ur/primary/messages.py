@@ -7,7 +7,7 @@ from enum import IntEnum
 from struct import Struct
 from typing import Final
 
-from tvist_server.instruments.snapshot import Snapshot
+from tvist_controller.instruments.snapshot import Snapshot
 
 ROBOT_MESSAGE: Final = 20
 SOURCE: Final = 254

@@ -8,10 +8,10 @@ import re
 from struct import Struct
 from typing import Final
 
+from tvist_controller.instruments.snapshot import Snapshot
 from tvist_plant.description import RobotDescription
 from tvist_protocol.modes import RuntimeState, SafetyMode
 from tvist_server.gateways.ur.primary import messages
-from tvist_server.instruments.snapshot import Snapshot
 
 ROBOT_STATE: Final = 16
 JOINTS: Final = 6

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.stream import Event
 from tvist_server.gateways.ur import version
 from tvist_server.gateways.ur.base import Control, Send, Session
@@ -11,7 +12,6 @@ from tvist_server.gateways.ur.primary.orders import Orders
 from tvist_server.gateways.ur.primary.packages import robot_state
 from tvist_server.gateways.ur.primary.scripts import Intake
 from tvist_server.gateways.ur.robot import UrRobot
-from tvist_server.instruments.snapshot import Snapshot
 
 EVERY: Final = 50
 """Ticks between two robot states: 10 Hz."""

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from operator import attrgetter
 from typing import Any
 
+from tvist_controller.instruments.snapshot import Snapshot
 from tvist_server.gateways.ur.rtde.registers import KINDS, registers
 from tvist_server.gateways.ur.rtde.wire import Encode, Wire
-from tvist_server.instruments.snapshot import Snapshot
 
 Read = Callable[[Snapshot], Any]
 """Takes a variable's value out of a snapshot."""

@@ -4,12 +4,12 @@ from collections.abc import Callable, Iterable
 from operator import itemgetter
 from struct import Struct
 
+from tvist_controller.instruments.snapshot import Snapshot
 from tvist_server.gateways.ur.rtde.codec import HEADER, LARGEST, Kind
 from tvist_server.gateways.ur.rtde.inputs import INPUTS
 from tvist_server.gateways.ur.rtde.outputs import OUTPUTS, READERS
 from tvist_server.gateways.ur.rtde.registers import EncodedRegisters
 from tvist_server.gateways.ur.rtde.wire import Wire
-from tvist_server.instruments.snapshot import Snapshot
 
 Value = int | float | tuple[float, ...]
 """Of an input variable."""

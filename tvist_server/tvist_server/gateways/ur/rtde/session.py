@@ -8,6 +8,7 @@ from collections.abc import Callable
 from math import floor
 from struct import Struct
 
+from tvist_controller.instruments.snapshot import Snapshot
 from tvist_server.gateways.ur import version
 from tvist_server.gateways.ur.base import Control, Send, Session
 from tvist_server.gateways.ur.robot import UrRobot
@@ -15,7 +16,6 @@ from tvist_server.gateways.ur.rtde.codec import Kind, Level, PackageReader, pack
 from tvist_server.gateways.ur.rtde.inputs import INPUTS, NEED_CONTROL
 from tvist_server.gateways.ur.rtde.recipes import InputRecipe, OutputRecipe, split
 from tvist_server.gateways.ur.rtde.writing import InputWriter
-from tvist_server.instruments.snapshot import Snapshot
 
 RATE = 500.0
 """Of control periods, and the highest frequency of packages [Hz]."""

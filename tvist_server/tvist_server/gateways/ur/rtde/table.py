@@ -3,10 +3,10 @@
 from collections.abc import Iterable
 from inspect import getdoc
 
+from tvist_controller.instruments.snapshot import Snapshot
 from tvist_server.gateways.ur.rtde.inputs import NAMED as NAMED_INPUTS
 from tvist_server.gateways.ur.rtde.outputs import NAMED as NAMED_OUTPUTS
 from tvist_server.gateways.ur.rtde.wire import Wire
-from tvist_server.instruments.snapshot import Snapshot
 
 SOURCES = ("State", "Io", "Computed", "Constant")
 """Words with which the description of an output variable begins."""

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from math import isclose
 
+from tvist_controller.peripherals import analog_share
 from tvist_protocol.commands import Command, SetSpeed
 from tvist_protocol.io import Bank, Io, SetIo, SetRegisters
 from tvist_protocol.replies import Refused, Reply
@@ -11,7 +12,6 @@ from tvist_server.gateways.ur.robot import UrRobot
 from tvist_server.gateways.ur.rtde.inputs import DIGITAL, REGISTERS
 from tvist_server.gateways.ur.rtde.recipes import Value
 from tvist_server.gateways.ur.rtde.wire import Wire
-from tvist_server.peripherals import analog_share
 
 Complain = Callable[[str], None]
 """Tells the client what was refused."""

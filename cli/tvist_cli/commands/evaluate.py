@@ -1,0 +1,375 @@
+"""`tvist evaluate`: any moves, each unshaped and shaped."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from tvist_cli.failure import Failure, told
+from tvist_cli.output import err, number, out, print_json, progress, say, table
+from tvist_cli.shapers_of import loaded
+
+if TYPE_CHECKING:
+    from tvist_controller.own_shapers import OwnShaper
+    from tvist_lab.evaluation.evaluate import Job, Judged
+    from tvist_lab.evaluation.moves import Move
+    from tvist_plant.description import RobotDescription
+    from tvist_protocol.calibration import Calibration
+
+UNIFORM = "uniform"
+"""A payload of its own for each move, up to what the arm is rated for."""
+LISTED = 12
+"""More moves than this are not printed one by one."""
+
+
+def evaluate(
+    *,
+    moves: Path | None = None,
+    random: int | None = None,
+    payload: str | None = None,
+    shaper: str = "zv",
+    modes: int = 1,
+    calibration: str | None = None,
+    robot: str = "ur5e",
+    seed: int = 0,
+    wrists: bool = False,
+    clean: bool = False,
+    disturbances: str | None = None,
+    frequency_error: float = 0.0,
+    baselines: Annotated[bool, Parameter(negative="--no-baselines")] = True,
+    save_moves: Path | None = None,
+    figures: Path | None = None,
+    json: bool = False,
+) -> None:
+    """Make moves unshaped and shaped, as fast as they compute, and say what shaping does to the vibration after them.
+
+    The moves come from a file or are drawn at random. The controller knows the payload. Beside the shaper stands what
+    it has to be compared with: waiting, a slower motion of the same duration, ZV frozen at the target, and fixed MZV,
+    EI2 and EI3 for the whole workspace.
+
+    Args:
+        moves: JSON file: a list of maps with start and target, an angle a joint, and payload in kg if one has its own.
+        random: Instead, how many to draw: over the workspace, 30 to 100 % of the way between two configurations, free
+            of collision.
+        payload: Mass of the paper's disc in kg, carried and declared; uniform: another one for each move, 0 to what the
+            arm is rated for [5].
+        shaper: Name of a shaper; or of a filter for several modes: auto, short, or auto-target, which is told the
+            target of each move; or FILE.py:NAME, which runs that file, for one of your own.
+        modes: That a shaper of the catalogue acts on; more than one takes a modal calibration.
+        calibration: Calibration that comes with the package, or path of one.
+        robot: Robot that comes with the package, or path of a robot file.
+        seed: Of random moves, payloads and gear errors.
+        wrists: Let random moves turn the two outer joints of the wrist.
+        clean: Without nonlinear friction, gear errors and noise.
+        disturbances: Which of these there are, with commas between: friction, gear, noise, or none [all].
+        frequency_error: Percent by which every frequency is taken too high.
+        baselines: Run what the shaper has to be compared with, too: three and a half times the work.
+        save_moves: File for the moves with their payloads.
+        figures: Folder for figures.
+        json: Print one JSON object.
+    """
+    from tvist_lab.evaluation.evaluate import Job, report
+    from tvist_lab.evaluation.evaluate import evaluate as run
+    from tvist_lab.evaluation.running import ShaperFaultError
+    from tvist_plant.description import DescriptionError, load
+
+    _check(moves, random, seed, modes, frequency_error, wrists=wrists)
+    with told(DescriptionError, code=2):
+        description = load(robot)
+    masses = _masses(payload, description)
+    shaper, own = loaded(shaper)
+    known = _calibration(calibration, shaper, own, modes, description)
+    chosen, share = _moves(moves, random, seed, masses, description, wrists=wrists)
+    plant, kept = _disturbed(description, disturbances, clean=clean)
+    recipe, others = _recipe(shaper, own, modes, known, plant, frequency_error, masses, baselines=baselines)
+    jobs = [
+        Job(plant, move, recipe, others, seed=_arm_seed(seed, place)) for place, move in enumerate(chosen)
+    ]
+    judged: list[Judged] = []
+    with told(OSError):
+        if save_moves is not None:
+            from tvist_lab.evaluation.moves import write_moves
+
+            write_moves(save_moves, chosen)
+        with progress(sum(job.motions for job in jobs), "motions") as bar:
+            try:
+                for job, one in zip(jobs, run(jobs), strict=True):
+                    judged.append(one)
+                    bar(job.motions, None)
+            except ShaperFaultError as fault:
+                raise Failure(f"shaper {shaper} {fault}") from fault
+        if figures is not None:
+            _draw(jobs, judged, figures)
+    from tvist_lab.evaluation.moves import collisions
+
+    met = collisions(description, chosen) if moves is not None else []
+    result = {
+        "shaper": shaper,
+        "calibration": None if known is None else known.name,
+        "plant": _named(kept),
+        "disturbances": list(kept),
+        "seed": seed,
+        "free_of_collision": share,
+        **report(jobs, judged),
+    }
+    result["notes"] = _notes(result, met, known, chosen, share)
+    if baselines and not others:
+        result["notes"].append("no baselines: they take a calibration of this arm")
+    if json:
+        print_json(result)
+    else:
+        _print(result)
+
+
+def _check(
+    moves: Path | None, random: int | None, seed: int, modes: int, frequency_error: float, *, wrists: bool
+) -> None:
+    if (moves is None) == (random is None):
+        raise Failure("give either --moves FILE or --random N", code=2)
+    if wrists and moves is not None:
+        raise Failure("wrists goes with --random: moves of a file turn what they turn", code=2)
+    if random is not None and not 1 <= random <= 100_000:
+        raise Failure(f"random is {random}: must be 1 to 100000", code=2)
+    if not 0 <= seed < 2**63:
+        raise Failure(f"seed is {seed}: must be at least 0 and less than 2^63", code=2)
+    if not 1 <= modes <= 6:
+        raise Failure(f"modes is {modes}: must be 1 to 6", code=2)
+    if not -90.0 <= frequency_error <= 900.0:
+        raise Failure(f"frequency-error is {frequency_error:g} %: must be -90 to 900 %", code=2)
+
+
+def _disturbed(
+    description: "RobotDescription", wanted: str | None, *, clean: bool
+) -> tuple["RobotDescription", tuple[str, ...]]:
+    """The arm with the disturbances that are wanted, and their names."""
+    from tvist_plant.description import DISTURBANCES, DescriptionError
+
+    if clean and wanted is not None:
+        raise Failure("give either --clean or --disturbances", code=2)
+    if wanted is None:
+        wanted = "none" if clean else ",".join(DISTURBANCES)
+    names = [] if wanted == "none" else [name.strip() for name in wanted.split(",")]
+    with told(DescriptionError, code=2):
+        return description.disturbed_by(names), tuple(name for name in DISTURBANCES if name in names)
+
+
+def _named(kept: tuple[str, ...]) -> str:
+    """What the arm is called that has these disturbances."""
+    from tvist_plant.description import DISTURBANCES
+
+    if kept == DISTURBANCES:
+        return "as described"
+    return f"with {' and '.join(kept)} alone" if kept else "clean"
+
+
+def _masses(payload: str | None, description: "RobotDescription") -> tuple[float, float]:
+    """Least and largest mass."""
+    if payload == UNIFORM:
+        return 0.0, description.limits.payload
+    if payload is None:
+        return description.payload.mass, description.payload.mass
+    try:
+        mass = float(payload)
+    except ValueError:
+        mass = math.nan
+    if not 0.0 <= mass <= 100.0:
+        raise Failure(f"payload is {payload!r}: must be a mass from 0 to 100 kg, or {UNIFORM}", code=2)
+    return mass, mass
+
+
+def _calibration(
+    name: str | None,
+    shaper: str,
+    own: "tuple[OwnShaper, ...]",
+    modes: int,
+    description: "RobotDescription",
+) -> "Calibration | None":
+    """The one that was named; else the paper's, or for several modes one that comes with the package."""
+    from tvist_controller.calibrations import DEFAULT, load
+    from tvist_controller.choices import wanted_modes
+    from tvist_controller.mode_source import modal_source
+    from tvist_controller.refusal import RefusalError
+    from tvist_protocol.calibration import CalibrationError
+    from tvist_shaping import Registry
+
+    with told(CalibrationError, RefusalError, code=2):
+        known = Registry(one.shaper for one in own)
+        several = wanted_modes(shaper, modes, "shaper", known) > 1
+        if name is not None:
+            return load(name)
+        paper = load(DEFAULT)
+        if paper.robot != description.robot.model:
+            return None
+        found = modal_source(description, paper) if several else None
+        return paper if found is None else found.calibration
+
+
+def _moves(
+    path: Path | None,
+    count: int | None,
+    seed: int,
+    masses: tuple[float, float],
+    description: "RobotDescription",
+    *,
+    wrists: bool,
+) -> tuple[list["Move"], float | None]:
+    """The moves, and the share of draws that were free of collision."""
+    import numpy as np
+
+    from tvist_lab.evaluation.moves import MovesError, draw_moves, read_moves
+
+    with told(MovesError, code=2):
+        if path is not None:
+            drawn_masses = np.random.default_rng(seed)
+            return read_moves(path, description, lambda: float(drawn_masses.uniform(*masses))), None
+        assert count is not None
+        drawn = draw_moves(description, count, seed, masses, wrists=wrists)
+    return drawn.moves, drawn.share
+
+
+def _recipe(
+    shaper: str,
+    own: "tuple[OwnShaper, ...]",
+    modes: int,
+    known: "Calibration | None",
+    description: "RobotDescription",
+    frequency_error: float,
+    masses: tuple[float, float],
+    *,
+    baselines: bool,
+) -> tuple[Any, Any]:
+    """The recipe, tried out, and the baselines."""
+    from tvist_controller.refusal import RefusalError
+    from tvist_lab.evaluation.baselines import baselines as every
+    from tvist_lab.evaluation.recipes import Recipe, RecipeError
+    from tvist_shaping.errors import ShapingError
+
+    recipe = Recipe(shaper, known, 0.01 * frequency_error, modes, own)
+    with told(RecipeError, RefusalError, ShapingError, code=2):
+        recipe.make(description, masses[1])
+        # Where nothing is known of an arm, there is nothing to design a baseline for.
+        return recipe, every(recipe, description, masses) if baselines and known is not None else ()
+
+
+def _arm_seed(seed: int, place: int) -> int:
+    """Each move has gear errors of its own."""
+    return (1_000_003 * seed + place) % 2**63
+
+
+def _draw(jobs: list["Job"], judged: list["Judged"], folder: Path) -> None:
+    from tvist_lab.evaluation.evaluate import record
+    from tvist_lab.figures import residual_by_move_figure, save, vibration_figure
+
+    err.print(str(save(residual_by_move_figure(judged), folder / "moves.png")))
+    middle = sorted(range(len(judged)), key=lambda place: judged[place].unshaped.peak)[
+        -(len(judged) // 2 + 1)
+    ]
+    err.print(str(save(vibration_figure(*record(jobs[middle]), middle + 1), folder / "one_move.png")))
+
+
+def _notes(
+    result: dict[str, Any],
+    met: list[str | None],
+    known: "Calibration | None",
+    chosen: list["Move"],
+    share: float | None,
+) -> list[str]:
+    from tvist_lab.evaluation.evaluate import WORTH
+
+    notes = []
+    if share is not None:
+        notes.append(
+            f"{100.0 * share:.0f} % of the draws were free of collision from start to target; the others were replaced"
+        )
+    if result["left_out"]:
+        notes.append(
+            f"{len(result['left_out'])} of {len(chosen)} moves have an unshaped peak below {WORTH:g} m/s²: they are "
+            "listed in absolute terms and left out of the percentages"
+        )
+    notes += [
+        f"move {place}: a robot would refuse it, {words}; evaluated all the same"
+        for place, words in enumerate(met, 1)
+        if words is not None
+    ]
+    if known is not None and known.modal is None and result["shaper"] != "none":
+        off = sum(
+            abs(move.mass - known.payload.mass) > 0.02 * max(known.payload.mass, 1.0) for move in chosen
+        )
+        if off:
+            notes.append(
+                f"calibration {known.name} was made with {known.payload.mass:g} kg; {off} moves carry something else"
+            )
+    if result["never_still"]:
+        notes.append(f"{result['never_still']} shaped moves were not below 0.1 m/s² when the rest ended")
+    return notes
+
+
+def _print(result: dict[str, Any]) -> None:
+    if len(result["moves"]) <= LISTED:
+        table(
+            f"moves with shaper {result['shaper']}",
+            (
+                "move",
+                "kg",
+                "unshaped m/s²",
+                "shaped m/s²",
+                "less %",
+                "delay ms",
+                "still ms",
+                "q̈/limit",
+                "q̇/limit",
+            ),
+            [_row(place, move) for place, move in enumerate(result["moves"], 1)],
+        )
+    ways = {result["shaper"]: result, **result["baselines"]}
+    table(
+        f"{result['counted']} moves, arm {result['plant']}",
+        (
+            "",
+            "less % median",
+            "p5",
+            "min",
+            "delay ms",
+            "max",
+            "still¹ ms",
+            "p90",
+            "q̈/limit",
+            "p90",
+            "max",
+            "q̇ max",
+        ),
+        [_way(name, way) for name, way in ways.items()],
+    )
+    median, p5 = (result["reduction_percent_interval"][name] for name in ("median", "p5"))
+    if median is not None:
+        out.print(
+            f"95 % intervals (bootstrap): median {median[0]:.1f} to {median[1]:.1f} %, p5 {p5[0]:.1f} to {p5[1]:.1f} %"
+        )
+    peaks = [(name, way["peak_m_s2"]) for name, way in list(ways.items())[:2]]
+    if median is not None:
+        said = (f"{name} {number(peak['median'])} (p95 {number(peak['p95'])})" for name, peak in peaks)
+        out.print(f"peaks in m/s², median: {', '.join(said)}")
+    out.print("¹ last time |α| exceeds 0.1 m/s², median, from the stop of the unshaped reference")
+    for note in result["notes"]:
+        say(note)
+
+
+def _row(place: int, move: dict[str, Any]) -> tuple[str, ...]:
+    return (
+        str(place), number(move["payload_kg"], 2), number(move["unshaped_peak_m_s2"]), number(move["shaped_peak_m_s2"]),
+        number(move["reduction_percent"], 1), number(move["delay_ms"], 0), number(move["still_after_ms"]["shaped"], 0),
+        number(move["peak_acceleration_ratio"]), number(move["peak_velocity_ratio"]),
+    )  # fmt: skip
+
+
+def _way(name: str, way: dict[str, Any]) -> tuple[str, ...]:
+    less, delay, still = (
+        way[key] for key in ("reduction_percent", "delay_ms", "still_after_unshaped_stop_ms")
+    )
+    qdd = way["peak_acceleration_ratio"]
+    return (
+        name, *(number(less[key], 1) for key in ("median", "p5", "min")),
+        number(delay["median"], 0), number(delay["max"], 0), number(still["median"], 0), number(still["p90"], 0),
+        *(number(qdd[key]) for key in ("median", "p90", "max")), number(way["peak_velocity_ratio"]["max"]),
+    )  # fmt: skip

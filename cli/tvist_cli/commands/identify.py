@@ -1,0 +1,272 @@
+"""`tvist identify`: learn from a robot's own sensors what shaping has to know of it."""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AsyncExitStack, asynccontextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from tvist_cli.failure import Failure, told
+from tvist_cli.identified import report_modal, report_payload, report_polynomial
+from tvist_cli.output import err, progress
+from tvist_cli.poses import pose
+
+if TYPE_CHECKING:
+    from tvist_client.arm import Arm
+    from tvist_client.robot import Robot
+    from tvist_lab.identification.modal import ModalIdentification
+    from tvist_lab.identification.payload import PayloadFound
+    from tvist_plant.description import RobotDescription
+
+MASSES = "0,5"
+"""Payloads that a modal model is made with, unless told otherwise [kg]."""
+
+Doing = Callable[["Robot", "Arm"], Awaitable[Any]]
+
+
+def identify(
+    endpoint: str | None = None,
+    *,
+    output: Path = Path("calibration.json"),
+    name: str | None = None,
+    robot: str = "ur5e",
+    description: str | None = None,
+    security: Path | None = None,
+    model: Literal["polynomial", "modal"] = "polynomial",
+    payload: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    configurations: int = 160,
+    repeats: int = 3,
+    ring_downs: int = 12,
+    payloads: str | None = None,
+    poses: int = 6,
+    declare: bool = False,
+    seed: int = 0,
+    at: list[str] | None = None,
+    figures: Path | None = None,
+    json: bool = False,
+) -> None:
+    """Jog the arm, fit what rings, and write a calibration; or find what the arm carries.
+
+    The model polynomial says the lowest mode with one payload, from many configurations: about a minute in process,
+    half an hour over a network. The model modal says any mode with any payload, from a dozen ring-downs: seconds in
+    process, a minute over a network. With --payload and no mass nothing is calibrated: mass and centre of mass of
+    what the arm carries are found by its torques.
+
+    Without an endpoint a robot is made in this process and runs as fast as it computes.
+
+    Args:
+        endpoint: Zenoh endpoint of a served robot.
+        output: File to write.
+        name: Of the calibration; default: the file's.
+        robot: Name of the served robot; in process, the robot file.
+        description: Robot file with the masses of a served robot; default: the UR5e's.
+        security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
+        model: What to fit.
+        payload: Mass of the paper's disc in kg, in process. Without a mass: find what the arm carries.
+        configurations: How many, spread over the workspace, for polynomial.
+        repeats: Jogs averaged at each, for polynomial.
+        ring_downs: How many in all, for modal.
+        payloads: Masses in kg with commas that a simulated arm carries in turn, for modal; default: 0,5 in process,
+            what is declared over a network.
+        poses: In how many the arm rests, for --payload.
+        declare: Declare the payload that was found.
+        seed: Of the choice of configurations, and of noise and gear errors in process.
+        at: Poses to measure with more weight, for polynomial: names of the robot file or angles with commas [Q1 Q2 Q3].
+        figures: Folder for a figure of the fit, for polynomial.
+        json: Print one JSON object.
+    """
+    if min(configurations, repeats, ring_downs, poses) < 1:
+        raise Failure("configurations, repeats, ring-downs and poses must be at least 1", code=2)
+    if not output.absolute().parent.is_dir():  # said before half an hour of jogs
+        raise Failure(f"output is {output}: there is no such folder", code=2)
+    endpoint, mass = _endpoint_and_mass(endpoint, payload)
+    from tvist_plant.description import DescriptionError, load
+
+    with told(DescriptionError, code=2):
+        arm = load(description or (robot if endpoint is None else "ur5e"))
+    place = _Place(endpoint, robot, security, mass, seed)
+    called = name or output.stem
+    if payload is not None and mass is None:
+        _payload(place, arm, poses, declare=declare, json=json)
+    elif model == "modal":
+        masses = MASSES if payloads is None and mass is None and endpoint is None else payloads
+        _modal(place, arm, ring_downs, masses, output, called, json=json)
+    else:
+        anchors = [_pose(text, arm.poses, arm.joints) for text in at or list(arm.poses)]
+        _polynomial(place, anchors, configurations, repeats, output, called, figures, json=json)
+
+
+class _Place:
+    """Which robot."""
+
+    def __init__(
+        self, endpoint: str | None, robot: str, security: Path | None, mass: float | None, seed: int
+    ) -> None:
+        from tvist_controller.setup import check_rating
+        from tvist_lab.in_process import free_setup
+        from tvist_server.config import ConfigError, from_mapping
+
+        self.endpoint, self.robot, self.security, self.mass, self.seed = endpoint, robot, security, mass, seed
+        self._setup = None
+        if endpoint is None:
+            content = {
+                "robot": robot,
+                "payload": mass,
+                "overload": True,  # refused below, without the hint for who serves
+                "calibration": "none",
+                "clock": "free",
+                "seed": seed,
+                "truth": True,
+            }
+            with told(ConfigError, code=2):
+                self._setup = free_setup(from_mapping(content, "options"))
+            with told(ValueError, code=2):
+                check_rating(self._setup.payload, self._setup.description)
+
+    def run(self, doing: Doing) -> Any:
+        """Do something as a client with control."""
+
+        async def whole() -> Any:
+            async with self._controlled() as (client, arm):
+                return await doing(client, arm)
+
+        return asyncio.run(whole())
+
+    @asynccontextmanager
+    async def _controlled(self) -> "AsyncIterator[tuple[Robot, Arm]]":
+        from tvist_client.robot import Robot
+        from tvist_lab.in_process import robot_in_process
+
+        async with AsyncExitStack() as stack:
+            if self._setup is not None:
+                client = await stack.enter_async_context(robot_in_process(self._setup))
+            else:
+                connected = await Robot.connect(str(self.endpoint), self.robot, security=self.security)
+                client = await stack.enter_async_context(connected)
+            yield client, await stack.enter_async_context(client.control("identify"))
+
+
+def _polynomial(
+    place: _Place,
+    anchors: list[tuple[float, ...]],
+    configurations: int,
+    repeats: int,
+    output: Path,
+    name: str,
+    figures: Path | None,
+    *,
+    json: bool,
+) -> None:
+    from tvist_lab.identification.fit import FitError
+    from tvist_lab.identification.identify import Plan
+    from tvist_lab.identification.identify import identify as run
+    from tvist_protocol.calibration import calibration_to_json
+
+    plan = Plan(configurations=configurations, anchors=tuple(anchors), repeats=repeats, seed=place.seed)
+    command = f"tvist identify --configurations {configurations} --repeats {repeats} --seed {place.seed}"
+    if place.mass is not None:
+        command += f" --payload {place.mass:g}"
+    with told(FitError, OSError):
+        with progress(configurations + len(anchors), "ring-downs") as bar:
+            done = place.run(
+                lambda client, arm: run(
+                    client, arm, plan, name=name, command=command, progress=lambda: bar(1, None)
+                )
+            )
+        output.write_bytes(calibration_to_json(done.calibration))
+    if figures is not None:
+        from tvist_lab.figures import identified_figure, save
+
+        figures.mkdir(parents=True, exist_ok=True)
+        drawn = identified_figure(
+            done.calibration, done.q, done.f_d, done.zeta, done.true_f_d, done.true_zeta
+        )
+        err.print(str(save(drawn, figures / "identification.png")))
+    report_polynomial(done, output, json=json)
+
+
+def _modal(
+    place: _Place,
+    arm: "RobotDescription",
+    ring_downs: int,
+    masses: str | None,
+    output: Path,
+    name: str,
+    *,
+    json: bool,
+) -> None:
+    from tvist_controller.setup import paper_payload
+    from tvist_lab.identification.modal import ModalPlan, identify_modal
+    from tvist_protocol.calibration import calibration_to_json
+
+    carried = () if masses is None else tuple(paper_payload(arm, mass) for mass in _masses(masses))
+    plan = ModalPlan(ring_downs=ring_downs, payloads=carried, seed=place.seed)
+    command = f"tvist identify --model modal --ring-downs {ring_downs} --seed {place.seed}"
+    if masses is not None:
+        command += f" --payloads {masses}"
+    elif place.mass is not None:
+        command += f" --payload {place.mass:g}"
+
+    with told(OSError):
+        with progress(ring_downs, "ring-downs") as bar:
+
+            async def run(client: "Robot", control: "Arm") -> "ModalIdentification":
+                return await identify_modal(
+                    client, control, arm, plan, name=name, command=command, progress=lambda: bar(1, None)
+                )
+
+            done = place.run(run)
+        output.write_bytes(calibration_to_json(done.calibration))
+    report_modal(done, output, json=json)
+
+
+def _payload(place: _Place, arm: "RobotDescription", poses: int, *, declare: bool, json: bool) -> None:
+    from tvist_lab.identification.payload import identify_payload
+
+    with told(OSError), progress(poses + 1, "poses") as bar:
+
+        async def run(client: "Robot", control: "Arm") -> "PayloadFound":
+            found = await identify_payload(
+                client, control, arm, poses=poses, seed=place.seed, progress=lambda: bar(1, None)
+            )
+            if declare:
+                new = found.payload
+                await control.set_payload(new.mass, new.com, new.inertia)
+            return found
+
+        found = place.run(run)
+    report_payload(found, declared=declare, json=json)
+
+
+def _endpoint_and_mass(endpoint: str | None, payload: list[str] | None) -> tuple[str | None, float | None]:
+    """Tell a mass from an endpoint: an option that may stand without a value takes what follows it."""
+    mass = None
+    for word in payload or []:
+        try:
+            given, mass = mass, float(word)
+            if given is not None:
+                raise Failure(f"payload is {given:g} and {mass:g}: give one mass", code=2)
+        except ValueError:
+            if endpoint is not None or "/" not in word:
+                raise Failure(f"payload is {word!r}: must be a mass in kg, or nothing", code=2) from None
+            endpoint = word
+    return endpoint, mass
+
+
+def _masses(text: str) -> tuple[float, ...]:
+    try:
+        masses = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        masses = ()
+    if not masses or not all(0.0 <= mass <= 100.0 for mass in masses) or len(set(masses)) < len(masses):
+        raise Failure(f"payloads is {text!r}: must be different masses in kg with commas", code=2)
+    return masses
+
+
+def _pose(text: str, poses: dict[str, tuple[float, ...]], joints: int) -> tuple[float, ...]:
+    angles = pose(text, poses, "at")
+    if len(angles) != joints:
+        raise Failure(f"at has {len(angles)} angles, {text.strip()}: the arm has {joints} joints", code=2)
+    return angles

@@ -1,0 +1,214 @@
+"""`tvist shaperbench`: shapers on eight arms, a person's own among them."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from tvist_cli.failure import Failure, told
+from tvist_cli.output import err, number, out, print_json, progress, say, table
+from tvist_cli.shapers_of import load_given
+
+if TYPE_CHECKING:
+    from tvist_controller.own_shapers import OwnShaper
+    from tvist_lab.evaluation.candidates import Candidate
+    from tvist_protocol.calibration import Calibration
+
+MOVES = 100
+QUICK = 3
+"""Moves with --quick."""
+
+
+def shaperbench(
+    *,
+    shaper: str | None = None,
+    quick: bool = False,
+    moves: int | None = None,
+    against: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    seed: int = 0,
+    calibration: str | None = None,
+    output: Path | None = None,
+    figures: Path | None = None,
+    markdown: Path | None = None,
+    json: bool = False,
+) -> None:
+    """Judge shapers by how soon eight different arms are still, and what rings until then.
+
+    Every shaper gets the same random moves with payloads of 0 to 5 kg of which the controller knows 100, 110 and 90 %,
+    and its reference is followed by eight arms; all but one differ from what the controller believes. A shaper that
+    peeks at the future or hides a tail is named and not ranked.
+
+    Args:
+        shaper: Python file with a class that has step(q_ref, info) -> q_star, and may have reset(q) and delay in s; or
+            with a function step. Or FILE.py:NAME, as tvist serve takes it.
+        quick: A few moves, with one payload error each.
+        moves: How many; 100, or 3 with --quick.
+        against: Names of the shapers and baselines to run, beside waiting; default: all.
+        seed: Of moves, payloads, gear errors and scatter.
+        calibration: Calibration with a modal model that comes with the package, or path of one.
+        output: JSON file for the leaderboard.
+        figures: Folder for a figure: settling against residual.
+        markdown: File for a page with the tables.
+        json: Print one JSON object.
+    """
+    from tvist_lab.evaluation import curves, leaderboard
+    from tvist_lab.evaluation import shaperbench as bench
+    from tvist_lab.evaluation.arms import ARMS
+    from tvist_plant.description import load
+
+    count = moves if moves is not None else QUICK if quick else MOVES
+    if not 1 <= count <= 10_000:
+        raise Failure(f"moves is {count}: must be 1 to 10000", code=2)
+    if not 0 <= seed < 2**62:
+        raise Failure(f"seed is {seed}: must be at least 0 and less than 2^62", code=2)
+    description = load("ur5e")
+    known = _calibration(calibration)
+    against = None if against is None else [name.lower() for name in against]
+    mine = None if shaper is None else _mine(shaper)
+    standing = _candidates(mine, against, known)
+    drawn = bench.draw(description, count, seed)
+    faults = [bench.inspect(one, description, drawn) for one in standing]
+    sound = [one for one, fault in zip(standing, faults, strict=True) if fault is None]
+    jobs, bends = (
+        bench.jobs(description, sound, drawn, seed, quick=quick),
+        curves.bends(description, sound, drawn),
+    )
+    done, bent = [], []
+    with progress(len(jobs) + len(bends), "motions") as bar:
+        for scores in bench.play(jobs):
+            done.append(scores)
+            bar(1, None)
+        for path in bends:
+            bent.append((path, curves.bend(path)))
+            bar(1, None)
+    result = {
+        "command": _command(shaper, against, count, seed, calibration, quick=quick),
+        "moves": count,
+        "seed": seed,
+        "payload_errors": list(bench.PAYLOAD_ERRORS),
+        "arms": {arm.name: arm.label for arm in ARMS},
+        "calibration": known.name,
+        **leaderboard.leaderboard(standing, faults, jobs, done, bent),
+    }
+    _write(result, output, figures, markdown)
+    if json:
+        print_json(result)
+    else:
+        _print(result)
+    called = getattr(mine, "name", "file")
+    unranked = next((row for row in result["shapers"] if row["name"] == called and not row["ranked"]), None)
+    if unranked is not None:
+        raise Failure(f"shaper {shaper} is not ranked: it {unranked['fault']}")
+
+
+def _calibration(name: str | None) -> "Calibration":
+    from tvist_controller.calibrations import DEFAULT, load
+    from tvist_controller.mode_source import modal_source
+    from tvist_plant.description import load as robot
+    from tvist_protocol.calibration import CalibrationError
+
+    with told(CalibrationError, code=2):
+        known = load(DEFAULT if name is None else name)
+    if name is None:
+        source = modal_source(robot("ur5e"), known)
+        known = known if source is None or source.calibration is None else source.calibration
+    if known.modal is None:
+        raise Failure(
+            f"calibration {known.name} has no modal model: make one with tvist identify --model modal", code=2
+        )
+    return known
+
+
+def _mine(shaper: str) -> "str | OwnShaper":
+    """A person's own shaper: path of a file with a class that has a method step, or what FILE.py:NAME names."""
+    if ".py:" in shaper:
+        return load_given(shaper)
+    from tvist_lab.evaluation.foreign import CandidateError, load_shaper
+
+    with told(CandidateError, code=2):
+        load_shaper(Path(shaper))
+    return shaper
+
+
+def _candidates(
+    mine: "str | OwnShaper | None", against: list[str] | None, known: "Calibration"
+) -> "list[Candidate]":
+    from tvist_lab.evaluation.recipes import RecipeError
+    from tvist_lab.evaluation.standing import candidates
+    from tvist_plant.description import load
+
+    with told(RecipeError, code=2):
+        every = {one.name for one in candidates(load("ur5e"), known, None, None)}
+        for name in against or []:
+            if name not in every:
+                raise Failure(f"against is {name!r}: must be one of {', '.join(sorted(every))}", code=2)
+        return candidates(load("ur5e"), known, mine, against)
+
+
+def _command(
+    shaper: str | None,
+    against: list[str] | None,
+    count: int,
+    seed: int,
+    calibration: str | None,
+    *,
+    quick: bool,
+) -> str:
+    words = ["tvist shaperbench"]
+    words += [] if shaper is None else [f"--shaper {shaper}"]
+    words += [] if against is None else ["--against", *against]
+    words += [] if calibration is None else [f"--calibration {calibration}"]
+    words += ["--quick"] if quick else []
+    return " ".join([*words, f"--moves {count} --seed {seed}"])
+
+
+def _write(result: dict[str, Any], output: Path | None, figures: Path | None, markdown: Path | None) -> None:
+    import msgspec
+
+    with told(OSError):
+        if output is not None:
+            output.write_bytes(msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n")
+        if markdown is not None:
+            from tvist_lab.evaluation.markdown import page
+
+            markdown.write_text(page(result), encoding="utf-8")
+        if figures is not None:
+            from tvist_lab.figures import pareto_figure, save
+
+            err.print(str(save(pareto_figure(result["shapers"]), figures / "pareto.png")))
+
+
+def _print(result: dict[str, Any]) -> None:
+    errors = len(result["payload_errors"])
+    table(
+        f"{result['moves']} moves on {len(result['arms'])} arms with {errors} payload errors; "
+        "* keeps the limits, and none that does is better in both still and ring",
+        (
+            "shaper", "still ms", "p90", "ring m/s²", "less %", "p5", "delay ms", "moving", "q̈/limit", "q̇/limit",
+            "bend mrad", "µs",
+        ),
+        [_row(row) for row in result["shapers"] if row["ranked"]],
+    )  # fmt: skip
+    out.print(
+        "still: last time |α| exceeds 0.1 m/s², from the unshaped reference's stop, median and p90; ring: envelope\n"
+        "within 3 to 60 Hz after the shaper's own stop; less: than waiting; moving: vibration in motion over its;\n"
+        "peaks are the largest; bend: distance from a path round a corner; µs: of a tick with its estimates, here.",
+        markup=False,
+    )
+    told = [row["name"] for row in result["shapers"] if row["ranked"] and row["told_target"]]
+    if told:
+        say(f"told before each move where it will end: {', '.join(told)}")
+    for row in result["shapers"]:
+        if not row["ranked"]:
+            say(f"{row['name']} ({row['label']}) is not ranked: it {row['fault']}")
+
+
+def _row(row: dict[str, Any]) -> tuple[str, ...]:
+    still, less = row["time_until_still_ms"], row["reduction_percent"]
+    return (
+        row["name"] + (" *" if row["pareto"] else ""), number(still["median"], 0), number(still["p90"], 0),
+        number(row["residual_m_s2"]["median"]), number(less["median"], 1), number(less["p5"], 1),
+        number(row["delay_ms"]["median"], 0), number(row["in_motion_ratio"], 2),
+        number(row["peak_acceleration_ratio"]["max"]), number(row["peak_velocity_ratio"]["max"]),
+        number(row["path_error_mrad"], 1), number(row["cost_us"], 0),
+    )  # fmt: skip

@@ -1,0 +1,68 @@
+"""What a controller says of itself."""
+
+from importlib.metadata import version
+
+from tvist_controller.calibrations import available, fits
+from tvist_controller.controller import Controller
+from tvist_controller.stopping import stopping
+from tvist_plant.plant import PERIOD
+from tvist_protocol.channels import COMMANDS, tag
+from tvist_protocol.info import CalibrationInfo, Info, Limits
+from tvist_protocol.values import PROTOCOL_VERSION
+
+VERSION = version("tvist")
+FIELDS = {tag(kind): list(kind.__struct_fields__) for kind in COMMANDS}
+"""Of each command."""
+
+
+def info_of(controller: Controller) -> Info:
+    """The robot, its limits and how it is set up now."""
+    setup, limits, lease = controller.setup, controller.setup.description.limits, controller.session.lease
+    hold = controller.stepping.hold
+    calibration = controller.filters.source.calibration
+    own = (setup.calibration.name,) if setup.calibration is not None else ()
+    tvist = controller.cycle.tvist
+    return Info(
+        name=setup.name,
+        protocol=PROTOCOL_VERSION,
+        version=VERSION,
+        model=setup.description.robot.model,
+        joints=list(setup.description.robot.joints),
+        rate_hz=1.0 / PERIOD,
+        clock=setup.clock,
+        limits=Limits(
+            position=[(-limit, limit) for limit in limits.position],
+            velocity=list(limits.velocity),
+            acceleration=list(limits.acceleration),
+            jerk=list(limits.jerk),
+            torque=list(limits.torque),
+            payload=limits.payload,
+        ),
+        payload=controller.declared,
+        calibration=None
+        if calibration is None
+        else CalibrationInfo(
+            name=calibration.name,
+            payload_mass=calibration.payload.mass,
+            fits_payload=fits(calibration, controller.declared, controller.filters.source.name),
+            fits_arm=controller.filters.source.fits_arm,
+            seed=calibration.provenance.seed,
+            f_d_range=calibration.provenance.measured_f_d_range,
+            zeta_range=calibration.provenance.measured_zeta_range,
+        ),
+        shaper=tvist.name,
+        modes=tvist.estimator.modes,
+        estimator=controller.filters.source.name,
+        calibrations=sorted({*available(), *own}),
+        shapers=list(setup.registry.names()),
+        control=None if lease is None else lease.client,
+        stepper=None if hold is None else hold.client,
+        commands=FIELDS,
+        tick=controller.tick_number,
+        stopping=list(stopping(setup.description)),
+        robot_mode=controller.motion.activity.robot_mode,
+        safety_mode=controller.motion.safety_mode,
+        stop=controller.stop_reason,
+        arm=controller.arm,
+        programs=sorted(controller.programs.known),
+    )

@@ -1,0 +1,104 @@
+"""Who has control and who holds the clock, and what ends with that: the commands of both rights."""
+
+from collections.abc import Callable
+
+from tvist_controller.command_row import Call, Row
+from tvist_controller.events import Emit
+from tvist_controller.refusal import RefusalError
+from tvist_controller.session import Session
+from tvist_controller.stepping import Stepping, check_step
+from tvist_protocol.commands import (
+    HandOver,
+    KeepAlive,
+    ReleaseClock,
+    ReleaseControl,
+    SimulationStep,
+    TakeClock,
+    TakeControl,
+)
+from tvist_protocol.replies import Accepted, Reply
+from tvist_protocol.values import PROTOCOL_VERSION
+
+
+class Authority:
+    """Gives, renews and ends the lease, with which motion ends, and the right to let time pass.
+
+    Args:
+        session: The lease.
+        steppable: Whether a client may let time pass.
+        interrupt: Ends motion; it takes the reason.
+        emit: Takes what happens.
+    """
+
+    def __init__(
+        self, session: Session, interrupt: Callable[[str], None], emit: Emit, *, steppable: bool
+    ) -> None:
+        self.session, self.stepping = session, Stepping()
+        self._steppable = steppable
+        self._interrupt, self._emit = interrupt, emit
+        self.rows = (
+            Row(TakeControl, self._take, lease="none"),
+            Row(KeepAlive, lambda _: None),  # every command renews the lease
+            Row(HandOver, self._hand_over),
+            Row(ReleaseControl, self._release),
+            Row(TakeClock, self._take_clock, lease="none"),
+            Row(ReleaseClock, lambda call: self.stepping.release(call.command.token), lease="none"),
+        )
+
+    def watch(self, now: float) -> None:
+        """End a lease that nobody has renewed."""
+        if self.session.expired(now):
+            self._lose("the lease ran out: no command renewed it")
+
+    def client_gone(self, client: str, session: str) -> None:
+        """A client's session has ended; where it held control, motion ends with it, and its hold of the clock ends."""
+        self.stepping.client_gone(client, session)
+        if self.session.client_gone(client, session):
+            self._lose(f"client {client!r} is gone")
+
+    def check_step(self, step: SimulationStep, now: float) -> None:
+        """Check that a step's sender may let time pass, and send the set-points in it.
+
+        Raises:
+            NoControlError: It may not.
+            RefusalError: Time passes by itself.
+        """
+        check_step(self.stepping.hold, self.session.lease, step)
+        if self.stepping.hold is None:
+            self.session.renew(step.token, now)
+        self._check_steppable()
+
+    def _check_steppable(self) -> None:
+        if not self._steppable:
+            why = "time passes by itself here: start with --clock lockstep to step"
+            raise RefusalError("wrong_mode", "type", why)
+
+    def _take_clock(self, call: Call[TakeClock]) -> Reply:
+        _check_version(call.command.protocol)
+        self._check_steppable()
+        return Accepted(token=self.stepping.take(call.command.client, call.session).token)
+
+    def _lose(self, why: str) -> None:
+        self.session.release()
+        self._emit("lease_lost", why=why)
+        self._interrupt(why)
+
+    def _take(self, call: Call[TakeControl]) -> Reply:
+        command = call.command
+        _check_version(command.protocol)
+        lease = self.session.take(command.client, command.lease_s, call.now, call.session)
+        return Accepted(token=lease.token, lease_s=lease.seconds)
+
+    def _hand_over(self, call: Call[HandOver]) -> None:
+        """Give the lease to another client, who then takes control and gets a token of its own."""
+        self.session.hand_over(call.command.client, call.now, call.session)
+
+    def _release(self, _: Call[ReleaseControl]) -> None:
+        self.session.release()
+        self._interrupt("control was released")
+
+
+def _check_version(protocol: int) -> None:
+    if protocol != PROTOCOL_VERSION:
+        why = f"protocol is {protocol}; this server speaks {PROTOCOL_VERSION}"
+        raise RefusalError("unsupported_version", "protocol", why, PROTOCOL_VERSION)

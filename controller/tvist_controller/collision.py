@@ -1,0 +1,225 @@
+"""Where the arm would meet itself or the floor: capsules of the robot file, distances by coal."""
+
+import math
+from dataclasses import dataclass
+from itertools import combinations
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from tvist_controller.control.differentiator import Floats
+from tvist_controller.trajectory import Way
+from tvist_plant.description import Body, Payload, RobotDescription
+from tvist_plant.model import FLANGE, link_frame, rigid_model
+
+CLEARANCE = 0.005
+"""Least distance between two bodies [m]."""
+FAR = 0.05
+"""Distance that allows a long step [m]."""
+SHORT = 0.004
+"""Way of the arm's points between two looks where something is as near as it may be [m]."""
+PAYLOAD = "payload"
+FLOOR = "floor"
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """Two bodies too near to each other."""
+
+    first: str
+    second: str
+    distance: float
+    """Between their surfaces; negative where they overlap [m]."""
+
+    def __str__(self) -> str:
+        return f"{self.first} and {self.second} would be {1e3 * self.distance:.0f} mm apart"
+
+
+class CollisionModel:
+    """The arm's bodies, its declared payload and the floor.
+
+    Args:
+        description: The robot; without bodies nothing ever meets.
+        payload: What the controller believes that the arm carries.
+    """
+
+    def __init__(self, description: RobotDescription, payload: Payload) -> None:
+        self._model = rigid_model(description, Payload())
+        self._data = self._model.createData()
+        self._reach = np.zeros(description.joints)
+        self.carried = payload
+        """What the controller believes that the arm carries."""
+        self._geometry = pin.GeometryModel()
+        self._names: list[str] = []
+        collision = description.collision
+        for body in collision.bodies:
+            self._add(body, description)
+        if collision.bodies:
+            self._add_payload(collision.payload_radius)
+        self._add_pairs(description)
+        self._fine, self._coarse = (self._request(margin) for margin in (CLEARANCE, FAR))
+        self._distances = self._geometry.createData()
+        self._pairs = list(self._geometry.collisionPairs)
+        if self._names:
+            self._with_payload = np.array(
+                [self._payload in (pair.first, pair.second) for pair in self._pairs]
+            )
+            self.carry(payload)
+
+    def meeting(self, q: Floats) -> Meeting | None:
+        """The nearest pair at a posture, where it is nearer than the clearance.
+
+        Args:
+            q: Joint positions, shape (n,) [rad].
+        """
+        return self._nearest(q) if self._within(self._fine, q) else None
+
+    def on_way(self, way: Way, *, before: Floats | None = None) -> tuple[float, Meeting] | None:
+        """The first meeting on a way, found by long steps where everything is far apart and short ones elsewhere.
+
+        Args:
+            way: Where it goes; `Path.whole` and `Path.way` give those of a path.
+            before: Posture that the way begins from, shape (n,) [rad]: what is in a meeting there may move out of it.
+                None: the beginning of the way itself.
+
+        Returns:
+            Share of the way and the pair; None where it is free.
+        """
+        travel = self.travel(way.turned)
+        share, escaping = 0.0, self.meeting(way.at(0.0) if before is None else before)
+        while True:
+            q = way.at(share)
+            step = FAR - CLEARANCE
+            if self._within(self._coarse, q):
+                nearest = self._nearest(q)
+                step = max(nearest.distance - CLEARANCE, SHORT)
+                if nearest.distance >= CLEARANCE:
+                    escaping = None
+                # What is in a meeting already may move out of it.
+                elif escaping is None or nearest.distance < escaping.distance:
+                    return share, nearest
+                else:
+                    escaping = nearest
+            else:
+                escaping = None
+            if share >= 1.0:
+                return None
+            share = 1.0 if travel <= 0.0 else min(share + step / travel, 1.0)
+
+    def nearest(self, postures: Floats, far: float = FAR) -> float:
+        """Least distance between two bodies at some postures, shape (k, n) [rad]; `far` where none is nearer [m]."""
+        near = [q for q in postures if self._names and self._within(self._coarse, q)]
+        return min((far, *(self._nearest(q).distance for q in near)))
+
+    def travel(self, turned: Floats) -> float:
+        """Upper bound of the way of any point of the arm while its joints turn by so much, shape (n,) [rad], in m."""
+        return float(np.abs(turned) @ self._reach)
+
+    def room(self, q: Floats) -> float:
+        """How far any point of the arm may travel from a posture before something can meet [m]; 0 in a meeting."""
+        if not self._names:
+            return math.inf
+        return max(self._nearest(q).distance - CLEARANCE, 0.0)
+
+    def _request(self, margin: float) -> pin.GeometryData:
+        data = self._geometry.createData()
+        for request in data.collisionRequests:
+            request.security_margin = margin
+        return data
+
+    def _within(self, margin: pin.GeometryData, q: Floats) -> bool:
+        """Whether any pair is nearer than the margin."""
+        return bool(pin.computeCollisions(self._model, self._data, self._geometry, margin, q, True))
+
+    def _nearest(self, q: Floats) -> Meeting:
+        pin.computeDistances(self._model, self._data, self._geometry, self._distances, q)
+        distances = np.array([result.min_distance for result in self._distances.distanceResults])
+        if not self._loaded:
+            distances[self._with_payload] = np.inf
+        number = int(np.argmin(distances))
+        pair = self._pairs[number]
+        return Meeting(self._names[pair.first], self._names[pair.second], float(distances[number]))
+
+    def _add(self, body: Body, description: RobotDescription) -> None:
+        start, end = np.array(body.start), np.array(body.end)
+        if body.link < 0:
+            self._add_capsule(body.name, 0, pin.SE3.Identity(), start, end, body.radius)
+        else:
+            frame = link_frame(description, body.link)
+            self._add_capsule(body.name, body.link + 1, frame, start, end, body.radius)
+
+    def _add_payload(self, radius: float) -> None:
+        flange = self._model.frames[self._model.getFrameId(FLANGE)]
+        self._flange, self._radius, self._payload = flange.placement, radius, len(self._names)
+        nowhere = np.zeros(3)
+        self._add_capsule(PAYLOAD, flange.parentJoint, flange.placement, nowhere, nowhere, radius)
+
+    def carry(self, payload: Payload) -> None:
+        """Change the payload, in place: building a model takes a good part of a tick.
+
+        Args:
+            payload: What the controller believes that the arm carries.
+        """
+        self.carried = payload
+        if not self._names:
+            return
+        centre = np.array(payload.com)
+        distance = float(np.linalg.norm(centre))
+        inset = centre * min(self._radius / distance, 1.0) if distance > 0.0 else centre
+        body = self._geometry.geometryObjects[self._payload]
+        body.placement, length = _placed(self._flange, inset, 2.0 * centre - inset)
+        body.geometry.halfLength = length / 2.0
+        self._loaded = payload.mass > 0.0
+        body.disableCollision = not self._loaded
+        self._reach = self._reaches()
+
+    def _reaches(self) -> Floats:
+        """How far any point of the arm can be from each joint's axis, in any posture, shape (n,) [m]."""
+        joints = self._model.nv
+        own = np.zeros(joints)  # from the joint's origin to the farthest point of its own link
+        for body in self._geometry.geometryObjects[: len(self._names) - 1]:
+            if body.parentJoint > 0 and not body.disableCollision:
+                axis = body.placement.rotation[:, 2] * body.geometry.halfLength
+                ends = [np.linalg.norm(body.placement.translation + sign * axis) for sign in (-1.0, 1.0)]
+                joint = body.parentJoint - 1
+                own[joint] = max(own[joint], max(ends) + body.geometry.radius)
+        links = [float(np.linalg.norm(placement.translation)) for placement in self._model.jointPlacements]
+        reach, beyond = np.zeros(joints), 0.0
+        for joint in reversed(range(joints)):
+            reach[joint] = beyond = max(own[joint], beyond)
+            beyond += links[joint + 1]
+        return reach
+
+    def _add_capsule(
+        self, name: str, joint: int, frame: pin.SE3, start: Floats, end: Floats, radius: float
+    ) -> None:
+        placement, length = _placed(frame, start, end)
+        shape = coal.Capsule(radius, length)
+        self._geometry.addGeometryObject(pin.GeometryObject(name, joint, placement, shape))
+        self._names.append(name)
+
+    def _add_pairs(self, description: RobotDescription) -> None:
+        collision = description.collision
+        apart = {frozenset(pair) for pair in collision.apart}
+        bodies = range(len(self._names))
+        for first, second in combinations(bodies, 2):
+            names = frozenset((self._names[first], self._names[second]))
+            if second - first > 1 and names not in apart:
+                self._geometry.addCollisionPair(pin.CollisionPair(first, second))
+        if not self._names:
+            return
+        floor = coal.Halfspace(np.array([0.0, 0.0, 1.0]), collision.floor)
+        self._geometry.addGeometryObject(pin.GeometryObject(FLOOR, 0, pin.SE3.Identity(), floor))
+        self._names.append(FLOOR)
+        for number in bodies[2:]:  # the base stands on the floor, and the shoulder cannot reach it
+            self._geometry.addCollisionPair(pin.CollisionPair(number, len(self._names) - 1))
+
+
+def _placed(frame: pin.SE3, start: Floats, end: Floats) -> tuple[pin.SE3, float]:
+    """Placement of a capsule and the length of its axis [m], from the ends of the axis in a frame."""
+    axis = end - start
+    length = float(np.linalg.norm(axis))
+    up = np.array([0.0, 0.0, 1.0])
+    rotation = pin.Quaternion.FromTwoVectors(up, axis / length).matrix() if length > 0.0 else np.eye(3)
+    return frame * pin.SE3(rotation, (start + end) / 2.0), max(length, 1e-6)

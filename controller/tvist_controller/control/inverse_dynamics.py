@@ -1,0 +1,119 @@
+"""Torques that the rigid arm needs for a motion."""
+
+import numpy as np
+import pinocchio as pin
+
+from tvist_controller.control.differentiator import Floats
+from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.model import FLANGE, payload_inertia, rigid_model
+
+SLEW = 250
+"""Ticks in which another payload comes into force."""
+
+
+class InverseDynamics:
+    """Recursive Newton-Euler on the rigid model with the payload that was declared.
+
+    Torque is linear in the ten inertial parameters of a body (mass, mass times centre of mass, inertia about the
+    joint), so another payload comes into force by a ramp between two sets of them: torque makes no step, and
+    everything in between is a body that could exist (Wensing, Kim and Slotine, 2018: such bodies are a convex set).
+
+    Args:
+        description: The robot.
+        payload: What the controller believes the arm carries.
+    """
+
+    def __init__(self, description: RobotDescription, payload: Payload) -> None:
+        self._model = rigid_model(description, Payload())
+        self._data = self._model.createData()
+        flange = self._model.frames[self._model.getFrameId(FLANGE)]
+        self._last, self._flange = flange.parentJoint, flange.placement
+        self._bare = self._model.inertias[self._last].toDynamicParameters()
+        self._before = self._present = self._after = self._bare
+        self._ticks_left = 0
+        self.declare(payload)
+        self.settle()
+
+    def declare(self, payload: Payload) -> None:
+        """Change the payload; `advance` brings it into force."""
+        self.payload = payload
+        self._before, self._after = self._present, self._bare
+        if payload.mass > 0.0:
+            placed = self._flange.act(payload_inertia(payload))
+            self._after = self._bare + placed.toDynamicParameters()
+        self._ticks_left = SLEW
+
+    def advance(self) -> None:
+        """One tick on the way to the payload declared last."""
+        if self._ticks_left == 0:
+            return
+        self._ticks_left -= 1
+        left = self._ticks_left / SLEW
+        share = (1.0 - left) ** 2 * (1.0 + 2.0 * left)
+        self._load(self._before + share * (self._after - self._before) if left > 0.0 else self._after)
+
+    @property
+    def changing(self) -> bool:
+        """Whether one payload is giving way to another."""
+        return self._ticks_left > 0
+
+    @property
+    def bodies(self) -> tuple[Floats, ...]:
+        """Inertial parameters of the last link that may be in force: two sets while one payload gives way to another.
+
+        Each has shape (10,), as pinocchio orders them [kg, kg m, kg m^2].
+        """
+        return (self._before, self._after) if self.changing else (self._after,)
+
+    def believe(self, bodies: tuple[Floats, ...]) -> None:
+        """Put other inertial parameters into force, as `bodies` gives them."""
+        self._before, self._after = bodies[0], bodies[-1]
+        self._ticks_left = len(bodies) - 1
+        self._load(self._after)
+
+    def settle(self) -> None:
+        """Put the payload declared last into force at once."""
+        self._ticks_left = 0
+        self._load(self._after)
+
+    def torque(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
+        """τ = M(q) q̈ + C(q, q̇) q̇ + g(q), shape (n,) [N m]."""
+        return np.array(pin.rnea(self._model, self._data, q, qd, qdd))
+
+    def torques(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
+        """The same for k states of motion, each argument of shape (k, n): shape (k, n) [N m]."""
+        found = np.empty_like(q)
+        for number in range(len(q)):
+            found[number] = pin.rnea(self._model, self._data, q[number], qd[number], qdd[number])
+        return found
+
+    def gravities(self, q: Floats) -> Floats:
+        """g(q) at k postures, shape (k, n) [N m]."""
+        found = np.empty_like(q)
+        for number in range(len(q)):
+            found[number] = pin.computeGeneralizedGravity(self._model, self._data, q[number])
+        return found
+
+    def gravity(self, q: Floats) -> Floats:
+        """g(q), shape (n,) [N m]."""
+        return np.array(pin.computeGeneralizedGravity(self._model, self._data, q))
+
+    def inertia(self, q: Floats) -> Floats:
+        """M(q), shape (n, n) [kg m^2]."""
+        return np.array(pin.crba(self._model, self._data, q, pin.Convention.WORLD))
+
+    def effort(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
+        """Largest |τ| whichever payload is right, shape (n,) [N m]: while one gives way to another, either may be."""
+        if self._ticks_left == 0:
+            return np.abs(self.torque(q, qd, qdd))
+        present, largest = self._present, np.zeros_like(q)
+        for parameters in (self._before, self._after):
+            self._load(parameters)
+            largest = np.maximum(largest, np.abs(self.torque(q, qd, qdd)))
+        self._load(present)
+        return largest
+
+    def _load(self, parameters: Floats) -> None:
+        """Give the last link with what it carries these inertial parameters, in place: a model takes long to build."""
+        self._present = parameters
+        self._model.inertias[self._last] = pin.Inertia.FromDynamicParameters(parameters)

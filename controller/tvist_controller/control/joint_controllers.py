@@ -1,0 +1,58 @@
+"""What the drives are told: set-points with their feed-forward."""
+
+import numpy as np
+
+from tvist_controller.control.differentiator import Floats, Target
+from tvist_plant.description import RobotDescription
+from tvist_plant.drives import DriveCommand
+
+
+class JointControllers:
+    """Feed-forward of the drives; their feedback runs in the drives themselves.
+
+    - Torque: τ_ff = τ* + B q̈* + friction, the rotors' inertia and a share of Coulomb friction on top of the
+      rigid arm.
+    - Wind-up: a gear that transmits τ - g twists by (τ - g)/K_g. The motor is led by a share c_w of that, so
+      that the link is nearer to its reference; gravity's own twist is left, as the paper's robot reports
+      joint angles.
+
+    Args:
+        description: The robot.
+        period: Tick [s].
+    """
+
+    def __init__(self, description: RobotDescription, period: float) -> None:
+        drives = description.drives
+        self._period = period
+        self._rotor = np.array(drives.rotor_inertia)
+        self._compliance = np.array(drives.windup_feedforward) / np.array(drives.gear_stiffness)
+        friction = np.array(drives.coulomb_friction)
+        self._linear = drives.linear_friction
+        self._viscous = friction / drives.friction_width
+        self._coulomb = drives.friction_feedforward * friction
+        self._width = drives.friction_feedforward_width
+        self._windup = np.zeros(description.joints)
+
+    def reset(self) -> None:
+        """Start anew at rest."""
+        self._windup = np.zeros_like(self._windup)
+
+    def command(self, target: Target, torque: Floats, gravity: Floats) -> DriveCommand:
+        """Drive command for a target.
+
+        Args:
+            target: Shaped reference and its derivatives.
+            torque: τ* of the rigid arm, shape (n,) [N m].
+            gravity: Its part that holds the arm, shape (n,) [N m].
+        """
+        windup = self._compliance * (torque - gravity)
+        windup_speed = (windup - self._windup) / self._period
+        self._windup = windup
+        friction = (
+            self._viscous * target.qd if self._linear else self._coulomb * np.tanh(target.qd / self._width)
+        )
+        return DriveCommand(
+            q=target.q + windup,
+            qd=target.qd + windup_speed,
+            torque=torque + self._rotor * target.qdd + friction,
+        )

@@ -1,0 +1,345 @@
+"""The controller: messages in, replies, states and events out. It has no clock, socket, thread or log.
+
+It owns a `Session` (who may) and a `ControlCycle` (what moves), which do not know each other.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Unpack
+
+import numpy as np
+
+from tvist_controller.authority import Authority
+from tvist_controller.collision import CollisionModel
+from tvist_controller.command_row import Call, Row
+from tvist_controller.cycle import ControlCycle, Sample
+from tvist_controller.declared_payload import DeclaredPayload
+from tvist_controller.events import Fields
+from tvist_controller.faults import Faults
+from tvist_controller.filters import Filters
+from tvist_controller.instruments.wrench import ToolWrench
+from tvist_controller.motion import MotionControl
+from tvist_controller.motion_commands import MotionCommands
+from tvist_controller.peripherals import Peripherals
+from tvist_controller.planning.basis import Basis
+from tvist_controller.planning.filter_planner import PlannedFilter
+from tvist_controller.planning.planner import Plan, Planner
+from tvist_controller.programs.player import ProgramPlayer
+from tvist_controller.refusal import RefusalError, check_content, check_joints
+from tvist_controller.reporting import Reporter, truth_of
+from tvist_controller.safety_control import SafetyControl
+from tvist_controller.session import NoControlError, Session
+from tvist_controller.setup import Setup, body
+from tvist_controller.stop_reasons import StopReasons
+from tvist_plant.fingerprint import fingerprint
+from tvist_plant.plant import PERIOD, Plant, PlantError
+from tvist_protocol import commands as c
+from tvist_protocol.info import StopReason
+from tvist_protocol.io import Io
+from tvist_protocol.replies import Done, Reply
+from tvist_protocol.stream import Event, EventKind, State, Truth
+from tvist_protocol.values import Payload
+
+
+@dataclass
+class Counters:
+    """What was counted since the start."""
+
+    commands: int = 0
+    refused: int = 0
+    setpoints_received: int = 0
+    setpoints_refused: int = 0
+    missed_ticks: int = 0
+
+
+class Controller:
+    """One robot.
+
+    Args:
+        setup: How it starts.
+        plant: What it moves; None: the flexible arm that the setup describes.
+
+    Raises:
+        ValueError: The setup is wrong, or the plant does not fit it.
+    """
+
+    def __init__(self, setup: Setup, plant: Plant | None = None) -> None:
+        setup.check()
+        self.setup = setup
+        self.tick_number = 0
+        self.counters = Counters()
+        self._events: list[Event] = []
+        self._stop_reasons = StopReasons()
+        self._io_changed = True
+        self._planner = Planner(setup)
+        source, tvist = self._planner.filters.first()
+        self.cycle = ControlCycle(
+            setup.description,
+            tvist,
+            q=np.array(setup.q, dtype=float),
+            declared=body(setup.payload),
+            carried=body(setup.carried or setup.payload),
+            seed=setup.seed,
+            plant=plant,
+        )
+        if setup.truth:
+            truth_of(self.cycle.plant)  # found missing now rather than at the first tick
+        self._seed = setup.seed
+        self._reporter = Reporter(setup.description)
+        self._wrench = ToolWrench(setup.description)
+        collisions = CollisionModel(setup.description, body(setup.payload))
+        self.motion = MotionControl(self.cycle, collisions, self._emit, setup.mode)
+        self.session = Session(timeouts=setup.clock == "realtime")
+        self._authority = Authority(
+            self.session, self._interrupt, self._emit, steppable=setup.clock != "realtime"
+        )
+        self.stepping = self._authority.stepping
+        safety = SafetyControl(self.motion, self._emit)
+        self._faults = Faults(self.motion, safety)
+        self.programs = ProgramPlayer(
+            setup.description, self.motion, safety, self._move_by_program, self._emit
+        )
+        self.filters = Filters(self.motion, source, setup.payload, self._emit)
+        self._payload = DeclaredPayload(setup.payload, self.motion, self.filters, self._emit)
+        self.peripherals = Peripherals(self._reporter.set_tcp)
+        parts = (
+            self._authority, MotionCommands(self.motion, safety, self.programs), self.filters, self._payload,
+            self.peripherals, self._faults, self.programs, self,
+        )  # fmt: skip
+        self._rows = {row.message: row for part in parts for row in part.rows}
+        self.latest = self._state(self.cycle.standing)
+        """State of the last tick; before the first, and where the arm was put somewhere since, how it stands there."""
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """Commands on the whole robot."""
+        return (
+            Row(c.SimulationReset, self._reset, changes_io=True),
+            Row(c.SimulationStep, self._check_step, lease="none"),
+        )
+
+    @property
+    def declared(self) -> Payload:
+        """What the controller believes that the arm carries."""
+        return self._payload.payload
+
+    @property
+    def now(self) -> float:
+        """Time of the present tick [s]; it passes by ticks alone."""
+        return self.tick_number * PERIOD
+
+    @cached_property
+    def arm(self) -> str:
+        """Fingerprint of the arm that the robot file describes."""
+        return fingerprint(self.setup.description)
+
+    @property
+    def stop_reason(self) -> StopReason | None:
+        """The stop that keeps the robot from moving; None: there is none."""
+        return self._stop_reasons.present(self.motion.activity.robot_mode, self.motion.safety_mode)
+
+    # ------------------------------------------------------------------ what comes in
+
+    @property
+    def basis(self) -> Basis:
+        """What plans for commands depend on, as it is now."""
+        on = self.filters.basis
+        return Basis(on, self.motion.basis(on))
+
+    def receive(self, command: c.Command, plan: Plan | None = None, session: str | None = None) -> Reply:
+        """Carry out a command between two ticks. A refused one changes nothing.
+
+        Args:
+            command: The command.
+            plan: For it, where it was planned beforehand; it must hold on `basis`.
+            session: Of the client that it gives control to, where its going is told by `client_gone`.
+        """
+        self.counters.commands += 1
+        row = self._rows[type(command)]
+
+        def planned() -> Any:
+            return self._found(plan or self._planner.plan(command, self.basis))
+
+        try:
+            token: Any = getattr(command, "token", None)
+            if row.lease == "needed" or (row.lease == "if named" and token is not None):
+                self.session.renew(token, self.now)
+            reply = row.handle(Call(command, self.tick_number + 1, self.now, session, planned))
+        except (RefusalError, NoControlError) as refusal:
+            self.counters.refused += 1
+            return refusal.reply
+        self._io_changed |= row.changes_io
+        return Done() if reply is None else reply
+
+    def receive_setpoint(self, setpoint: c.Setpoint) -> None:
+        """Take a set-point; one that is not for us is counted and dropped: nobody waits for an answer."""
+        lease = self.session.lease
+        if lease is None or setpoint.token != lease.token:
+            self._count_refused()  # a stranger's: it says nothing of the stream, and no journal has it
+            return
+        try:
+            check_joints(setpoint.q, self.setup.description)
+        except RefusalError as refusal:
+            self.refuse_setpoint(refusal.reply.why)
+            return
+        if not self.motion.streaming:
+            self.refuse_setpoint("no stream is running")
+            return
+        self.counters.setpoints_received += 1
+        self.session.renew(setpoint.token, self.now)
+        self.motion.streams.offer(setpoint.sequence, np.array(setpoint.q, dtype=float), self.now)
+
+    def refuse_setpoint(self, why: str) -> None:
+        """Count and drop a set-point of the lease's holder; should the stream fall silent, its end names the reason."""
+        self._count_refused()
+        self.motion.streams.refuse(why)
+
+    def _count_refused(self) -> None:
+        self.counters.setpoints_received += 1
+        self.counters.setpoints_refused += 1
+
+    def client_gone(self, client: str, session: str) -> None:
+        """A client's session has ended; what it held ends with it."""
+        self._authority.client_gone(client, session)
+
+    def missed(self, ticks: int) -> None:
+        """Ticks have begun too late."""
+        self.counters.missed_ticks += ticks
+
+    # ------------------------------------------------------------------ what goes out
+
+    def tick(self) -> tuple[State, list[Event]]:
+        """One control period."""
+        self._watch_time()
+        self._io_changed |= self.programs.advance()
+        try:
+            sample = self.motion.step()
+        except PlantError as error:
+            self._faults.clear()
+            sample = self.motion.recover(error, self._seed)
+            self._payload.begin_anew()
+        self._payload.watch(sample)
+        self.filters.watch()
+        self._stop_reasons.update(self.motion.activity.robot_mode, self.motion.safety_mode)
+        self.tick_number += 1
+        events, self._events = self._events, []
+        self.latest = self._state(sample)
+        return self.latest, events
+
+    def _state(self, sample: Sample) -> State:
+        return self._reporter.state(
+            self.tick_number,
+            sample,
+            self.cycle.tvist,
+            robot_mode=self.motion.activity.robot_mode,
+            safety_mode=self.motion.safety_mode,
+            runtime=self.motion.runtime,
+            speed=self.motion.motions.speed,
+            setpoint_sequence=self.motion.streams.sequence,
+            missed_ticks=self.counters.missed_ticks,
+        )
+
+    def io(self, *, wrench: bool = True) -> Io:
+        """Inputs, outputs and registers as they are for the next tick.
+
+        Args:
+            wrench: Whether to find the wrench at the tool, which takes a third of a tick.
+        """
+        return self.peripherals.io(
+            self.tick_number + 1,
+            self.declared,
+            self.motion.motions.wanted_speed,
+            self.programs,
+            self.wrench() if wrench else None,
+        )
+
+    def wrench(self) -> list[float]:
+        """What pushes the tool in the last tick: force and torque at its centre point, base frame [N, N m].
+
+        It is computed when it is asked for.
+        """
+        return self._wrench.of(self.latest, self.peripherals.tcp_offset)
+
+    def changed_io(self) -> Io | None:
+        """Inputs, outputs and registers where they changed since this was asked last, before a tick; else None."""
+        if not self._io_changed:
+            return None
+        self._io_changed = False
+        return self.io(wrench=False)
+
+    def truth(self) -> Truth:
+        """What no robot can know, after a tick.
+
+        Raises:
+            ValueError: The plant does not know it either.
+        """
+        return self._reporter.truth(self.tick_number, self.cycle.plant)
+
+    def _emit(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
+        """Put down an event of the tick that is being made; of the next one between two."""
+        event = Event(tick=self.tick_number + 1, kind=kind, **fields)
+        self._events.append(event)
+        if kind in {"protective_stop", "safety_stop"}:
+            self._stop_reasons.note(event, self.motion.safety_mode)
+        self._io_changed |= self.programs.hear(event)
+
+    def _watch_time(self) -> None:
+        """End what is over, and what nobody keeps up."""
+        self._faults.end(self.tick_number + 1)
+        self._authority.watch(self.now)
+        if self.setup.clock == "realtime":
+            self.motion.watch(self.now)
+
+    def _interrupt(self, why: str) -> None:
+        """End what nobody has control of any longer."""
+        self._io_changed |= self.programs.end()
+        self.motion.interrupt(why)
+
+    def _move_by_program(self, command: c.MoveJ) -> int:
+        """Plan and start a motion of the program; its number."""
+        self.motion.check_move()
+        return self.motion.move(self._found(self._planner.plan(command, self.basis)))
+
+    def _found(self, plan: Plan) -> Any:
+        if isinstance(plan.found, RefusalError):
+            raise plan.found
+        return plan.found
+
+    # ------------------------------------------------------------------ commands on the whole robot
+
+    def _reset(self, call: Call[c.SimulationReset]) -> Reply:
+        """Put the simulated arm somewhere at rest."""
+        command = call.command
+        check_content(command, self.setup.description)
+        chosen: PlannedFilter | None = call.planned()
+        self.programs.end()
+        self.motion.abandon("simulation.reset")
+        self._faults.clear()
+        q = self.cycle.position if command.q is None else np.array(command.q, dtype=float)
+        carried = None if command.payload is None else body(command.payload)
+        if chosen is not None:
+            self.filters.use(chosen)
+        if command.seed is not None:
+            self._seed = command.seed
+        self.cycle.reset(q, carried=carried, seed=self._seed)
+        self.motion.put(command.mode)
+        if command.mode is not None:
+            self._stop_reasons.forget()
+        self.latest = self._state(self.cycle.standing)
+        self._payload.begin_anew()
+        self._reporter.forget_modes()
+        return Done(tick=self.tick_number)
+
+    def _check_step(self, call: Call[c.SimulationStep]) -> Reply:
+        """Check that a client may let time pass; the driver then does."""
+        command = call.command
+        self._authority.check_step(command, call.now)
+        if command.setpoints is not None and not self.motion.streaming:
+            raise RefusalError("wrong_mode", "setpoints", "no stream is running: send servo_start first")
+        setpoints = command.setpoints or ()
+        if len(setpoints) > command.ticks:
+            why = f"setpoints has {len(setpoints)} entries, one a tick; ticks is {command.ticks}"
+            raise RefusalError("out_of_range", "setpoints", why, command.ticks)
+        for number, setpoint in enumerate(setpoints):
+            check_joints(setpoint.q, self.setup.description, f"setpoints[{number}].q")
+        return Done(tick=self.tick_number + command.ticks)

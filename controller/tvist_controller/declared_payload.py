@@ -1,0 +1,62 @@
+"""What the controller believes that the arm carries: declared by a client, doubted by what the drives feel."""
+
+from tvist_controller.command_row import Call, Row
+from tvist_controller.cycle import Sample
+from tvist_controller.events import Emit
+from tvist_controller.filters import Filters
+from tvist_controller.motion import MotionControl
+from tvist_controller.payload_monitor import PayloadMonitor
+from tvist_controller.refusal import check_content, payload_of
+from tvist_controller.setup import body
+from tvist_protocol.commands import SetPayload
+from tvist_protocol.modes import RobotMode
+from tvist_protocol.values import Payload
+
+
+class DeclaredPayload:
+    """The declared payload, and everything that counts on it.
+
+    Args:
+        payload: At the start.
+        motion: The arm's motion, and with it the control line.
+        filters: The control line's filter.
+        emit: Takes what happens.
+    """
+
+    def __init__(self, payload: Payload, motion: MotionControl, filters: Filters, emit: Emit) -> None:
+        self.payload = payload
+        """What the controller believes that the arm carries."""
+        self._motion, self._filters, self._emit = motion, filters, emit
+        self._description = motion.cycle.description
+        self._monitor = PayloadMonitor(self._description, body(payload))
+        self._held = False
+        """Whether the brakes have held the arm since the drives were listened to last."""
+        self.rows = (Row(SetPayload, self._declare, changes_io=True),)
+
+    def watch(self, sample: Sample) -> None:
+        """Say when the arm does not carry what was declared; where the brakes hold it, nobody can tell."""
+        if self._motion.activity.robot_mode is not RobotMode.RUNNING:
+            self._held = True
+            return
+        if self._held:
+            self.begin_anew()
+        why = self._monitor.update(sample.target, sample.fed_forward, sample.measured.moment)
+        if why is not None:
+            self._emit("warning", code="payload_mismatch", why=why)
+
+    def begin_anew(self) -> None:
+        """Forget what the drives felt: the arm was put elsewhere, or its power was off."""
+        self._held = False
+        self._monitor.reset()
+
+    def _declare(self, call: Call[SetPayload]) -> None:
+        check_content(call.command, self._description)
+        payload = payload_of(call.command)
+        tvist = call.planned()
+        carried = body(payload)
+        self._motion.ahead.check_payload(carried, tvist)
+        self.payload = payload
+        self._motion.cycle.declare(carried)
+        self._filters.declare(payload, tvist)
+        self._monitor.declare(carried)
+        self._held = False

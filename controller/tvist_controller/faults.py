@@ -1,0 +1,139 @@
+"""Faults caused on purpose: what `simulation.inject` asks for, done to the arm or the safety system."""
+
+import heapq
+from collections.abc import Callable
+from itertools import count
+
+import numpy as np
+
+from tvist_controller.command_row import Row
+from tvist_controller.motion import MotionControl
+from tvist_controller.refusal import RefusalError
+from tvist_controller.safety_control import SafetyControl
+from tvist_plant.plant import PERIOD, Breakable, Pushable
+from tvist_protocol.commands import SimulationInject
+from tvist_protocol.faults import FAULTS
+
+
+class Faults:
+    """Begins faults, and ends those that last.
+
+    Args:
+        motion: What they happen to.
+        safety: Its safety system.
+    """
+
+    def __init__(self, motion: MotionControl, safety: SafetyControl) -> None:
+        self._motion = motion
+        self._inputs: dict[str, tuple[Callable[[], None], Callable[[], None]]] = {
+            "reduced": (lambda: safety.reduce(reduced=True), lambda: safety.reduce(reduced=False)),
+            "safeguard_stop": (
+                lambda: safety.safeguard(stopped=True),
+                lambda: safety.safeguard(stopped=False),
+            ),
+            "emergency_stop": (lambda: safety.emergency("robot"), lambda: safety.end_emergency("robot")),
+            "system_emergency_stop": (
+                lambda: safety.emergency("system"),
+                lambda: safety.end_emergency("system"),
+            ),
+        }
+        """What begins and ends an input of the safety system."""
+        self._momentary: dict[str, Callable[[], None]] = {
+            "protective_stop": lambda: motion.protect("a protective stop was injected"),
+            "normal": safety.release,
+            "power_loss": lambda: safety.cut_power("a loss of power was injected"),
+            "violation": lambda: safety.cut_power("the safety system found a violation", "violation"),
+            "fault": lambda: safety.cut_power("the safety system failed", "fault"),
+        }
+        """What is over at once."""
+        self.rows = (Row(SimulationInject, lambda call: self.inject(call.command, call.tick)),)
+        plant = motion.cycle.plant
+        self._pushable = plant if isinstance(plant, Pushable) else None
+        if isinstance(plant, Breakable):
+            self._momentary["nan"] = plant.make_nan
+        self._push = np.zeros(motion.cycle.description.joints)
+        self._ends: list[tuple[int, int, str, Callable[[], None]]] = []
+        self._number = count()
+
+    def inject(self, command: SimulationInject, tick: int) -> None:
+        """Begin a fault.
+
+        Args:
+            command: Which one.
+            tick: The next one.
+
+        Raises:
+            RefusalError: There is none of that name, a field it needs is missing, one it has not is there, or the plant
+                cannot have this fault.
+        """
+        _check(command, self._motion.cycle.description.joints)
+        self._check_plant(command.fault)
+        fault, seconds = command.fault, command.seconds
+        ends = tick + round((seconds or 0.0) / PERIOD)
+        if fault == "torque":
+            joint, value = command.joint or 0, command.value or 0.0
+            self._add(joint, value)
+            self._at(ends, fault, lambda: self._add(joint, -value))
+            return
+        # An input that is set anew, or released, does not end by what it was set to before.
+        self._forget({*self._inputs} if fault == "normal" else {fault})
+        if fault in self._inputs:
+            begin, end = self._inputs[fault]
+            begin()
+            if seconds is not None:
+                self._at(ends, fault, end)
+        else:
+            self._momentary[fault]()
+
+    def end(self, tick: int) -> None:
+        """End those that are over before a tick."""
+        while self._ends and self._ends[0][0] <= tick:
+            heapq.heappop(self._ends)[-1]()
+
+    def clear(self) -> None:
+        """End all that last now, and let go of the arm."""
+        while self._ends:
+            heapq.heappop(self._ends)[-1]()
+        self._push[:] = 0.0
+        if self._pushable is not None:
+            self._pushable.push(self._push)
+
+    def _check_plant(self, fault: str) -> None:
+        """Check that the plant can have a fault that is its own."""
+        if (fault == "torque" and self._pushable is None) or (
+            fault == "nan" and fault not in self._momentary
+        ):
+            plant = type(self._motion.cycle.plant).__name__
+            missing = "push" if fault == "torque" else "make_nan"
+            why = f"fault is {fault!r}: the plant, {plant}, cannot have it, since it has no method {missing}"
+            raise RefusalError("unknown_fault", "fault", why)
+
+    def _forget(self, faults: set[str]) -> None:
+        """Let these go on, if they last, until something else ends them."""
+        self._ends = [one for one in self._ends if one[2] not in faults]
+        heapq.heapify(self._ends)
+
+    def _at(self, tick: int, fault: str, end: Callable[[], None]) -> None:
+        heapq.heappush(self._ends, (tick, next(self._number), fault, end))
+
+    def _add(self, joint: int, torque: float) -> None:
+        self._push[joint] += torque
+        if self._pushable is not None:
+            self._pushable.push(self._push)
+
+
+def _check(command: SimulationInject, joints: int) -> None:
+    fault = FAULTS.get(command.fault)
+    if fault is None:
+        why = f"fault is {command.fault!r}: there is {', '.join(FAULTS)}"
+        raise RefusalError("unknown_fault", "fault", why)
+    for field in ("joint", "value", "seconds"):
+        given = getattr(command, field) is not None
+        if field in fault.needs and not given:
+            raise RefusalError("missing_field", field, f"{field} is missing: fault {command.fault} needs it")
+        if given and field not in (*fault.needs, *fault.may):
+            why = f"{field} does not belong to fault {command.fault}"
+            raise RefusalError("out_of_range", field, why)
+    if command.joint is not None and command.joint >= joints:
+        why = f"joint is {command.joint}; the arm's joints are 0 to {joints - 1}"
+        raise RefusalError("out_of_range", "joint", why, joints - 1)

@@ -1,0 +1,100 @@
+"""Which filter shapes, and where it has its modes from: changed on the line, and watched."""
+
+from tvist_controller.calibrations import fits
+from tvist_controller.command_row import Call, Row
+from tvist_controller.events import Emit
+from tvist_controller.mode_source import ModeSource
+from tvist_controller.motion import MotionControl
+from tvist_controller.planning.basis import FilterBasis
+from tvist_controller.planning.filter_planner import PlannedFilter
+from tvist_protocol.commands import SetEstimator, SetShaper
+from tvist_protocol.values import Payload
+from tvist_shaping.base import Filter
+
+
+class Filters:
+    """The control line's filter.
+
+    Args:
+        motion: What may not be spoiled by another filter; it has the control line.
+        source: Where the modes of the line's first filter come from.
+        declared: What the controller believes that the arm carries.
+        emit: Takes what happens.
+    """
+
+    def __init__(self, motion: MotionControl, source: ModeSource, declared: Payload, emit: Emit) -> None:
+        self._motion, self._cycle, self._emit = motion, motion.cycle, emit
+        self._declared, self._clipped = declared, False
+        self.source = source
+        """Where the filter's modes come from."""
+        self.rows = (Row(SetShaper, self._choose), Row(SetEstimator, self._estimate))
+        self._warn_of_payload()
+        self._warn_of_arm()
+
+    @property
+    def basis(self) -> FilterBasis:
+        """What another filter depends on."""
+        tvist = self._cycle.tvist
+        return FilterBasis(tvist.name, tvist.estimator.modes, self.source, self._declared)
+
+    def use(self, chosen: PlannedFilter) -> None:
+        """Shape with it from now on."""
+        before = self.source
+        self.source, tvist = chosen
+        self._cycle.use(tvist)
+        self._emit("shaper_changed", why=f"{tvist.name} with estimator {self.source.name}")
+        if self.source is not before:
+            self._warn_of_arm()
+
+    def _choose(self, call: Call[SetShaper] | Call[SetEstimator]) -> None:
+        chosen: PlannedFilter = call.planned()
+        self._motion.ahead.check_filter(chosen[1])
+        self.use(chosen)
+
+    def _estimate(self, call: Call[SetEstimator]) -> None:
+        self._choose(call)
+        self._warn_of_payload()
+
+    def declare(self, payload: Payload, tvist: Filter | None) -> None:
+        """The arm carries something else: so it may have other modes.
+
+        Args:
+            payload: What the controller believes that it carries.
+            tvist: The filter for it; None where its modes are not known to change.
+        """
+        self._declared = payload
+        if tvist is not None:
+            self._cycle.use(tvist)
+        self._warn_of_payload()
+
+    def _warn_of_payload(self) -> None:
+        """Say that modes are of another payload, where they are."""
+        declared = self._declared
+        calibration = self.source.calibration
+        if calibration is not None and not fits(calibration, declared, self.source.name):
+            self._emit(
+                "warning",
+                code="payload_mismatch",
+                why=f"calibration {calibration.name!r} was made with "
+                f"{calibration.payload.mass:g} kg; {declared.mass:g} kg is declared: "
+                "frequencies will be off",
+            )
+
+    def _warn_of_arm(self) -> None:
+        """Say that modes are of another arm of the same model, where they are."""
+        calibration = self.source.calibration
+        if calibration is not None and self.source.fits_arm is False:
+            why = (
+                f"calibration {calibration.name!r} was measured on another arm than the robot file describes: "
+                "frequencies will be off; tvist identify measures this one"
+            )
+            self._emit("warning", why=why)
+
+    def watch(self) -> None:
+        """Say when the filter cannot do what it should, once until it can again."""
+        clipped = self._cycle.tvist.clipped
+        if clipped and not self._clipped:
+            name = self._cycle.tvist.name
+            why = f"{name} cannot do here what it should: a delay is beyond what it holds, or more is left"
+            self._emit("warning", code="out_of_range", why=why)
+        self._clipped = clipped

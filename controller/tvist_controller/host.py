@@ -1,0 +1,188 @@
+"""What is around one controller: what was admitted is carried out and journaled, what comes out goes to sinks.
+
+Still without clock, thread or socket: whoever calls `tick` lets time pass. In lockstep and free it is the client,
+through `simulation.step`.
+"""
+
+from collections.abc import Callable
+
+from tvist_controller.about import info_of
+from tvist_controller.admission import Admitted, Unreadable, admit, admit_setpoint
+from tvist_controller.controller import Controller
+from tvist_controller.planning.planner import Plan
+from tvist_controller.sink import Sink
+from tvist_controller.standing import Standing
+from tvist_controller.stepping import may_step
+from tvist_protocol.codec import encode
+from tvist_protocol.commands import Command, Setpoint, SimulationStep
+from tvist_protocol.journal import Entry, entry_of
+from tvist_protocol.replies import Done, Refused, Reply
+from tvist_protocol.stream import Event
+
+Attend = Callable[[], bool]
+"""Does what waits before a tick of a step; False where the step has to end."""
+_BUSY = Refused(code="busy", where="", why="a step is under way: send the next when it is answered")
+
+
+class Host:
+    """One controller, its journal and its sinks.
+
+    Args:
+        controller: The robot.
+        sinks: They take what it puts out, in this order.
+    """
+
+    def __init__(self, controller: Controller, *sinks: Sink) -> None:
+        self.controller = controller
+        self.failure: str | None = None
+        """Why the controller ticks no more, where it does not."""
+        self._sinks = sinks
+        self.standing = self._standing()
+        """What any thread may know of the controller."""
+        self._info: tuple[int, Standing | None, bytes] = -1, None, b""
+        self._stepping = False
+
+    def request(self, data: bytes) -> Reply:
+        """Admit and carry out an encoded command."""
+        admitted = admit(data, self.standing.lease, self.standing.clock)
+        if isinstance(admitted, Refused):
+            self.controller.counters.commands += 1
+            self.controller.counters.refused += 1
+            return admitted
+        return self.carry_out(admitted)
+
+    def carry_out(self, admitted: Admitted, plan: Plan | None = None, attend: Attend | None = None) -> Reply:
+        """Carry out a command.
+
+        Args:
+            admitted: The command.
+            plan: For it, where it was planned beforehand and the plan holds.
+            attend: Called before each tick of a step, where others may send something meanwhile. It may carry out
+                other commands, but no step.
+        """
+        command = admitted.command
+        if self._stepping and isinstance(command, SimulationStep):
+            self.controller.counters.commands += 1
+            self.controller.counters.refused += 1
+            return _BUSY
+        session = admitted.session
+        entry = Entry(tick=self._next, kind="command", message=admitted.content, session=session)
+        try:
+            reply = self.controller.receive(command, plan, session)
+        except Exception:
+            self._note(entry)  # whoever looks for the error needs it
+            raise
+        # A command of the lease's holder renews the lease even where it is refused; a stranger's does nothing.
+        if not isinstance(reply, Refused) or self._is_holders(command):
+            self._note(entry)
+        if isinstance(command, SimulationStep) and isinstance(reply, Done):
+            reply = self._step(command, attend)
+        self.standing = self._standing()
+        return reply
+
+    def setpoint(self, data: bytes) -> None:
+        """Admit and take a set-point."""
+        setpoint = admit_setpoint(data, self.standing.lease)
+        if setpoint is None:
+            self.controller.counters.setpoints_received += 1
+            self.controller.counters.setpoints_refused += 1
+        else:
+            self.receive_setpoint(setpoint)
+
+    def client_gone(self, client: str, session: str) -> None:
+        """A client's session has ended; nothing comes of it but where that one has control or the clock."""
+        if session in self._standing().sessions_of(client):
+            self._note(Entry(tick=self._next, kind="client_gone", client=client, session=session))
+            self.controller.client_gone(client, session)
+            self.standing = self._standing()
+
+    def missed(self, ticks: int) -> None:
+        """Ticks have begun too late."""
+        self._note(Entry(tick=self._next, kind="missed", count=ticks))
+        self.controller.missed(ticks)
+
+    def publish(self) -> None:
+        """Tell what any thread may know, as it is now; after a tick that is done only where it matters."""
+        self.standing = self._standing()
+
+    def info(self) -> bytes:
+        """What the controller says of itself; made once, however many ask between two ticks."""
+        now = self.controller.tick_number, self.standing
+        if self._info[0] != now[0] or self._info[1] is not now[1]:
+            self._info = *now, encode(info_of(self.controller))
+        return self._info[2]
+
+    def tick(self) -> None:
+        """One control period."""
+        io = self.controller.changed_io()
+        if io is not None:
+            for sink in self._sinks:
+                sink.io(io)
+        state, events = self.controller.tick()
+        truth = self.controller.truth() if self.controller.setup.truth else None
+        for sink in self._sinks:
+            for event in events:
+                sink.event(event)
+            sink.state(state)
+            if truth is not None:
+                sink.truth(truth)
+        told = self.standing
+        if (
+            self.controller.session.lease is not told.lease
+            or self.controller.motion.may_move is not told.may_move
+        ):
+            self.publish()
+
+    def warn(self, why: str) -> None:
+        """Tell clients of something outside the controller, whose replay knows nothing of it."""
+        event = Event(tick=self._next, kind="warning", why=why)
+        for sink in self._sinks:
+            sink.event(event)
+
+    @property
+    def _next(self) -> int:
+        return self.controller.tick_number + 1
+
+    def _note(self, entry: Entry) -> None:
+        for sink in self._sinks:
+            sink.journal(entry)
+
+    def receive_setpoint(self, setpoint: Setpoint | Unreadable) -> None:
+        """Take a set-point that was admitted."""
+        if isinstance(setpoint, Unreadable):
+            if self._is_holders(setpoint):
+                self._note(Entry(tick=self._next, kind="setpoint_refused", why=setpoint.why))
+                self.controller.refuse_setpoint(setpoint.why)
+            return
+        if self._is_holders(setpoint):
+            self._note(entry_of(self._next, setpoint))
+        self.controller.receive_setpoint(setpoint)
+
+    def _is_holders(self, message: Command | Setpoint | Unreadable) -> bool:
+        lease = self.controller.session.lease
+        return lease is not None and getattr(message, "token", None) == lease.token
+
+    def _standing(self) -> Standing:
+        controller = self.controller
+        return Standing(controller.session.lease, controller.basis, controller.stepping.hold)
+
+    def _step(self, step: SimulationStep, attend: Attend | None) -> Done:
+        """Tick as often as a step says, or until its token lets time pass no longer."""
+        controller, setpoints = self.controller, iter(step.setpoints or ())
+        motion_token = step.token if step.motion_token is None else step.motion_token
+        self._stepping = True
+        try:
+            for _ in range(step.ticks):
+                going_on = attend is None or attend()
+                if not going_on or not may_step(
+                    controller.stepping.hold, controller.session.lease, step.token
+                ):
+                    break
+                setpoint = next(setpoints, None)
+                if setpoint is not None:
+                    played = Setpoint(token=motion_token, sequence=setpoint.sequence, q=setpoint.q)
+                    self.receive_setpoint(played)
+                self.tick()
+        finally:
+            self._stepping = False
+        return Done(tick=controller.tick_number)

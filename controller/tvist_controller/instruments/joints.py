@@ -1,0 +1,92 @@
+"""What the joints report: one entry each."""
+
+from functools import cached_property
+
+from tvist_controller.instruments.ratings import BUS_VOLTAGE
+from tvist_controller.instruments.reading import Reading
+
+DEVIATION = 0.05
+"""Difference of measured and wanted angle that counts as 1 [rad]."""
+
+
+class JointValues(Reading):
+    """Motion, torque and electricity of the joints."""
+
+    @property
+    def target_q(self) -> list[float]:
+        """State: shaped reference [rad]."""
+        return self.state.target_q
+
+    @property
+    def target_qd(self) -> list[float]:
+        """State: velocity of the shaped reference [rad/s]."""
+        return self.state.target_qd
+
+    @property
+    def target_qdd(self) -> list[float]:
+        """State: acceleration of the shaped reference [rad/s²]."""
+        return self.state.target_qdd
+
+    @property
+    def target_moment(self) -> list[float]:
+        """State: torque that the rigid model with the declared payload needs for the shaped reference [N m]."""
+        return self.state.target_moment
+
+    @cached_property
+    def target_current(self) -> list[float]:
+        """Computed: target torque over torque constant; zero while the brakes hold the arm [A]."""
+        if not self.driven:
+            return [0.0] * len(self._ratings)
+        moment = self.state.target_moment
+        return [m / rating.torque_constant for m, rating in zip(moment, self._ratings, strict=True)]
+
+    @property
+    def actual_q(self) -> list[float]:
+        """State: measured angle, on the link's side of the gear [rad]."""
+        return self.state.actual_q
+
+    @property
+    def actual_qd(self) -> list[float]:
+        """State: measured velocity [rad/s]."""
+        return self.state.actual_qd
+
+    @property
+    def actual_moment(self) -> list[float]:
+        """State: measured torque [N m]."""
+        return self.state.actual_moment
+
+    @property
+    def actual_current(self) -> list[float]:
+        """Computed: measured torque over torque constant; zero while the brakes hold the arm [A]."""
+        return self._current
+
+    @cached_property
+    def actual_current_window(self) -> list[float]:
+        """Constant: current of a tenth of the joint's largest torque, by which the two currents may differ [A]."""
+        return [rating.window for rating in self._ratings]
+
+    @property
+    def actual_current_as_torque(self) -> list[float]:
+        """State: measured torque; zero while the brakes hold the arm [N m]."""
+        return self.state.actual_moment if self.driven else [0.0] * len(self._ratings)
+
+    @property
+    def joint_control_output(self) -> list[float]:
+        """Computed: the measured currents, since a simulated motor has the current that its drive asks for [A]."""
+        return self.actual_current
+
+    @property
+    def actual_joint_voltage(self) -> list[float]:
+        """Constant: 48 while the arm has power, else 0 [V]."""
+        return [BUS_VOLTAGE if self.powered else 0.0] * len(self._ratings)
+
+    @property
+    def joint_temperatures(self) -> list[float]:
+        """Computed: a body a joint in air of 25 °C, heated by its electronics and R i² in some 20 minutes [°C]."""
+        return self._temperatures
+
+    @cached_property
+    def joint_position_deviation_ratio(self) -> float:
+        """Computed: largest difference of measured and target angle, over 0.05 rad [-]."""
+        state = self.state
+        return max(abs(a - t) for a, t in zip(state.actual_q, state.target_q, strict=True)) / DEVIATION

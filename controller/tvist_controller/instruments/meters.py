@@ -1,0 +1,60 @@
+"""What adds up over time: temperatures and energies."""
+
+from math import exp
+
+from tvist_controller.instruments.ratings import AMBIENT, STANDBY, JointRating
+from tvist_plant.plant import PERIOD
+
+
+class Meters:
+    """Temperature of each joint, energy of all.
+
+    A joint is one body: τ dT/dt = T_ambient + R_th (P_standby + R i²) - T, solved exactly over each step with
+    its current held. Ticks that were not looked at count as one step with the current at its end.
+
+    Args:
+        ratings: Of each joint.
+    """
+
+    def __init__(self, ratings: list[JointRating]) -> None:
+        self._ratings = ratings
+        self._tick = 0
+        self._shares = self._over(PERIOD)
+        self.temperatures = [AMBIENT] * len(ratings)
+        """Of the joints [°C]."""
+        self.power = 0.0
+        """Taken from the supply now [W]."""
+        self.consumed = 0.0
+        """Energy taken from the supply since the first tick [J]."""
+        self.dissipated = 0.0
+        """Energy that braking gave back, and a resistor turned to heat [J]."""
+
+    def _over(self, seconds: float) -> list[float]:
+        """Share of its way that each temperature goes in that time."""
+        return [1.0 - exp(-seconds / rating.thermal_time) for rating in self._ratings]
+
+    def update(self, tick: int, current: list[float], mechanical: float, *, powered: bool) -> None:
+        """Count up to a tick.
+
+        Args:
+            tick: Number of the control period; an earlier one, or the last one again, adds nothing.
+            current: Of each joint's motor [A].
+            mechanical: Power the motors give to the arm, negative where they brake [W].
+            powered: Whether the arm has power.
+        """
+        standby = STANDBY if powered else 0.0
+        heats = [rating.resistance * i * i for rating, i in zip(self._ratings, current, strict=True)]
+        net = sum(heats) + mechanical
+        self.power = standby * len(heats) + max(net, 0.0)
+        ticks = tick - self._tick
+        if ticks <= 0:
+            return
+        self._tick = tick
+        seconds = ticks * PERIOD
+        shares = self._shares if ticks == 1 else self._over(seconds)
+        self.temperatures = [
+            old + share * (AMBIENT + rating.thermal_resistance * (standby + heat) - old)
+            for old, share, rating, heat in zip(self.temperatures, shares, self._ratings, heats, strict=True)
+        ]
+        self.consumed += seconds * self.power
+        self.dissipated += seconds * max(-net, 0.0)

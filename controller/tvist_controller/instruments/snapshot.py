@@ -1,0 +1,53 @@
+"""One tick of a robot as UR's interfaces tell it, under RTDE's names."""
+
+from typing import Any
+
+from tvist_controller.instruments.joints import JointValues
+from tvist_controller.instruments.meters import Meters
+from tvist_controller.instruments.ratings import joint_ratings
+from tvist_controller.instruments.reading import POWERED, RUNNING
+from tvist_controller.instruments.rigid_body import RigidBody
+from tvist_controller.instruments.status import StatusValues
+from tvist_controller.instruments.terminals import TerminalValues
+from tvist_controller.instruments.tool import ToolValues
+from tvist_controller.instruments.wrench import ToolWrench
+from tvist_plant.description import RobotDescription
+from tvist_protocol.io import Io
+from tvist_protocol.stream import State
+
+
+class Snapshot(StatusValues, JointValues, ToolValues, TerminalValues):
+    """Every output variable of RTDE is an attribute; what costs something is computed when first asked for."""
+
+
+class Instruments:
+    """Reads a robot's values tick by tick; whoever reads less often gets coarser temperatures and energies.
+
+    Args:
+        description: The robot.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self._rigid, self._wrench = RigidBody(description), ToolWrench(description)
+        self._ratings = joint_ratings(description)
+        self._constants = [rating.torque_constant for rating in self._ratings]
+        self._idle = [0.0] * description.joints
+        self._meters = Meters(self._ratings)
+        self._kept: dict[str, Any] = {}
+
+    def snapshot(self, state: State, io: Io) -> Snapshot:
+        """Values of a tick.
+
+        Args:
+            state: The tick.
+            io: Terminals and registers in force at it.
+        """
+        mode, current, mechanical = state.robot_mode, self._idle, 0.0
+        if mode == RUNNING:
+            moment = state.actual_moment
+            current = [m / constant for m, constant in zip(moment, self._constants, strict=True)]
+            mechanical = sum([m * v for m, v in zip(moment, state.actual_qd, strict=True)])
+        self._meters.update(state.tick, current, mechanical, powered=mode in POWERED)
+        return Snapshot(
+            state, io, self._rigid, self._wrench, self._ratings, current, self._meters, self._kept
+        )

@@ -1,0 +1,142 @@
+"""Time, modes and the controller's own figures."""
+
+from typing import Final
+
+from tvist_controller.instruments.ratings import BUS_VOLTAGE
+from tvist_controller.instruments.reading import Reading
+from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+
+START: Final = 40.0
+"""Time of tick 0 at UR's interfaces: clients take a robot with a smaller one for one that boots [s]."""
+JOINT_MODES: Final[dict[int, int]] = {
+    RobotMode.RUNNING: 253,
+    RobotMode.POWER_OFF: 239,
+    RobotMode.BACKDRIVE: 238,
+}
+"""RTDE's numbers of a joint's mode; otherwise it idles."""
+JOINT_IDLE: Final = 255
+
+_STOPPED_BY_SAFETY = 1 << 10
+_EMERGENCY = 1 << 7
+_SAFETY_BITS: dict[int, int] = {
+    SafetyMode.NORMAL: 1 << 0,
+    SafetyMode.REDUCED: 1 << 1,
+    SafetyMode.PROTECTIVE_STOP: 1 << 2 | _STOPPED_BY_SAFETY,
+    SafetyMode.RECOVERY: 1 << 3,
+    SafetyMode.SAFEGUARD_STOP: 1 << 4 | _STOPPED_BY_SAFETY,
+    SafetyMode.SYSTEM_EMERGENCY_STOP: 1 << 5 | _EMERGENCY | _STOPPED_BY_SAFETY,
+    SafetyMode.ROBOT_EMERGENCY_STOP: 1 << 6 | _EMERGENCY | _STOPPED_BY_SAFETY,
+    SafetyMode.VIOLATION: 1 << 8 | _STOPPED_BY_SAFETY,
+    SafetyMode.FAULT: 1 << 9 | _STOPPED_BY_SAFETY,
+}
+_RUNNING: set[int] = {
+    RuntimeState.STOPPING,
+    RuntimeState.PLAYING,
+    RuntimeState.PAUSING,
+    RuntimeState.RESUMING,
+}
+
+
+class StatusValues(Reading):
+    """How the controller and its arm are doing."""
+
+    @property
+    def timestamp(self) -> float:
+        """State: tick time plus 40 s, for clients that wait until a robot has booted [s]."""
+        return START + self.state.timestamp
+
+    @property
+    def control_step(self) -> int:
+        """State: number of the control period."""
+        return self.state.tick
+
+    @property
+    def actual_execution_time(self) -> float:
+        """Constant: 0; how long a tick took is told by telemetry, outside what is repeatable [ms]."""
+        return 0.0
+
+    @property
+    def target_execution_time(self) -> float:
+        """Constant: 2, the control period [ms]."""
+        return 2.0
+
+    @property
+    def robot_mode(self) -> int:
+        """State: RTDE's number; 3 is POWER_OFF, 5 IDLE, 7 RUNNING."""
+        return self.state.robot_mode
+
+    @property
+    def joint_mode(self) -> list[int]:
+        """Computed: from the robot's mode; 253 is running, 239 power off, 238 backdrive, 255 idle."""
+        mode = JOINT_MODES.get(self.state.robot_mode, JOINT_IDLE)
+        return [mode] * len(self.state.target_q)
+
+    @property
+    def safety_mode(self) -> int:
+        """State: RTDE's number; 1 is NORMAL, 2 REDUCED, 3 PROTECTIVE_STOP, 5 to 9 stops of the safety system."""
+        return self.state.safety_mode
+
+    @property
+    def safety_status(self) -> int:
+        """State: the safety mode again; the numbers that it has beyond it do not occur."""
+        return self.state.safety_mode
+
+    @property
+    def runtime_state(self) -> int:
+        """State: RTDE's number; 1 is STOPPED, 2 PLAYING: a motion or a stream runs."""
+        return self.state.runtime_state
+
+    @property
+    def robot_status_bits(self) -> int:
+        """Computed: from the modes; bit 0 power is on, bit 1 something runs; there are no buttons for bits 2 and 3."""
+        return int(self.powered) | (self.state.runtime_state in _RUNNING) << 1
+
+    @property
+    def safety_status_bits(self) -> int:
+        """Computed: from the safety mode, its own bit; with stops bit 10, with emergency stops bit 7."""
+        return _SAFETY_BITS.get(self.state.safety_mode, 0)
+
+    @property
+    def speed_scaling(self) -> float:
+        """State: share of the programmed speed [-]."""
+        return self.state.speed_scaling
+
+    @property
+    def target_speed_fraction(self) -> float:
+        """Io: the speed slider [-]."""
+        return self.io.target_speed_fraction
+
+    @property
+    def time_scale_source(self) -> int:
+        """Constant: 0; what slows a motion down is not told apart."""
+        return 0
+
+    @property
+    def script_control_line(self) -> int:
+        """Constant: 0; no program is run."""
+        return 0
+
+    @property
+    def actual_main_voltage(self) -> float:
+        """Constant: 48, the safety board's supply [V]."""
+        return BUS_VOLTAGE
+
+    @property
+    def actual_robot_voltage(self) -> float:
+        """Constant: 48 while the arm has power, else 0 [V]."""
+        return BUS_VOLTAGE if self.powered else 0.0
+
+    @property
+    def actual_robot_current(self) -> float:
+        """Computed: power over voltage; power is 5 W a joint, the motors' heat and what they give to the arm [A]."""
+        return self._power / BUS_VOLTAGE
+
+    @property
+    def actual_robot_energy_consumed(self) -> float:
+        """Computed: integral of the power the robot takes, since the first tick [J]."""
+        return self._consumed
+
+    @property
+    def actual_robot_braking_energy_dissipated(self) -> float:
+        """Computed: integral of what braking gives back beyond the motors' heat, since the first tick [J]."""
+        return self._dissipated

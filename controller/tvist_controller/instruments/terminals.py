@@ -1,0 +1,165 @@
+"""Inputs, outputs and registers, at the controller and in the tool."""
+
+import re
+
+from tvist_controller.instruments.reading import Reading
+from tvist_controller.instruments.status import JOINT_IDLE, JOINT_MODES
+from tvist_protocol.io import BITS, NUMBERS
+
+CONFIGURABLE = 0xFF00
+"""Bits 8–15."""
+
+_WORDS = re.compile(r"(input|output)_bit_registers(0_to_31|32_to_63)")
+_REGISTER = re.compile(r"(input|output)_(bit|int|double)_register_(0|[1-9]\d{0,2})")
+
+
+class TerminalValues(Reading):
+    """What stands on terminals and in registers.
+
+    Registers are attributes too: `input_int_register_7`, `output_bit_register_64`, `output_bit_registers0_to_31`.
+    """
+
+    @property
+    def actual_digital_input_bits(self) -> int:
+        """Io: digital inputs; bits 0–7 standard, 8–15 configurable, 16–17 tool."""
+        return self.io.actual_digital_input_bits
+
+    @property
+    def actual_digital_output_bits(self) -> int:
+        """Io: digital outputs, likewise."""
+        return self.io.actual_digital_output_bits
+
+    @property
+    def actual_configurable_digital_input_bits(self) -> int:
+        """Io: bits 8–15 of the digital inputs, where they are."""
+        return self.io.actual_digital_input_bits & CONFIGURABLE
+
+    @property
+    def actual_configurable_digital_output_bits(self) -> int:
+        """Io: bits 8–15 of the digital outputs, where they are."""
+        return self.io.actual_digital_output_bits & CONFIGURABLE
+
+    @property
+    def analog_io_types(self) -> int:
+        """Io: bits 0–1 analogue inputs, 2–3 outputs; 0 is current, 1 voltage."""
+        return self.io.analog_io_types
+
+    @property
+    def standard_analog_input0(self) -> float:
+        """Io: analogue input 0 [A or V]."""
+        return self.io.standard_analog_input[0]
+
+    @property
+    def standard_analog_input1(self) -> float:
+        """Io: analogue input 1 [A or V]."""
+        return self.io.standard_analog_input[1]
+
+    @property
+    def standard_analog_output0(self) -> float:
+        """Io: analogue output 0 [A or V]."""
+        return self.io.standard_analog_output[0]
+
+    @property
+    def standard_analog_output1(self) -> float:
+        """Io: analogue output 1 [A or V]."""
+        return self.io.standard_analog_output[1]
+
+    @property
+    def io_current(self) -> float:
+        """Constant: 0; nothing draws current from the terminals [mA]."""
+        return 0.0
+
+    @property
+    def tool_mode(self) -> int:
+        """Computed: from the robot's mode, as the joints' modes."""
+        return JOINT_MODES.get(self.state.robot_mode, JOINT_IDLE)
+
+    @property
+    def tool_analog_input_types(self) -> int:
+        """Constant: 3, both are voltages."""
+        return 3
+
+    @property
+    def tool_analog_input0(self) -> float:
+        """Io: analogue input 0 of the tool [V]."""
+        return self.io.tool_analog_input[0]
+
+    @property
+    def tool_analog_input1(self) -> float:
+        """Io: analogue input 1 of the tool [V]."""
+        return self.io.tool_analog_input[1]
+
+    @property
+    def tool_output_voltage(self) -> int:
+        """Constant: 0, the tool's supply is off [V]."""
+        return 0
+
+    @property
+    def tool_output_current(self) -> float:
+        """Constant: 0; nothing draws current from it [mA]."""
+        return 0.0
+
+    @property
+    def tool_temperature(self) -> float:
+        """Computed: the last joint's temperature, on which the tool's electronics sit [°C]."""
+        return self._temperatures[-1]
+
+    @property
+    def tool_output_mode(self) -> int:
+        """Constant: 0, the tool's outputs are digital ones."""
+        return 0
+
+    @property
+    def tool_digital_output0_mode(self) -> int:
+        """Constant: 1, the output sinks."""
+        return 1
+
+    @property
+    def tool_digital_output1_mode(self) -> int:
+        """Constant: 1, the output sinks."""
+        return 1
+
+    @property
+    def euromap67_input_bits(self) -> int:
+        """Constant: 0; no Euromap 67 interface is fitted."""
+        return 0
+
+    @property
+    def euromap67_output_bits(self) -> int:
+        """Constant: 0; no Euromap 67 interface is fitted."""
+        return 0
+
+    @property
+    def euromap67_24V_voltage(self) -> float:
+        """Constant: 0; no Euromap 67 interface is fitted [V]."""
+        return 0.0
+
+    @property
+    def euromap67_24V_current(self) -> float:
+        """Constant: 0; no Euromap 67 interface is fitted [mA]."""
+        return 0.0
+
+    @property
+    def encoder0_raw(self) -> int:
+        """Constant: 0; no conveyor's encoder is connected."""
+        return 0
+
+    @property
+    def encoder1_raw(self) -> int:
+        """Constant: 0; no conveyor's encoder is connected."""
+        return 0
+
+    def __getattr__(self, name: str) -> bool | int | float:
+        """A register by RTDE's name."""
+        found = _WORDS.fullmatch(name)
+        if found is not None:
+            words: list[int] = getattr(self.io, f"{found[1]}_bit_register")
+            return words[found[2] == "32_to_63"]
+        found = _REGISTER.fullmatch(name)
+        if found is None or int(found[3]) >= (BITS if found[2] == "bit" else NUMBERS):
+            raise AttributeError(f"{type(self).__name__} has no {name}")
+        number, values = int(found[3]), getattr(self.io, f"{found[1]}_{found[2]}_register")
+        if found[2] == "bit":
+            return bool(values[number // 32] >> number % 32 & 1)
+        value: int | float = values[number]
+        return value

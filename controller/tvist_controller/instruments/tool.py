@@ -1,0 +1,184 @@
+"""What tool and payload do: poses, forces, momentum."""
+
+from functools import cached_property
+from math import sqrt
+
+import numpy as np
+
+from tvist_controller.instruments.reading import Reading
+from tvist_controller.instruments.rigid_body import Tool, add, carried, cross
+from tvist_plant.model import Floats
+
+GRAVITY = 9.81
+"""Down the base's z axis [m/s²]."""
+
+
+class ToolValues(Reading):
+    """Motion and forces in space. Base frame, unless said otherwise."""
+
+    @property
+    def tcp_offset(self) -> list[float]:
+        """Io: tool centre point in the flange frame [m, rad]."""
+        return self.io.tcp_offset
+
+    @property
+    def actual_TCP_pose(self) -> list[float]:
+        """State: kinematics of the measured angles with the TCP offset [m, rad]."""
+        return self.state.actual_TCP_pose
+
+    @property
+    def actual_TCP_speed(self) -> list[float]:
+        """State: kinematics of measured angles and velocities with the TCP offset [m/s, rad/s]."""
+        return self.state.actual_TCP_speed
+
+    @property
+    def actual_tool_accelerometer(self) -> list[float]:
+        """State: specific force in the flange frame; at rest it points up with 9.81 [m/s²]."""
+        return self.state.actual_tool_accelerometer
+
+    @property
+    def target_TCP_pose(self) -> list[float]:
+        """Computed: kinematics of the target angles with the TCP offset [m, rad]."""
+        return self._target.pose
+
+    @property
+    def target_TCP_speed(self) -> list[float]:
+        """Computed: kinematics of target angles and velocities with the TCP offset [m/s, rad/s]."""
+        return self._target.speed
+
+    @property
+    def target_TCP_acceleration(self) -> list[float]:
+        """Computed: kinematics of target angles, velocities and accelerations with the TCP offset [m/s², rad/s²]."""
+        return self._target.acceleration
+
+    @cached_property
+    def actual_TCP_acceleration(self) -> list[float]:
+        """Computed: the accelerometer's reading turned to the base, without gravity, carried to the TCP [m/s², rad/s²].
+
+        Angular acceleration is the target's: no sensor measures it.
+        """
+        linear: list[float] = (self._rotation @ np.array(self.state.actual_tool_accelerometer)).tolist()
+        linear[2] -= GRAVITY
+        alpha, offset = self._target.acceleration[3:], self.io.tcp_offset
+        if any(offset[:3]):
+            arm: list[float] = (self._rotation @ np.array(offset[:3])).tolist()
+            linear = add(linear, carried(self.state.actual_TCP_speed[3:], alpha, arm))
+        return linear + alpha
+
+    @cached_property
+    def actual_TCP_force(self) -> list[float]:
+        """Computed: force at the TCP that explains the measured torques, through the Jacobian [N, N m].
+
+        Of them is taken off what the target needs: rigid arm with the declared payload, rotors, friction. Where the
+        posture is nearly singular part of the force cannot be felt, and is left out. Braked, it is zero.
+        """
+        force: list[float] = self._force.tolist()
+        return force
+
+    @cached_property
+    def tcp_force_scalar(self) -> float:
+        """Computed: length of the TCP force's linear part [N]."""
+        x, y, z, *_ = self.actual_TCP_force
+        return sqrt(x * x + y * y + z * z)
+
+    @property
+    def wrench_calc_from_currents(self) -> list[float]:
+        """Computed: the TCP force again, which is made from currents here [N, N m]."""
+        return self.actual_TCP_force
+
+    @cached_property
+    def ft_raw_wrench(self) -> list[float]:
+        """Computed: what a sensor between flange and payload would feel, in the flange frame [N, N m].
+
+        Weight and inertial force of the declared payload as the accelerometer tells, without those of its turning,
+        and the TCP force.
+        """
+        payload, force = self.io.payload, self._force
+        carries = [-payload.mass * felt for felt in self.state.actual_tool_accelerometer]
+        pushes: list[float] = (force[:3] @ self._rotation).tolist()
+        turns: list[float] = (force[3:] @ self._rotation).tolist()
+        torque = add(turns, add(cross(payload.com, carries), cross(self.io.tcp_offset, pushes)))
+        return add(carries, pushes) + torque
+
+    @cached_property
+    def collision_detection_ratio(self) -> float:
+        """Computed: largest share of a joint's torque limit by which measured torque differs from expected [-]."""
+        felt: list[float] = self._felt.tolist()
+        return max(abs(torque) / rating.torque for torque, rating in zip(felt, self._ratings, strict=True))
+
+    @cached_property
+    def actual_momentum(self) -> float:
+        """Computed: length of the linear momentum of links and declared payload, as measured [kg m/s]."""
+        return self._rigid.momentum(self.state.actual_q, self.state.actual_qd, self.io.payload)
+
+    @property
+    def elbow_position(self) -> list[float]:
+        """Computed: where upper arm and forearm meet, on the elbow's axis, as measured [m].
+
+        An arm with fewer than three joints has its flange there.
+        """
+        return self._elbow[0]
+
+    @property
+    def elbow_velocity(self) -> list[float]:
+        """Computed: velocity of the elbow's position [m/s]."""
+        return self._elbow[1]
+
+    @property
+    def payload(self) -> float:
+        """Io: declared mass [kg]."""
+        return self.io.payload.mass
+
+    @property
+    def payload_cog(self) -> list[float]:
+        """Io: declared centre of mass in the flange frame [m]."""
+        return list(self.io.payload.com)
+
+    @property
+    def payload_inertia(self) -> list[float]:
+        """Io: declared inertia about the centre of mass: xx yy zz xy xz yz [kg m²]."""
+        xx, xy, xz, yy, yz, zz = self.io.payload.inertia
+        return [xx, yy, zz, xy, xz, yz]
+
+    @property
+    def target_gravity(self) -> list[float]:
+        """Constant: 0 0 9.81, the acceleration that stands for gravity of a robot on the floor [m/s²]."""
+        return [0.0, 0.0, GRAVITY]
+
+    @property
+    def target_base_acceleration(self) -> list[float]:
+        """Constant: zero; the base stands [m/s², rad/s²]."""
+        return [0.0] * 6
+
+    @cached_property
+    def target_base_wrench(self) -> list[float]:
+        """Computed: force and torque on its foot of the arm with the declared payload as the target moves [N, N m].
+
+        The foot's own weight is not in it.
+        """
+        state = self.state
+        return self._rigid.base_wrench(state.target_q, state.target_qd, state.target_qdd, self.io.payload)
+
+    @cached_property
+    def _target(self) -> Tool:
+        state = self.state
+        return self._rigid.tool(state.target_q, state.target_qd, state.target_qdd, self.io.tcp_offset)
+
+    @cached_property
+    def _elbow(self) -> tuple[list[float], list[float]]:
+        return self._rigid.elbow(self.state.actual_q, self.state.actual_qd)
+
+    @cached_property
+    def _rotation(self) -> Floats:
+        return self._rigid.flange_rotation(self.state.actual_q)
+
+    @cached_property
+    def _felt(self) -> Floats:
+        """Torque of the surroundings on the joints: expected less measured, shape (n,) [N m]."""
+        return self._wrench.felt(self.state)
+
+    @cached_property
+    def _force(self) -> Floats:
+        if not self.driven:
+            return np.zeros(6)
+        return self._wrench.at_tool(self.state.actual_q, self._felt, self.io.tcp_offset)

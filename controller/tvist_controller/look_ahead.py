@@ -1,0 +1,143 @@
+"""Streams of set-points: nothing is played from which no stop would be clear."""
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from tvist_controller.collision import CollisionModel, Meeting
+from tvist_controller.control.differentiator import Floats, Target
+from tvist_controller.safety import GENTLEST_STOP, TorqueRoom
+from tvist_controller.stops import StopPlanner
+from tvist_controller.trajectory import Stop, Way
+
+MARGIN = 0.8
+"""Share of the acceleration that the torque leaves where a stop begins, with which it is made: what it leaves changes
+on the way [-]."""
+FRESH = 8
+"""Ticks for which the acceleration that the torque leaves is taken for what it was: the margin covers what changes."""
+
+
+class LookAhead:
+    """Looks at the stop from the state of motion that a reference would lead to.
+
+    As long as that stop is clear along its whole way, the reference may be played. Otherwise the stop from the state
+    before is made, which was looked at a tick ago: so there always is one that is clear.
+
+    Where everything is far away a bound of the stop's way is enough: no point of the arm travels farther than the
+    angles turned times its reach. What room there is around a posture is remembered until it is used up.
+
+    Args:
+        collisions: Where the arm would meet something.
+        stops: Plans stops.
+        room: What torque leaves.
+    """
+
+    def __init__(self, collisions: CollisionModel, stops: StopPlanner, room: TorqueRoom) -> None:
+        self._collisions, self._stops, self._torque = collisions, stops, room
+        self._centre: Floats | None = None
+        self._room = 0.0
+        self._carried = collisions.carried
+        self._before: tuple[Target, Callable[[], Stop]] | None = None
+        self._acceleration, self._age = GENTLEST_STOP, FRESH
+        self.met: Meeting | None = None
+        """What the reference that was refused last would have led to."""
+
+    def begin(self, state: Target) -> None:
+        """Start from rest."""
+        self._before, self.met = (state, self._within(state, GENTLEST_STOP)), None
+        self._acceleration, self._age = GENTLEST_STOP, FRESH
+
+    def __call__(self, state: Target) -> Stop | None:
+        """Whether a reference may be played.
+
+        Args:
+            state: State of motion that it would lead to.
+
+        Returns:
+            None: it may. Otherwise the stop to be made instead, from the state before.
+        """
+        found = self._permitted(state)
+        if found is None:
+            return self.fallback()
+        self._before = state, found
+        return None
+
+    def take(self, state: Target, stop: Stop) -> None:
+        """From now on this is the stop that is known to be clear, from the state of the newest reference."""
+        self._before = state, lambda: stop
+
+    def fallback(self) -> Stop:
+        """The stop from the state of motion of the reference that was played last, which is known to be clear."""
+        assert self._before is not None, "begin comes first"
+        return self._before[1]()
+
+    def clear(self, stop: Stop) -> bool:
+        """Whether nothing meets on the whole way of a stop."""
+        q, qd, qdd = stop.at(0.0)
+        if self.is_spacious(q, self.turned(qd, qdd, stop.acceleration)):
+            return True
+        self.met = self.meeting(stop)
+        return self.met is None
+
+    def meeting(self, stop: Stop) -> Meeting | None:
+        """The first pair that meets on the way of a stop."""
+        _, qd, qdd = stop.at(0.0)
+        turned = _fastest(qd, qdd, stop.jerk) * stop.duration
+        before = None if self._before is None else self._before[0].q
+        way = Way(lambda share: stop.at(share * stop.duration)[0], turned)
+        found = self._collisions.on_way(way, before=before)
+        return None if found is None else found[1]
+
+    def _within(self, state: Target, acceleration: float) -> Callable[[], Stop]:
+        """Makes a stop, once it is wanted."""
+        return partial(self._stops.stop, state, acceleration)
+
+    def _permitted(self, state: Target) -> Callable[[], Stop] | None:
+        """Gives a stop that is clear; None where there is none."""
+        self._age += 1
+        if self._age <= FRESH and self._is_spacious_for(state):
+            return self._within(state, self._acceleration)
+        allowed = MARGIN * self._torque.acceleration(state.q, state.qd)
+        self._acceleration, self._age = min(max(allowed, GENTLEST_STOP), self._stops.highest), 0
+        if self._is_spacious_for(state):
+            return self._within(state, self._acceleration)
+        stop = self._stops.stop(state, self._acceleration)
+        found = stop if self.clear(stop) else self._stops.by_joints(state, None, self.clear)
+        return None if found is None else lambda: found
+
+    def _is_spacious_for(self, state: Target) -> bool:
+        return self.is_spacious(state.q, self.turned(state.qd, state.qdd, self._acceleration))
+
+    def is_spacious(self, q: Floats, turned: Floats) -> bool:
+        """Whether there is certainly room around q to turn the joints by so much."""
+        collisions = self._collisions
+        if self._carried is not collisions.carried:
+            self._carried, self._centre = collisions.carried, None
+        way = collisions.travel(turned)
+        if self._centre is not None and way + collisions.travel(q - self._centre) < self._room:
+            return True
+        if self._centre is not q:
+            self._centre, self._room = q, collisions.room(q)
+        return way < self._room
+
+    def turned(self, qd: Floats, qdd: Floats, acceleration: float, jerk: float | None = None) -> Floats:
+        """Upper bound of what each joint turns in a stop, shape (n,) [rad].
+
+        Args:
+            qd: Velocities where it begins, shape (n,) [rad/s].
+            qdd: Accelerations there, shape (n,) [rad/s^2].
+            acceleration: Its limit [rad/s^2].
+            jerk: Its limit [rad/s^3]; None for that of the joints.
+        """
+        jerk = self._stops.jerk if jerk is None else jerk
+        fastest = _fastest(qd, qdd, jerk)
+        ramps = (acceleration + np.abs(qdd)) / jerk
+        turned: Floats = fastest * (fastest / (2.0 * acceleration) + ramps + self._stops.period)
+        return turned
+
+
+def _fastest(qd: Floats, qdd: Floats, jerk: float) -> Floats:
+    """Upper bound of what each joint's velocity comes to until its acceleration is taken back [rad/s]."""
+    fastest: Floats = np.abs(qd) + qdd * qdd / (2.0 * jerk)
+    return fastest

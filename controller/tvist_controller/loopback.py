@@ -1,0 +1,81 @@
+"""The server in process: no network, no thread, no clock. Time passes when a client steps it."""
+
+from collections.abc import Callable
+
+from tvist_controller.controller import Controller
+from tvist_controller.host import Host
+from tvist_controller.setup import Setup
+from tvist_controller.sink import Sink, Topic
+from tvist_plant.plant import Plant
+from tvist_protocol.codec import encode
+from tvist_protocol.io import Io
+from tvist_protocol.journal import Entry
+from tvist_protocol.stream import Event, State, Truth
+
+
+class LoopbackHost(Sink):
+    """A robot in the caller's own thread, as fast as it computes. Every message still goes through the codec.
+
+    Args:
+        setup: How the controller starts; its clock should be `free` or `lockstep`.
+        plant: What the controller moves; None: the flexible arm that the setup describes.
+
+    Raises:
+        ValueError: The setup is wrong, or the plant does not fit it.
+    """
+
+    def __init__(self, setup: Setup, plant: Plant | None = None) -> None:
+        self.controller = Controller(setup, plant)
+        self.entries: list[Entry] = []
+        """What reached the controller: with the setup, all that a replay needs."""
+        self._host = Host(self.controller, self)
+        self._callbacks: dict[Topic, list[Callable[[bytes], object]]] = {}
+
+    def request(self, client: str, data: bytes) -> bytes:  # noqa: ARG002  a network's door knows no client either
+        """Carry out a command; its encoded reply."""
+        return encode(self._host.request(data))
+
+    def put_setpoint(self, client: str, data: bytes) -> None:  # noqa: ARG002
+        """Take a set-point."""
+        self._host.setpoint(data)
+
+    def info(self) -> bytes:
+        """What the controller says of itself."""
+        return self._host.info()
+
+    def subscribe(self, topic: Topic, callback: Callable[[bytes], object]) -> Callable[[], None]:
+        """Have every message of a topic, first of all the present state or io; the function returned ends that."""
+        callbacks = self._callbacks.setdefault(topic, [])
+        callbacks.append(callback)
+        if topic == "state":
+            callback(encode(self.controller.latest))
+        elif topic == "io":
+            callback(encode(self.controller.io()))
+        return lambda: callbacks.remove(callback)
+
+    def state(self, state: State) -> None:
+        """Hand on a state."""
+        self._put("state", state)
+
+    def event(self, event: Event) -> None:
+        """Hand on an event."""
+        self._put("event", event)
+
+    def truth(self, truth: Truth) -> None:
+        """Hand on what no robot can know."""
+        self._put("truth", truth)
+
+    def io(self, io: Io) -> None:
+        """Hand on inputs, outputs and registers."""
+        self._put("io", io)
+
+    def journal(self, entry: Entry) -> None:
+        """Keep an entry."""
+        self.entries.append(entry)
+
+    def _put(self, topic: Topic, message: State | Event | Truth | Io) -> None:
+        callbacks = self._callbacks.get(topic)
+        if callbacks:
+            data = encode(message)
+            for callback in tuple(callbacks):
+                callback(data)

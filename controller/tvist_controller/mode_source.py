@@ -1,0 +1,92 @@
+"""Where a filter's modes come from: what makes an estimator for as many modes as a filter wants, and for a payload."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+from tvist_controller.calibrations import available, estimator_of, load
+from tvist_controller.calibrations.modal import modal_estimator
+from tvist_plant.description import RobotDescription
+from tvist_plant.fingerprint import fingerprint
+from tvist_protocol.calibration import Calibration
+from tvist_protocol.values import Payload
+from tvist_shaping.errors import EstimatorError
+from tvist_shaping.estimators.base import Estimator
+from tvist_shaping.estimators.fixed import Fixed
+
+SourceName = Literal["fixed", "polynomial", "modal"]
+
+
+@dataclass(frozen=True)
+class ModeSource:
+    """An estimator that was chosen."""
+
+    name: SourceName
+    """As on the wire."""
+    description: RobotDescription
+    """The robot."""
+    calibration: Calibration | None = None
+    """Of `polynomial` and `modal`."""
+    f_d: Sequence[float] = ()
+    """Of `fixed` [Hz]."""
+    zeta: Sequence[float] = ()
+    """Of `fixed` [-]."""
+
+    @property
+    def knows_payload(self) -> bool:
+        """Whether another payload makes other modes."""
+        return self.name == "modal"
+
+    @cached_property
+    def fits_arm(self) -> bool | None:
+        """Whether the calibration was measured on the arm that the robot file describes; None: it does not say."""
+        measured = None if self.calibration is None else self.calibration.provenance.arm
+        return None if measured is None else measured == fingerprint(self.description)
+
+    @property
+    def most(self) -> int:
+        """How many modes it can give."""
+        if self.name == "modal":
+            return self.description.joints + 2 * len(self.description.link_flexibility.links)
+        return len(self.f_d) if self.name == "fixed" else 1
+
+    def estimator(self, modes: int, payload: Payload) -> Estimator:
+        """The lowest modes with a payload.
+
+        Raises:
+            EstimatorError: There are not so many, or the calibration is not of this arm.
+        """
+        if modes > self.most:
+            raise EstimatorError("modes", modes, f"at most {self.most}, which the estimator {self.name} has")
+        if self.calibration is None:
+            return Fixed(self.f_d[:modes], self.zeta[:modes])
+        if self.name == "polynomial":
+            return estimator_of(self.calibration)
+        return modal_estimator(self.calibration, self.description, payload, modes)
+
+
+def first_source(description: RobotDescription, calibration: Calibration | None) -> ModeSource:
+    """What a robot starts with; without a calibration it is still to be identified."""
+    if calibration is None:
+        return ModeSource("fixed", description, f_d=(10.0,), zeta=(0.2,))
+    name: SourceName = "modal" if calibration.polynomial is None else "polynomial"
+    return ModeSource(name, description, calibration)
+
+
+def modal_source(description: RobotDescription, calibration: Calibration | None) -> ModeSource | None:
+    """The estimator `modal` of a robot: of its own calibration, or of one that comes with the package.
+
+    Args:
+        description: The robot.
+        calibration: Its own; None: it is still to be identified, and nothing that comes with the package is its own.
+
+    Returns:
+        None where there is none.
+    """
+    if calibration is None:
+        return None
+    for one in (calibration, *map(load, available())):
+        if one.modal is not None and one.robot == description.robot.model:
+            return ModeSource("modal", description, one)
+    return None

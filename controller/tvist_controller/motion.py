@@ -1,0 +1,346 @@
+"""What the robot is doing: motions by their numbers, streams of set-points, stops, power and protective stops.
+
+`tvist_protocol.transitions` says what leads where; here it is done.
+"""
+
+from typing import Unpack
+
+import numpy as np
+
+from tvist_controller.activities import PUT, at_rest, runtime_of
+from tvist_controller.brakes import brake
+from tvist_controller.collision import CollisionModel
+from tvist_controller.cycle import ControlCycle, Sample
+from tvist_controller.events import Emit, Told
+from tvist_controller.motions import Motions
+from tvist_controller.outlook import Outlook
+from tvist_controller.planning.basis import FilterBasis, MotionBasis
+from tvist_controller.planning.move_planner import PlannedMove
+from tvist_controller.protection import Protection
+from tvist_controller.refusal import RefusalError, out_of_turn
+from tvist_controller.safety_system import SafetySystem
+from tvist_controller.stops import StopPlan
+from tvist_controller.streaming import Streaming
+from tvist_controller.trajectory import Limits
+from tvist_controller.way_ahead import WayAhead
+from tvist_plant.plant import PERIOD, PlantError
+from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_protocol.replies import Code
+from tvist_protocol.stream import EventKind
+from tvist_protocol.transitions import Activity, after
+from tvist_protocol.values import ResetMode
+
+
+class MotionControl:
+    """Starts, watches and ends motion on the control line. Every motion's number ends in one of done and stopped.
+
+    Args:
+        cycle: The control line.
+        collisions: Where the arm would meet something.
+        emit: Takes what happens.
+        mode: Robot mode to start in.
+    """
+
+    def __init__(
+        self, cycle: ControlCycle, collisions: CollisionModel, emit: Emit, mode: ResetMode = "RUNNING"
+    ) -> None:
+        self.cycle = cycle
+        self.collisions = collisions
+        self.activity = PUT[mode]
+        """What the robot is doing."""
+        self.safety = SafetySystem()
+        """What the safety system allows."""
+        self._emit = emit
+        self.outlook = Outlook(cycle)
+        """What the control line is going to do."""
+        self.ahead = WayAhead(cycle, self.outlook, collisions)
+        """What would meet on its way."""
+        self._protection = Protection(cycle)
+        self.motions = Motions(cycle, self.safety, emit)
+        """Point-to-point motions, and their speed."""
+        self.streams = Streaming()
+        """The stream of set-points that is followed, where there is one."""
+
+    @property
+    def streaming(self) -> bool:
+        """Whether a stream of set-points is followed."""
+        return self.streams.stream is not None
+
+    def check_move(self) -> None:
+        """Check that a point-to-point motion may begin.
+
+        Raises:
+            RefusalError: The arm is busy, without power or stopped for safety.
+        """
+        self._check("move_j")
+
+    @property
+    def may_move(self) -> bool:
+        """Whether what the robot is doing lets a point-to-point motion begin."""
+        return after(self.activity, "move_j") is not None
+
+    def basis(self, on: FilterBasis) -> MotionBasis | None:
+        """What a point-to-point motion from here depends on; None where the arm is busy or without power.
+
+        Args:
+            on: The present filter.
+        """
+        if not self.may_move:
+            return None
+        cycle = self.cycle
+        return MotionBasis(
+            q=cycle.reference,
+            speed=self.motions.wanted_speed,
+            slowest=self.motions.reduced_velocity if self.safety.reduced else None,
+            excess=cycle.tvist.excess,
+            carried=self.collisions.carried,
+            bodies=cycle.inverse_dynamics.bodies,
+            filter=on,
+        )
+
+    def move(self, planned: PlannedMove) -> int:
+        """Start a point-to-point motion that was planned on what is so now; its number.
+
+        Raises:
+            RefusalError: As `check_move`.
+        """
+        self._go("move_j")
+        return self.motions.begin(planned)
+
+    def pause(self) -> None:
+        """Bring the motion to a standstill on its way; one that is about to end anyway goes on to its end.
+
+        Raises:
+            RefusalError: None is running.
+        """
+        self._go("pause")
+        self.motions.hold()
+
+    def resume(self) -> None:
+        """Go on with a motion that was paused.
+
+        Raises:
+            RefusalError: None is.
+        """
+        self._go("resume")
+        self.motions.release()
+
+    @property
+    def runtime(self) -> RuntimeState:
+        """Whether something moves."""
+        return runtime_of(self.activity, slowing=self.motions.speed > 0.0 and not self.cycle.at_rest)
+
+    @property
+    def safety_mode(self) -> SafetyMode:
+        """What the safety system allows."""
+        return self.safety.mode(self.activity)
+
+    def power_on(self, *, release_brakes: bool = True) -> None:
+        """Power the arm and release its brakes.
+
+        Args:
+            release_brakes: False: leave the brakes of an arm without power.
+
+        Raises:
+            RefusalError: It moves, or is in a protective stop.
+        """
+        self._go("power_on" if release_brakes else "power")
+
+    def brake(self, why: str) -> None:
+        """Stop by category 0: the power is gone, and the brakes close at once.
+
+        Args:
+            why: The reason, for a person.
+        """
+        target, plan, cycle = after(self.activity, "brakes"), None, self.cycle
+        if target is not None:
+            self.activity = target
+        if target is not None and not cycle.at_rest:
+            stop = brake(cycle.description, cycle.plant.payload, cycle.newest, PERIOD)
+            way = float(np.abs(stop.end - cycle.position).max())
+            plan = StopPlan(None, None, limited=False, duration=stop.duration, way=way)
+            self.outlook.brake(stop)
+        self._tell_end(plan, why, None, "safety_stop", 0)
+
+    def protect(self, why: str, code: Code | None = None) -> None:
+        """Make a protective stop; nothing happens where the brakes hold the arm or power is on its way out."""
+        if after(self.activity, "protective_stop") is not None:
+            self.end("protective_stop", why, code, kind="protective_stop")
+
+    def unlock(self) -> None:
+        """Leave a protective stop.
+
+        Raises:
+            RefusalError: There is none, or the arm is still stopping.
+        """
+        self._go("unlock_protective_stop")
+        self._protection.forget()
+
+    def recover(self, error: PlantError, seed: int) -> Sample:
+        """Put an arm whose state was no longer finite at rest where its reference was, in a protective stop.
+
+        Args:
+            error: What the arm said.
+            seed: Of its noise and gear errors.
+
+        Returns:
+            A tick of the line with it.
+        """
+        why = f"{error}: the simulation put it at rest where its reference was"
+        self.abandon(why, "plant_failure")
+        self.cycle.reset(self.cycle.position, seed=seed)
+        self._protection.forget()
+        if after(self.activity, "plant_failure") is not None:
+            self._go("plant_failure")
+        self._emit("protective_stop", code="plant_failure", why=why)
+        return self.cycle.step()
+
+    def _check(self, trigger: str) -> Activity:
+        """What a trigger leads to.
+
+        Raises:
+            RefusalError: Nowhere, from here.
+        """
+        target = after(self.activity, trigger)
+        if target is None:
+            raise out_of_turn(trigger, self.activity)
+        self.safety.check(trigger, self.activity)
+        return target
+
+    def _go(self, trigger: str) -> None:
+        self.activity = self._check(trigger)
+
+    def follow(self, period: float, limits: Limits, now: float) -> None:
+        """Start to follow set-points.
+
+        Raises:
+            RefusalError: The arm is busy, or such a stream may be too fast.
+        """
+        target = self._check("servo_start")
+        if self.safety.reduced and limits.velocity > (most := self.motions.reduced_velocity):
+            why = f"velocity is {limits.velocity:g} rad/s; safety_mode is REDUCED, which leaves {most:.3g}"
+            raise RefusalError("limit_velocity", "velocity", why, most)
+        self.activity = target
+        self.streams.begin(self.cycle.stream(period, limits), now)
+        self.ahead.begin()
+
+    def end_stream(self) -> None:
+        """Bring the stream to rest through the filter.
+
+        Raises:
+            RefusalError: None is running.
+        """
+        stream = self.streams.stream
+        if stream is None:
+            raise out_of_turn("servo_stop", self.activity)
+        end = self.cycle.end_of(stream)
+        met = self.ahead.after_stream(end)
+        if met is not None:
+            self.interrupt(f"{met} before the stream came to rest through the filter", "collision")
+            return
+        self._go("servo_stop")
+        self.cycle.start(end)
+        self._end_stream("servo_stop")
+
+    def stop(self, deceleration: float | None, why: str, code: Code | None = None) -> None:
+        """Stop past the filter, and say how what was moving ended.
+
+        Args:
+            deceleration: Wanted limit [rad/s^2]; None for what the torque allows.
+            why: The reason, for a person.
+            code: The reason, for a program.
+        """
+        self.end("stop", why, code, deceleration)
+
+    def interrupt(self, why: str, code: Code | None = None) -> None:
+        """End motion that may not go on, as `stop` does."""
+        self.end("interruption", why, code)
+
+    def end(
+        self,
+        trigger: str,
+        why: str,
+        code: Code | None = None,
+        deceleration: float | None = None,
+        *,
+        kind: EventKind | None = None,
+        category: int = 2,
+    ) -> None:
+        """Go where a trigger leads, and stop on the way what moves. One that leads nowhere is none of ours.
+
+        Args:
+            trigger: Of the table.
+            why: The reason, for a person.
+            code: The reason, for a program.
+            deceleration: Wanted limit [rad/s^2]; None for what the torque allows.
+            kind: Of an event that tells of the stop itself; None for none.
+            category: Of the stop.
+        """
+        target = after(self.activity, trigger)
+        if target is None:
+            return
+        self.activity = target
+        plan = None if self.cycle.at_rest else self.outlook.stop(deceleration)
+        if plan is not None and plan.limited:
+            kept = "the motion's own" if plan.acceleration is None else f"{plan.acceleration:.3g} rad/s²"
+            why = f"{why}; deceleration is {kept}, limited from {deceleration:.3g}"
+        bare = not self.motions.running  # what has no number ends without a word on limits
+        self._tell_end(plan, why, code, kind, category)
+        if bare and plan is not None and plan.limited:
+            self._emit("warning", code="limit_acceleration", why=why)
+
+    def _tell_end(
+        self, plan: StopPlan | None, why: str, code: Code | None, kind: EventKind | None, category: int
+    ) -> None:
+        """Tell of a stop, and of what it has ended."""
+        if kind is None and not self.motions.running and not self.streaming:
+            return
+        duration, way = (0.0, 0.0) if self.cycle.at_rest else self.ahead.until_rest(plan)
+        told = Told(category=category, duration=duration, way=way)
+        if kind is not None:
+            self._emit(kind, code=code, why=why, **told)
+        self._end_stream(why, code, **told)
+        self.motions.stopped(why, code, **told)
+
+    def abandon(self, why: str, code: Code | None = None) -> None:
+        """Say that what was moving ended: the arm is put elsewhere."""
+        self._end_stream(why, code)
+        self.motions.stopped(why, code)
+
+    def put(self, mode: ResetMode | None) -> None:
+        """Be in a robot mode; None: in the present one, at rest. The arm was put somewhere at rest before."""
+        if mode is not None:
+            self.activity = PUT[mode]
+            self.safety.clear()
+        else:
+            self.activity = at_rest(self.activity, emergency=bool(self.safety.emergencies))
+        self._protection.forget()
+
+    def watch(self, now: float) -> None:
+        """End a stream that nobody keeps up."""
+        silence = self.streams.silence(now)
+        if silence is not None:
+            self.interrupt(silence)
+
+    def step(self) -> Sample:
+        """One tick of the line.
+
+        Raises:
+            PlantError: The arm's state is no longer finite: `recover`.
+        """
+        sample = self.cycle.step()
+        stream = self.streams.stream
+        refused = stream is not None and self.cycle.trajectory is not stream
+        if refused or (self.cycle.stopping and self.activity is Activity.ENDING):
+            self.end("interruption", str(self.ahead.met), "collision")
+        if self.cycle.at_rest and self.activity.moving and (target := after(self.activity, "at_rest")):
+            self.activity = target
+            self.motions.done()
+        if self.activity.robot_mode is RobotMode.RUNNING:
+            for danger in self._protection.dangers(sample):
+                self.protect(danger.why, danger.code)
+        return sample
+
+    def _end_stream(self, why: str, code: Code | None = None, **told: Unpack[Told]) -> None:
+        if self.streams.end():
+            self._emit("stream_stopped", code=code, why=why, **told)

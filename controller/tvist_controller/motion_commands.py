@@ -1,0 +1,66 @@
+"""Commands that move, stop and power the arm."""
+
+from tvist_controller.command_row import Call, Row
+from tvist_controller.motion import MotionControl
+from tvist_controller.programs.player import ProgramPlayer
+from tvist_controller.refusal import check_content, check_motion
+from tvist_controller.safety_control import SafetyControl
+from tvist_controller.trajectory import Limits
+from tvist_protocol import commands as c
+from tvist_protocol.replies import Accepted, Reply
+
+
+class MotionCommands:
+    """What clients may ask of motion.
+
+    Args:
+        motion: What the robot is doing.
+        safety: What its safety system does.
+        programs: The program, which no stop and no loss of power lets go on.
+    """
+
+    def __init__(self, motion: MotionControl, safety: SafetyControl, programs: ProgramPlayer) -> None:
+        self._motion, self._safety, self._programs = motion, safety, programs
+        self._description = motion.cycle.description
+        self.rows = (
+            Row(c.MoveJ, self._move_j),
+            Row(c.ServoStart, self._servo_start),
+            Row(c.ServoStop, lambda _: motion.end_stream()),
+            Row(c.Stop, self._stop, lease="if named", changes_io=True),
+            Row(c.Pause, self._pause),
+            Row(c.Resume, lambda _: motion.resume()),
+            Row(c.SetSpeed, self._set_speed, changes_io=True),
+            Row(c.PowerOn, self._power_on),
+            Row(c.PowerOff, self._power_off, changes_io=True),
+            Row(c.UnlockProtectiveStop, lambda _: motion.unlock()),
+            Row(c.RestartSafety, lambda _: motion.safety.restart()),
+        )
+
+    def _move_j(self, call: Call[c.MoveJ]) -> Reply:
+        check_content(call.command, self._description)
+        self._motion.check_move()
+        return Accepted(id=self._motion.move(call.planned()))
+
+    def _servo_start(self, call: Call[c.ServoStart]) -> None:
+        command = call.command
+        check_motion(command.velocity, command.acceleration, command.jerk, self._description)
+        limits = Limits(command.velocity, command.acceleration, command.jerk)
+        self._motion.follow(command.period, limits, call.now)
+
+    def _stop(self, call: Call[c.Stop]) -> None:
+        self._programs.stop_moving()
+        self._motion.stop(call.command.deceleration, "a stop was commanded")
+
+    def _pause(self, _: Call[c.Pause]) -> None:
+        self._motion.pause()
+        self._safety.stay_paused()
+
+    def _set_speed(self, call: Call[c.SetSpeed]) -> None:
+        self._motion.motions.set_speed(call.command.fraction)
+
+    def _power_on(self, call: Call[c.PowerOn]) -> None:
+        self._motion.power_on(release_brakes=call.command.release_brakes)
+
+    def _power_off(self, _: Call[c.PowerOff]) -> None:
+        self._programs.end()
+        self._motion.end("power_off", "power_off was commanded", category=1)

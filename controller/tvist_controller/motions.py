@@ -1,0 +1,90 @@
+"""Point-to-point motions by their numbers, and the speed at which they go."""
+
+from typing import Unpack
+
+from tvist_controller.cycle import ControlCycle
+from tvist_controller.events import Emit, Told
+from tvist_controller.moving import Move
+from tvist_controller.planning.move_planner import PlannedMove
+from tvist_controller.safety import REDUCED_SHARE
+from tvist_controller.safety_system import SafetySystem
+from tvist_protocol.replies import Code
+
+
+class Motions:
+    """Starts motions, one at a time; every number ends in one of done and stopped.
+
+    Args:
+        cycle: The control line.
+        safety: What the safety system allows.
+        emit: Takes what happens.
+    """
+
+    def __init__(self, cycle: ControlCycle, safety: SafetySystem, emit: Emit) -> None:
+        self._cycle, self._safety, self._emit = cycle, safety, emit
+        self.reduced_velocity = REDUCED_SHARE * min(cycle.description.limits.velocity)
+        """Largest velocity of a joint where the safety system reduces the speed [rad/s]."""
+        self._started = 0
+        self._move: Move | None = None
+        self.wanted_speed = 1.0
+        """What the speed was set to [-]."""
+
+    @property
+    def running(self) -> bool:
+        """Whether one has not ended."""
+        return self._move is not None
+
+    @property
+    def speed(self) -> float:
+        """Rate of the running motion's time; without one, that of the next [-]."""
+        return self.wanted_speed if self._move is None else self._move.rate
+
+    def begin(self, planned: PlannedMove) -> int:
+        """Start a motion; its number."""
+        trajectory = planned.trajectory
+        self._cycle.start(trajectory)
+        self._cycle.tvist.aim(trajectory.path.end)
+        self._started += 1
+        move = self._move = Move(self._started, trajectory, planned.velocity, self._cycle)
+        self._emit("motion_started", id=move.number)
+        if planned.excess_of_torque is not None:
+            self._emit("warning", id=move.number, code="limit_torque", why=planned.excess_of_torque)
+        return move.number
+
+    def set_speed(self, fraction: float) -> None:
+        """Scale the time of the motion that runs and of those to come."""
+        self.wanted_speed = fraction
+        self.keep_rate()
+
+    def keep_rate(self) -> None:
+        """Let the motion that runs go at the rate that is set and allowed."""
+        if self._move is not None:
+            self._move.go(self._rate(self._move))
+
+    def hold(self) -> None:
+        """Bring the motion to a standstill on its way."""
+        if self._move is not None:
+            self._move.hold()
+
+    def release(self) -> None:
+        """Go on with it."""
+        if self._move is not None:
+            self._move.release(self._rate(self._move))
+
+    def done(self) -> None:
+        """The shaped reference rests at the motion's target."""
+        if self._move is not None:
+            self._emit("motion_done", id=self._move.number)
+            self._move = None
+
+    def stopped(self, why: str, code: Code | None, **told: Unpack[Told]) -> None:
+        """The motion ends before its target."""
+        if self._move is not None:
+            self._emit("motion_stopped", id=self._move.number, code=code, why=why, **told)
+            self._move = None
+
+    def _rate(self, move: Move) -> float:
+        """Rate for the time of a motion [-]."""
+        if self._safety.reduced:
+            return min(self.wanted_speed, self.reduced_velocity / move.velocity)
+        return self.wanted_speed

@@ -1,0 +1,153 @@
+"""What the control line is going to do, and the quickest way to end it."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from tvist_controller.ahead import MOST_AHEAD, Ahead
+from tvist_controller.control.differentiator import Floats
+from tvist_controller.cycle import ControlCycle
+from tvist_controller.stops import StopPlan, StopPlanner
+from tvist_controller.trajectory import Forecast, PathStop, Stop, Trajectory
+from tvist_plant.plant import PERIOD
+from tvist_shaping.base import Filter
+
+EVEN = 1e-12
+"""Differences of steps below this are rounding [rad]."""
+
+
+def _anywhere(_: Stop) -> bool:
+    return True
+
+
+class Outlook:
+    """Looks ahead on a control line, and stops it.
+
+    Args:
+        cycle: The control line.
+    """
+
+    def __init__(self, cycle: ControlCycle) -> None:
+        self._cycle = cycle
+        self.stops = StopPlanner(cycle.description, cycle.inverse_dynamics, PERIOD)
+        """Plans stops."""
+        self._wanted = math.inf
+
+    def foresee(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Floats | None:
+        """Run the references ahead: what they will be if nothing is commanded.
+
+        Args:
+            tvist: A filter to change to now; None for no change. A stop bypasses any.
+            trajectory: One to follow from now on; None for the present one.
+
+        Returns:
+            The two shaped references played last and those to come until they rest, one a tick, shape (k, n) [rad];
+            None where that takes more than `MOST_AHEAD` ticks.
+        """
+        ahead = self._ahead(tvist, trajectory)
+        ahead.until(MOST_AHEAD)
+        return np.array(ahead.references) if ahead.rests else None
+
+    def _ahead(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Ahead:
+        """As `foresee`, to be run as far as one likes."""
+        stopping = self._cycle.stopping
+        present, line_filter, shaped = self._cycle.fork()
+        trajectory = present if trajectory is None else trajectory.fork()
+        if tvist is not None and not stopping:
+            line_filter.use(tvist.fork())
+        return Ahead(trajectory, None if stopping else line_filter, shaped)
+
+    def stop(self, deceleration: float | None) -> StopPlan | None:
+        """Come to rest as soon as is permitted.
+
+        A motion stays on its way, never further along it than if it had not been stopped, and rests no later.
+        Where no stop does that within the torque, the motion runs out through the filter. A stream, whose way is
+        its client's, stops clear of everything.
+
+        Args:
+            deceleration: Wanted limit [rad/s^2]; None for what the torque allows.
+
+        Returns:
+            What is done; None where a stop under way is as quick already, and goes on.
+        """
+        cycle, wanted = self._cycle, math.inf if deceleration is None else deceleration
+        if (cycle.stopping or cycle.running_out) and wanted <= self._wanted:
+            return None
+        plan = self.plan_stop(deceleration)
+        self._wanted = wanted
+        if plan is None:
+            return None
+        if plan.trajectory is None:
+            cycle.run_out()
+        else:
+            cycle.bypass(plan.trajectory)
+        return plan
+
+    def brake(self, trajectory: Trajectory) -> None:
+        """Follow the arm while its brakes bring it to rest; no stop takes their place."""
+        self._cycle.bypass(trajectory)
+        self._wanted = math.inf
+
+    def plan_stop(self, deceleration: float | None) -> StopPlan | None:
+        """The quickest permitted stop from here; as `stop`, but nothing is done."""
+        forecast = self._cycle.trajectory.forecast
+        return self._by_joints(deceleration) if forecast is None else self._on_path(forecast, deceleration)
+
+    def _by_joints(self, deceleration: float | None) -> StopPlan | None:
+        cycle, guard, present = self._cycle, self._cycle.guard, self._cycle.trajectory
+        stop = self.stops.by_joints(cycle.newest, deceleration, _anywhere if guard is None else guard.clear)
+        if cycle.stopping and (stop is None or stop.acceleration <= present.acceleration):
+            return None
+        if stop is None:  # none is clear and keeps the torque
+            hardest = self.stops.highest
+            stop = self.stops.stop(cycle.newest, hardest) if guard is None else guard.fallback()
+        return self._plan(stop, deceleration, stop.duration, stop.end)
+
+    def _on_path(self, forecast: Forecast, deceleration: float | None) -> StopPlan | None:
+        cycle, forecast = self._cycle, self._shaped(forecast)
+        state, newest = cycle.along.published, cycle.along.position
+        stop = self.stops.on_path(state, newest, forecast, deceleration)
+        lets_run_out = StopPlan(None, None, deceleration is not None, None, None)
+        ahead = None
+        if stop is None:
+            ahead = self._ahead()
+            # What goes no way back need be run ahead no further than a stop lasts.
+            ahead.until(MOST_AHEAD if forecast.turns else 0)
+            stop = self.stops.under(ahead, state, forecast, deceleration)
+        if stop is None and ahead is not None:
+            ahead.until(MOST_AHEAD)
+            if not ahead.rests:  # it lasts for so long that any stop is sooner
+                stop = self.stops.on_path(state, newest, forecast, deceleration, certain=False)
+            else:
+                last, asked = ahead.last, self.stops.asked(np.array(ahead.references))
+                stop = self.stops.under(ahead, state, forecast, deceleration, asked)
+                lets_run_out = self._plan(None, deceleration, (last - 1) * PERIOD, ahead.references[-1])
+        if stop is not None:
+            return self._plan(stop, deceleration, stop.duration, stop.end)
+        return None if cycle.stopping else lets_run_out
+
+    def _plan(
+        self, stop: Stop | PathStop | None, wanted: float | None, duration: float, end: Floats
+    ) -> StopPlan:
+        kept = None if stop is None else stop.acceleration
+        way = float(np.abs(end - self._cycle.position).max())
+        return StopPlan(stop, kept, wanted is not None and kept != wanted, max(duration, 0.0), way)
+
+    def _shaped(self, forecast: Forecast) -> Forecast:
+        """What is known of a motion after the filter."""
+        cycle = self._cycle
+        if cycle.stopping:
+            return forecast
+        peak, direction = cycle.line_filter.peak, forecast.path.direction
+        known = peak == 1.0 and not cycle.line_filter.fading and forecast.steady > 0.0
+        if known:  # the filter gives back late what it was given, also how it was slowed down before
+            steps = np.diff(cycle.line_filter.window() @ direction)
+            known = bool((np.diff(steps) >= -EVEN * float(direction @ direction)).all())
+        return replace(
+            forecast,
+            braking=peak * forecast.braking,
+            jerk=peak * forecast.jerk,
+            steady=forecast.steady if known else 0.0,
+            turns=peak > 1.0,
+        )

@@ -1,0 +1,46 @@
+"""Drives that give more torque than they should."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tvist_controller.control.differentiator import Floats
+from tvist_plant.plant import PERIOD
+
+ALLOWED = 0.01
+"""How long a drive may be beyond its limit [s]."""
+TICKS = round(ALLOWED / PERIOD)
+
+
+class Overload:
+    """Finds a joint whose drive has been beyond its torque limit for longer than `ALLOWED`.
+
+    Args:
+        limits: Largest torque of each joint, shape (n,) [N m].
+    """
+
+    def __init__(self, limits: Sequence[float]) -> None:
+        self.limits = np.array(limits, dtype=float)
+        self._beyond = np.zeros(len(limits), dtype=int)
+        self._any = False
+
+    def joint(self, moment: Floats) -> int | None:
+        """The joint with the longest excess that is too long, after one more tick; None: there is none.
+
+        Args:
+            moment: Total torque of each drive, shape (n,) [N m].
+        """
+        beyond = np.abs(moment) > self.limits
+        if not np.count_nonzero(beyond):  # a good deal faster than any()
+            if self._any:
+                self.forget()
+            return None
+        self._any = True
+        self._beyond = np.where(beyond, self._beyond + 1, 0)
+        joint = int(np.argmax(self._beyond))
+        return joint if self._beyond[joint] > TICKS else None
+
+    def forget(self) -> None:
+        """Begin to count anew."""
+        self._beyond[:] = 0
+        self._any = False

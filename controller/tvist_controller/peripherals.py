@@ -1,0 +1,201 @@
+"""Terminals, registers and tool centre point of a robot: what commands set there, and what is told of it."""
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from tvist_controller.command_row import Call, Row
+from tvist_controller.refusal import RefusalError
+from tvist_protocol.io import (
+    BITS,
+    NUMBERS,
+    Bank,
+    Io,
+    Register,
+    SetIo,
+    SetRegisters,
+    SetTcp,
+    SimulationSetInputs,
+)
+from tvist_protocol.programs import ProgramState
+from tvist_protocol.values import Payload
+
+CURRENT = (0.004, 0.020)
+"""Range of an analogue terminal as current [A]."""
+VOLTAGE = (0.0, 10.0)
+"""The same as voltage [V]."""
+LEAST, MOST = -(2**31), 2**31 - 1
+"""Of an integer register."""
+
+
+def analog_value(share: float, *, voltage: bool) -> float:
+    """What an analogue terminal gives at a share of its range [A or V]."""
+    low, high = VOLTAGE if voltage else CURRENT
+    return low + share * (high - low)
+
+
+def analog_share(value: float, *, voltage: bool) -> float:
+    """Share of its range at which an analogue terminal gives a value [-]."""
+    low, high = VOLTAGE if voltage else CURRENT
+    return (value - low) / (high - low)
+
+
+class LoadedProgram(Protocol):
+    """What is told of the program; see `Io`."""
+
+    name: str | None
+    state: ProgramState
+
+    @property
+    def line(self) -> int:
+        """As in `Io`."""
+
+
+class Peripherals:
+    """What hangs on the control box, apart from the arm. It starts with everything off and at zero.
+
+    Args:
+        on_tcp: Called with where the tool centre point is, when that is set.
+    """
+
+    def __init__(self, on_tcp: Callable[[tuple[float, ...]], None]) -> None:
+        self._on_tcp = on_tcp
+        self.rows = (
+            Row(SetIo, lambda call: self.set_outputs(call.command), changes_io=True),
+            Row(SetRegisters, self._set_registers, lease="if named", changes_io=True),
+            Row(SetTcp, lambda call: self.set_tcp(call.command.offset), changes_io=True),
+            Row(SimulationSetInputs, lambda call: self.set_inputs(call.command), changes_io=True),
+        )
+        self._digital_inputs = 0
+        self._digital_outputs = 0
+        self._analog_inputs = [CURRENT[0], CURRENT[0]]
+        self._analog_ratios = [0.0, 0.0]
+        self._analog_types = 0
+        self._tool_analog_inputs = [0.0, 0.0]
+        self._bits: dict[Bank, list[int]] = {bank: [0] * (BITS // 32) for bank in ("input_bit", "output_bit")}
+        self._ints: dict[Bank, list[int]] = {bank: [0] * NUMBERS for bank in ("input_int", "output_int")}
+        self._doubles: dict[Bank, list[float]] = {
+            bank: [0.0] * NUMBERS for bank in ("input_double", "output_double")
+        }
+        self.tcp_offset: tuple[float, ...] = (0.0,) * 6
+        """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
+
+    def set_outputs(self, command: SetIo) -> None:
+        """Set those outputs that a mask names."""
+        mask = command.digital_output_mask
+        self._digital_outputs = self._digital_outputs & ~mask | command.digital_outputs & mask
+        for number, ratio in enumerate((command.standard_analog_output_0, command.standard_analog_output_1)):
+            if command.standard_analog_output_mask >> number & 1:
+                self._analog_ratios[number] = ratio
+                bit = 1 << (2 + number)
+                voltage = command.standard_analog_output_type >> number & 1
+                self._analog_types = self._analog_types & ~bit | bit * voltage
+
+    def set_inputs(self, command: SimulationSetInputs) -> None:
+        """Put signals on inputs."""
+        mask = command.digital_input_mask
+        self._digital_inputs = self._digital_inputs & ~mask | command.digital_inputs & mask
+        if command.standard_analog_input is not None:
+            self._analog_inputs = list(command.standard_analog_input)
+        if command.analog_input_types is not None:
+            self._analog_types = self._analog_types & ~0b11 | command.analog_input_types
+        if command.tool_analog_input is not None:
+            self._tool_analog_inputs = list(command.tool_analog_input)
+
+    def set_tcp(self, offset: tuple[float, ...]) -> None:
+        """Say where the tool centre point is in the flange frame: x y z [m] and rotation vector [rad]."""
+        self.tcp_offset = offset
+        self._on_tcp(offset)
+
+    def _set_registers(self, call: Call[SetRegisters]) -> None:
+        """Write registers; input registers anyone may."""
+        command = call.command
+        if command.token is None and command.bank.startswith("output"):
+            why = f"token is missing: {command.bank} registers are the robot's own, and take control to write"
+            raise RefusalError("missing_field", "token", why)
+        self.set_registers(command)
+
+    def set_registers(self, command: SetRegisters) -> None:
+        """Write registers.
+
+        Raises:
+            RefusalError: There are not as many, or a value is none of the bank's.
+        """
+        bank, first, values = command.bank, command.first, command.values
+        there = BITS if bank in self._bits else NUMBERS
+        if first + len(values) > there:
+            why = f"first is {first} with {len(values)} values; {bank} has {there} registers"
+            raise RefusalError("out_of_range", "values", why, there)
+        last = first + len(values)
+        if bank in self._bits:
+            self._bits[bank] = _with_bits(self._bits[bank], first, values, bank)
+        elif bank in self._ints:
+            self._ints[bank][first:last] = [_integer(k, value, bank) for k, value in enumerate(values)]
+        else:
+            self._doubles[bank][first:last] = [_double(k, value, bank) for k, value in enumerate(values)]
+
+    def io(
+        self, tick: int, payload: Payload, speed: float, program: LoadedProgram, wrench: list[float] | None
+    ) -> Io:
+        """What is told of all that.
+
+        Args:
+            tick: First control period for which it holds.
+            payload: Declared.
+            speed: The speed slider [-].
+            program: The one that is loaded.
+            wrench: At the tool centre point in the last tick, base frame [N, N m]; None: it is not told.
+        """
+        return Io(
+            tick=tick,
+            actual_digital_input_bits=self._digital_inputs,
+            actual_digital_output_bits=self._digital_outputs,
+            standard_analog_input=list(self._analog_inputs),
+            standard_analog_output=[self._analog_output(number) for number in range(2)],
+            analog_io_types=self._analog_types,
+            tool_analog_input=list(self._tool_analog_inputs),
+            input_bit_register=list(self._bits["input_bit"]),
+            input_int_register=list(self._ints["input_int"]),
+            input_double_register=list(self._doubles["input_double"]),
+            output_bit_register=list(self._bits["output_bit"]),
+            output_int_register=list(self._ints["output_int"]),
+            output_double_register=list(self._doubles["output_double"]),
+            tcp_offset=list(self.tcp_offset),
+            payload=payload,
+            target_speed_fraction=speed,
+            program=program.name,
+            program_state=program.state,
+            program_line=program.line,
+            actual_TCP_force=wrench,
+        )
+
+    def _analog_output(self, number: int) -> float:
+        voltage = bool(self._analog_types >> (2 + number) & 1)
+        return analog_value(self._analog_ratios[number], voltage=voltage)
+
+
+def _with_bits(words: list[int], first: int, values: Sequence[Register], bank: Bank) -> list[int]:
+    new = list(words)
+    for k, value in enumerate(values):
+        if not isinstance(value, bool):
+            raise _wrong(k, value, bank, "true or false")
+        word, bit = divmod(first + k, 32)
+        new[word] = new[word] & ~(1 << bit) | value << bit
+    return new
+
+
+def _integer(k: int, value: Register, bank: Bank) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not LEAST <= value <= MOST:
+        raise _wrong(k, value, bank, f"an integer from {LEAST} to {MOST}")
+    return value
+
+
+def _double(k: int, value: Register, bank: Bank) -> float:
+    if isinstance(value, bool):
+        raise _wrong(k, value, bank, "a number")
+    return float(value)
+
+
+def _wrong(k: int, value: Register, bank: Bank, wanted: str) -> RefusalError:
+    return RefusalError(
+        "out_of_range", f"values[{k}]", f"values[{k}] is {value}; {bank} registers take {wanted}"
+    )

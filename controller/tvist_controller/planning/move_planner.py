@@ -1,0 +1,127 @@
+"""Point-to-point motions, whether they are clear, and what torque they will take."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tvist_controller.ahead import MOST_AHEAD, Ahead
+from tvist_controller.collision import CLEARANCE, CollisionModel
+from tvist_controller.control.differentiator import Floats
+from tvist_controller.control.inverse_dynamics import InverseDynamics
+from tvist_controller.control.shaped_reference import ShapedReference
+from tvist_controller.line_filter import LineFilter
+from tvist_controller.planning.basis import MotionBasis
+from tvist_controller.planning.filter_planner import FilterPlanner
+from tvist_controller.refusal import RefusalError
+from tvist_controller.safety import largest_torque, torque_along
+from tvist_controller.setup import Setup, body
+from tvist_controller.trajectory import JointLine, Limits, Motion, Path, quickest_motion
+from tvist_plant.plant import PERIOD
+from tvist_protocol.commands import MoveJ
+
+LOOKS = 64
+"""Moments of a motion at which its torque is looked at before it is run ahead."""
+BLUNTED = 1.05
+"""By how much the shaped motion's torque may be beyond that of the unshaped one, which it lags behind [-]."""
+
+
+@dataclass(frozen=True)
+class PlannedMove:
+    """A motion that may begin."""
+
+    trajectory: Motion
+    """Its reference."""
+    velocity: float
+    """Limit that was asked for [rad/s]."""
+    excess_of_torque: str | None
+    """By how much it will pass a limit of torque, in words; None where it will not."""
+
+
+class MovePlanner:
+    """Plans the motions of one robot.
+
+    Args:
+        setup: How the robot starts.
+        filters: Makes its filters.
+    """
+
+    def __init__(self, setup: Setup, filters: FilterPlanner) -> None:
+        self._description, self._filters = setup.description, filters
+        payload = body(setup.payload)
+        self._collisions = CollisionModel(setup.description, payload)
+        self._dynamics = InverseDynamics(setup.description, payload)
+        self._torque = np.array(setup.description.limits.torque)
+
+    def move(self, command: MoveJ, basis: MotionBasis) -> PlannedMove:
+        """Plan a motion from rest, whose content was checked.
+
+        Raises:
+            RefusalError: There is no such motion, or something would meet on its way.
+        """
+        limits = Limits(command.velocity, command.acceleration, command.jerk)
+        return self.along(JointLine(basis.q, np.array(command.q, dtype=float)), limits, basis)
+
+    def along(self, path: Path, limits: Limits, basis: MotionBasis) -> PlannedMove:
+        """Plan a motion along a path, from rest to rest.
+
+        Args:
+            path: Where to go; it begins where the reference rests.
+            limits: That every joint is to keep.
+            basis: What it depends on.
+
+        Raises:
+            RefusalError: There is no such motion, or something would meet on its way.
+        """
+        spared = replace(limits, acceleration=limits.acceleration * (1.0 - basis.excess))
+        rate = basis.speed if basis.slowest is None else min(basis.speed, basis.slowest / limits.velocity)
+        try:
+            motion = quickest_motion(path, spared, PERIOD, rate)
+        except ValueError as error:
+            raise RefusalError("out_of_range", "velocity", str(error)) from error
+        self._check_clear(motion, basis)
+        return PlannedMove(motion, limits.velocity, self._excess_of_torque(motion, basis))
+
+    def _check_clear(self, motion: Motion, basis: MotionBasis) -> None:
+        if self._collisions.carried is not basis.carried:
+            self._collisions.carry(basis.carried)
+        found = self._collisions.on_way(motion.path.whole)
+        if found is not None:
+            share, meeting = found
+            time = motion.time_at(share)
+            raise RefusalError("collision", "q", f"{meeting} {time:.2f} s after the start", CLEARANCE)
+
+    def _excess_of_torque(self, motion: Motion, basis: MotionBasis) -> str | None:
+        dynamics, allowed, limits = self._dynamics, self._torque, motion.limits
+        dynamics.believe(basis.bodies)
+        bound = largest_torque(dynamics, motion.path, limits.velocity, limits.acceleration)
+        if (bound <= allowed).all() or (BLUNTED * self._before_shaping(motion) <= allowed).all():
+            return None
+        ahead = self._shaped(motion, basis)
+        if ahead is None:
+            return None
+        most = torque_along(dynamics, ahead, PERIOD)
+        joint = int(np.argmax(most / allowed))
+        name, limit = self._description.robot.joints[joint], allowed[joint]
+        if most[joint] <= limit:
+            return None
+        return (
+            f"torque of joint {name} will reach {most[joint]:.0f} N m, {most[joint] - limit:.1f} beyond its "
+            f"limit of {limit:g}: ask for less acceleration"
+        )
+
+    def _before_shaping(self, motion: Motion) -> Floats:
+        """Largest torques that the motion would take without a filter, shape (n,) [N m]."""
+        most: Floats = np.max([self._dynamics.effort(*state) for state in motion.states(LOOKS)], axis=0)
+        return most
+
+    def _shaped(self, motion: Motion, basis: MotionBasis) -> Floats | None:
+        """References of the shaped motion, shape (k, n) [rad]; None where it lasts for too long to know."""
+        tvist = self._filters.present(basis.filter)
+        path, shaped = motion.path, ShapedReference(basis.q, PERIOD)
+        shaped.enter(path.posture_of, path.start)
+        line_filter = LineFilter(tvist, motion.limits)
+        line_filter.begin(tvist, path.start, path.posture_of)
+        tvist.aim(path.end)
+        ahead = Ahead(motion.fork(), line_filter, shaped)
+        ahead.until(MOST_AHEAD)
+        return np.array(ahead.references) if ahead.rests else None

@@ -1,0 +1,71 @@
+"""Plans for the commands that take longer than a tick may wait."""
+
+from dataclasses import dataclass
+
+from tvist_controller.planning.basis import Basis, FilterBasis, MotionBasis
+from tvist_controller.planning.filter_planner import FilterPlanner, PlannedFilter
+from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
+from tvist_controller.refusal import RefusalError, check_content, payload_of
+from tvist_controller.setup import Setup
+from tvist_protocol import commands as c
+from tvist_shaping.base import Filter
+
+PLANNED = (c.MoveJ, c.SetShaper, c.SetEstimator, c.SetPayload, c.SimulationReset)
+"""Commands that are planned."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a command will do, as long as what it was planned on holds."""
+
+    basis: FilterBasis | MotionBasis | None
+    """None: that no point-to-point motion may begin."""
+    found: PlannedMove | PlannedFilter | Filter | RefusalError | None
+    """What was planned, or why it cannot be; None where there is nothing to change."""
+
+    def holds(self, now: Basis) -> bool:
+        """Whether what it was planned on is so now."""
+        match self.basis:
+            case None:
+                return now.motion is None
+            case FilterBasis() as planned:
+                return planned == now.filter
+            case planned:
+                return now.motion is not None and planned.agrees(now.motion)
+
+
+class Planner:
+    """Plans for one robot. Equal commands on equal bases get equal plans: nothing is remembered.
+
+    Args:
+        setup: How the robot starts.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self._description = setup.description
+        self.filters = FilterPlanner(setup)
+        self._moves = MovePlanner(setup, self.filters)
+
+    def plan(self, command: c.Command, basis: Basis) -> Plan:
+        """Plan a command; that it is refused is a plan, too."""
+        on = basis.motion if isinstance(command, c.MoveJ) else basis.filter
+        try:
+            return Plan(on, self._find(command, basis))
+        except RefusalError as refusal:
+            return Plan(on, refusal)
+
+    def _find(self, command: c.Command, basis: Basis) -> PlannedMove | PlannedFilter | Filter | None:
+        check_content(command, self._description)
+        on, filters = basis.filter, self.filters
+        match command:
+            case c.MoveJ() if basis.motion is not None:
+                return self._moves.move(command, basis.motion)
+            case c.SetShaper():
+                return filters.choose(command.name, command.modes, on.source, on.declared, "name")
+            case c.SetEstimator():
+                return filters.estimate(command, on)
+            case c.SetPayload():
+                return filters.with_payload(payload_of(command), on)
+            case c.SimulationReset() if command.shaper is not None:
+                return filters.choose(command.shaper, 1, on.source, on.declared)
+        return None

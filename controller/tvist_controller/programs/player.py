@@ -1,0 +1,160 @@
+"""The program that is loaded, and how far it is."""
+
+from collections.abc import Callable
+
+from tvist_controller.command_row import Call, Row
+from tvist_controller.events import Emit
+from tvist_controller.motion import MotionControl
+from tvist_controller.programs.built_in import Move, built_in
+from tvist_controller.refusal import RefusalError
+from tvist_controller.safety_control import SafetyControl
+from tvist_plant.description import RobotDescription
+from tvist_protocol.commands import MoveJ
+from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramState, ProgramStop
+from tvist_protocol.stream import Event
+from tvist_protocol.transitions import Activity
+
+_OWN_TOKEN = "program"  # noqa: S105  the lease was checked when the program was played
+"""Stands in the commands that a program makes, which are sent to nobody."""
+
+
+class ProgramPlayer:
+    """Carries out one program at a time, a line after the other, with the authority of whoever played it.
+
+    Its motions are motions like any other: they have numbers and events, a client may pause them, and a stop of one
+    ends the program. A protective stop pauses the program: once it is unlocked, playing goes on with the line that
+    was stopped.
+
+    Args:
+        description: The robot.
+        motion: What the robot is doing.
+        safety: What its safety system does.
+        move: Plans and starts a motion, and gives its number; raises `RefusalError`.
+        emit: Takes what happens.
+    """
+
+    def __init__(
+        self,
+        description: RobotDescription,
+        motion: MotionControl,
+        safety: SafetyControl,
+        move: Callable[[MoveJ], int],
+        emit: Emit,
+    ) -> None:
+        self._motion, self._safety, self._move, self._emit = motion, safety, move, emit
+        self.known = built_in(description)
+        """What can be loaded, by name."""
+        self.name: str | None = None
+        """The loaded program; None: none."""
+        self.state: ProgramState = "STOPPED"
+        self._next = 0
+        """Number of the line that is carried out, or comes next, from 0."""
+        self._moving: int | None = None
+        """Number of the motion of that line."""
+        self.rows = (
+            Row(ProgramLoad, self._load, lease="if named", changes_io=True),
+            Row(ProgramPlay, self._play, changes_io=True),
+            Row(ProgramPause, self._pause, changes_io=True),
+            Row(ProgramStop, self._stop, lease="if named", changes_io=True),
+        )
+
+    @property
+    def line(self) -> int:
+        """The line that is carried out, or comes next when it is played on, counted from 1; 0: none."""
+        return 0 if self.state == "STOPPED" or self._next >= len(self._lines) else self._next + 1
+
+    def advance(self) -> bool:
+        """Begin the line that comes next, where it is its turn: first thing in every tick.
+
+        Returns:
+            Whether the state or the line has changed.
+        """
+        if self.state == "STOPPED":
+            return False
+        lines = self._lines
+        # Between two lines a safeguard stop finds no motion to pause: the next line waits.
+        waits = self.state == "PAUSED" or self._motion.safety.safeguard
+        if waits or self._moving is not None or not lines:
+            return False
+        if self._next == len(lines):
+            self.end()
+            return True
+        line = lines[self._next]
+        try:
+            self._moving = self._move(MoveJ(token=_OWN_TOKEN, q=line.q))
+        except RefusalError as refusal:
+            why = f"move to {line.pose} was refused: {refusal.reply.why}"
+            self._emit("warning", code=refusal.reply.code, why=why, line=self._next + 1)
+            self.end()
+            return True
+        return False
+
+    def hear(self, event: Event) -> bool:
+        """Take note of what has happened to the robot; whether that has changed the state or the line."""
+        before = self.state, self._next
+        if event.kind == "protective_stop" and self.state != "STOPPED":
+            self.state, self._moving = "PAUSED", None
+        elif event.kind == "safety_stop" and event.category != 2:
+            self.end()
+        elif event.id is not None and event.id == self._moving:
+            if event.kind == "motion_done":
+                self._moving = None
+                self._next += 1
+            elif (
+                event.kind == "motion_stopped" and event.code != "plant_failure"
+            ):  # a protective stop follows that
+                self.end()
+        return (self.state, self._next) != before
+
+    def end(self) -> bool:
+        """End the program; what moves is left to others.
+
+        Returns:
+            Whether one was playing or paused.
+        """
+        before, self.state, self._next, self._moving = self.state, "STOPPED", 0, None
+        return before != "STOPPED"
+
+    def stop_moving(self) -> None:
+        """End a program that moves the arm, also where its next motion has not begun: none begins after a stop."""
+        if self.state == "PLAYING" and self._lines:
+            self.end()
+
+    @property
+    def _lines(self) -> tuple[Move, ...]:
+        return self.known.get(self.name or "", ())
+
+    def _load(self, call: Call[ProgramLoad]) -> None:
+        name = call.command.name
+        if name not in self.known:
+            why = f"name is {name!r}: the programs are {', '.join(sorted(self.known))}"
+            raise RefusalError("out_of_range", "name", why)
+        if self.state != "STOPPED":
+            self.end()
+            self._motion.stop(None, "another program was loaded")
+        self.name = name
+
+    def _play(self, _: Call[ProgramPlay]) -> None:
+        if self.name is None:
+            raise RefusalError("wrong_mode", "", "no program is loaded: send program.load first")
+        if self.state == "PLAYING":
+            raise RefusalError("busy", "", f"program {self.name} is playing")
+        if self.state == "PAUSED" and self._moving is not None:
+            if self._motion.activity is Activity.PAUSED:
+                self._motion.resume()
+        else:
+            self._motion.check_move()
+        self.state = "PLAYING"
+
+    def _pause(self, _: Call[ProgramPause]) -> None:
+        if self.state != "PLAYING":
+            raise RefusalError("wrong_mode", "", "no program is playing: there is nothing to pause")
+        # Between two lines nothing of the program moves: the next line then waits.
+        if self._moving is not None:
+            self._motion.pause()
+            self._safety.stay_paused()
+        self.state = "PAUSED"
+
+    def _stop(self, _: Call[ProgramStop]) -> None:
+        self.end()
+        self._motion.stop(None, "the program was stopped")

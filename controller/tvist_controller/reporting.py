@@ -1,0 +1,117 @@
+"""What went along the line in a tick, as the messages that clients get."""
+
+from tvist_controller.control.kinematics import ForwardKinematics, rotation_vector
+from tvist_controller.cycle import Sample
+from tvist_plant.description import RobotDescription
+from tvist_plant.plant import PERIOD, Modal, Plant
+from tvist_plant.plant import Truth as PlantTruth
+from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_protocol.stream import State, Truth
+from tvist_shaping.base import Filter
+
+TRUE_MODES_EVERY = 50
+"""Ticks between two computations of the arm's true modes: an eigenvalue problem takes a good part of one."""
+
+
+class Reporter:
+    """Makes states and truths.
+
+    Args:
+        description: The robot.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self._joints = description.joints
+        self._kinematics = ForwardKinematics(description)
+        self._true_modes: dict[str, list[float]] = {}
+
+    def state(
+        self,
+        tick: int,
+        sample: Sample,
+        tvist: Filter,
+        *,
+        robot_mode: RobotMode,
+        safety_mode: SafetyMode,
+        runtime: RuntimeState,
+        speed: float,
+        setpoint_sequence: int | None,
+        missed_ticks: int,
+    ) -> State:
+        """The state of a tick."""
+        target, measured = sample.target, sample.measured
+        pose, tool_speed = self._kinematics.tool(measured.q, measured.qd)
+        return State(
+            tick=tick,
+            timestamp=tick * PERIOD,
+            robot_mode=robot_mode.value,
+            safety_mode=safety_mode.value,
+            runtime_state=runtime.value,
+            setpoint_sequence=setpoint_sequence,
+            reference_q=sample.reference.tolist(),
+            target_q=target.q.tolist(),
+            target_qd=target.qd.tolist(),
+            target_qdd=target.qdd.tolist(),
+            target_moment=sample.torque.tolist(),
+            actual_q=measured.q.tolist(),
+            actual_qd=measured.qd.tolist(),
+            actual_moment=measured.moment.tolist(),
+            actual_TCP_pose=pose,
+            actual_TCP_speed=tool_speed,
+            actual_tool_accelerometer=measured.accelerometer.tolist(),
+            speed_scaling=speed,
+            estimated_f_d=tvist.f_d.tolist(),
+            estimated_zeta=tvist.zeta.tolist(),
+            shaper_delay=tvist.delay,
+            missed_ticks=missed_ticks,
+            shaper_clipped=tvist.clipped,
+        )
+
+    def set_tcp(self, offset: tuple[float, ...]) -> None:
+        """Say where the tool centre point is in the flange frame: x y z [m] and rotation vector [rad]."""
+        self._kinematics.set_tool(offset)
+
+    def truth(self, tick: int, plant: Plant) -> Truth:
+        """What no robot can know of itself after a tick.
+
+        Its modes are computed now and then, and are empty lists where the plant does not know them.
+
+        Raises:
+            ValueError: The plant does not know the truth.
+        """
+        if not self._true_modes or tick % TRUE_MODES_EVERY == 0:
+            modes = plant.modes() if isinstance(plant, Modal) else None
+            self._true_modes = {
+                name: [] if modes is None else getattr(modes, name)[: self._joints].tolist()
+                for name in ("f_d", "zeta", "participation")
+            }
+        truth = truth_of(plant)
+        return Truth(
+            tick=tick,
+            timestamp=tick * PERIOD,
+            motor_q=truth.motor_q.tolist(),
+            motor_qd=truth.motor_qd.tolist(),
+            gear_deflection=truth.gear_deflection.tolist(),
+            link_deflection=truth.link_deflection.tolist(),
+            flange_pose=truth.flange_position.tolist() + rotation_vector(truth.flange_rotation),
+            tool_acceleration=truth.specific_force.tolist(),
+            **self._true_modes,
+        )
+
+    def forget_modes(self) -> None:
+        """The arm was put elsewhere: compute its modes anew."""
+        self._true_modes = {}
+
+
+def truth_of(plant: Plant) -> PlantTruth:
+    """What no robot can know, from a plant that does.
+
+    Raises:
+        ValueError: The plant does not know it.
+    """
+    truth = plant.truth()
+    if truth is None:
+        raise ValueError(
+            f"truth is on, and plant {type(plant).__name__} does not know the truth: turn it off"
+        )
+    return truth

@@ -1,0 +1,183 @@
+"""What the arm may do: positions, velocities, accelerations, torques."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from tvist_controller.control.differentiator import Floats, Target, central_differences
+from tvist_controller.control.inverse_dynamics import InverseDynamics
+from tvist_controller.trajectory import Path, PathStop, Stop
+from tvist_plant.description import RobotDescription
+
+TORQUE_SHARE = 0.9
+"""Share of the joints' torque that a stop or a stream may ask for [-]."""
+REBOUND = 1.0
+"""How far a flexible arm's torque swings beyond a sudden change of the rigid arm's, against that change [-]: as far
+again without damping. A stop bypasses the filter, so its change is sudden."""
+GENTLEST_STOP = 1.0
+"""Deceleration below which no stop goes: neither for torque, nor because a client wants it [rad/s^2]."""
+
+MOMENTS = 32
+"""Of a stop at which its torque is looked at."""
+_SHARES = np.arange(1, MOMENTS + 1) / MOMENTS
+LOOK_EVERY = 4
+"""Ticks between two looks at the torque of references that are known."""
+REDUCED_SHARE = 0.25
+"""Share of the joints' velocity that is left while the safety system reduces it [-]."""
+
+
+class TorqueRoom:
+    """What the joints' torques, less what gravity and velocities take, leave to a stream's accelerations.
+
+    Args:
+        description: The robot.
+        dynamics: Its inverse dynamics with the declared payload.
+    """
+
+    def __init__(self, description: RobotDescription, dynamics: InverseDynamics) -> None:
+        self._most = TORQUE_SHARE * np.array(description.limits.torque)
+        self._dynamics = dynamics
+
+    def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
+        """Whether a state of motion keeps every torque within its share, or is as gentle as any stop."""
+        if (self._dynamics.effort(q, qd, qdd) <= self._most).all():
+            return True
+        return bool(np.abs(qdd).max() <= GENTLEST_STOP)
+
+    def acceleration(self, q: Floats, qd: Floats) -> float:
+        """Largest a for which every q̈ with |q̈ᵢ| ≤ a keeps the torques within their share [rad/s^2].
+
+        With τ = M q̈ + h, the most that such a q̈ asks of joint i is |hᵢ| + a Σⱼ|Mᵢⱼ|. No less than the gentlest stop.
+        """
+        left = self._most - self._dynamics.effort(q, qd, np.zeros_like(q))
+        return max(float((left / np.abs(self._dynamics.inertia(q)).sum(axis=1)).min()), GENTLEST_STOP)
+
+
+class StopTorque:
+    """What a stop may ask of the joints' torques.
+
+    Every torque of the rigid arm along the stop stays within its share of the limit. Where the motion itself would take
+    more if it were not stopped, the stop may, too.
+
+    Args:
+        dynamics: Inverse dynamics with the declared payload.
+        state: Where the stop begins.
+        limits: Of the joints' torque, shape (n,) [N m].
+        asked: Largest that the motion itself would ask from now on, shape (n,) [N m]; None: what it asks now.
+    """
+
+    def __init__(
+        self, dynamics: InverseDynamics, state: Target, limits: Floats, asked: Floats | None = None
+    ) -> None:
+        self._dynamics = dynamics
+        if asked is None:
+            asked = dynamics.effort(state.q, state.qd, state.qdd)
+        self._share, self._most = np.maximum(TORQUE_SHARE * limits, asked), np.maximum(limits, asked)
+        self._before = dynamics.torque(state.q, state.qd, state.qdd) - dynamics.gravity(state.q)
+
+    def holds(self, stop: Stop | PathStop, *, rebound: bool = True) -> bool:
+        """Whether a stop keeps to it.
+
+        The very start is what the motion already asks for: only what follows is the stop's own doing. Thirty-two
+        moments, since torque peaks where a joint's ramp ends: nine in ten of the stops that ask for too much do so
+        where the whole stop's ramp ends, so that moment is looked at first.
+
+        Args:
+            stop: The stop.
+            rebound: Whether the limits themselves must hold for what the flexible arm swings beyond the rigid one, at
+                both ends of the stop.
+        """
+        ramp = stop.acceleration / stop.jerk
+        ends = min(math.ceil(ramp / stop.duration * MOMENTS), MOMENTS) if stop.duration > 0.0 else MOMENTS
+        times = _SHARES * stop.duration
+        return self._holds(stop, times[ends - 1 : ends], rebound=rebound) and self._holds(
+            stop, times, rebound=rebound
+        )
+
+    def _holds(self, stop: Stop | PathStop, times: Floats, *, rebound: bool) -> bool:
+        dynamics = self._dynamics
+        q, qd, qdd = stop.states(times)
+        torque = dynamics.torques(q, qd, qdd)
+        effort = np.abs(torque)
+        if dynamics.changing:
+            effort = np.array([dynamics.effort(*state) for state in zip(q, qd, qdd, strict=True)])
+        if (effort > self._share).any():
+            return False
+        if not rebound:
+            return True
+        gravity = dynamics.gravities(q)
+        motion = torque - gravity
+        begun = np.abs(torque + REBOUND * (motion - self._before))
+        ended = np.abs(gravity - REBOUND * motion)
+        return bool((np.maximum(begun, ended) <= self._most).all())
+
+
+def largest_torque(dynamics: InverseDynamics, path: Path, velocity: float, acceleration: float) -> Floats:
+    """Upper bound of the torques of a motion along a path, whatever its profile, shape (n,) [N m].
+
+    Along q(x) the torque is m(x) ẍ + c(x) ẋ² + g(x): it is largest at one of the corners of the range of ẋ² and ẍ.
+    Seventeen places on the way are looked at.
+
+    Args:
+        dynamics: Inverse dynamics with the declared payload.
+        path: Where it goes.
+        velocity: Limit for the path's parameter [rad/s].
+        acceleration: Likewise [rad/s^2].
+    """
+    most = np.zeros(len(path.posture(path.start)))
+    way = path.end - path.start
+    for resting, pushed in _on_way(dynamics, path, path.start, way, velocity, acceleration):
+        most = np.maximum(most, resting + acceleration * pushed)
+    return most
+
+
+def acceleration_on_way(
+    dynamics: InverseDynamics, path: Path, start: Floats, way: Floats, velocity: float, limits: Floats
+) -> float:
+    """Largest acceleration of a path's parameter with which torques stay within their share [rad/s^2].
+
+    Args:
+        dynamics: Inverse dynamics with the declared payload.
+        path: Where the motion goes.
+        start: Parameter where it is looked at first, shape (m,) [rad].
+        way: From there to where it is looked at last, shape (m,) [rad].
+        velocity: Largest there [rad/s].
+        limits: Of the joints' torque, shape (n,) [N m].
+    """
+    room = math.inf
+    for resting, pushed in _on_way(dynamics, path, start, way, velocity, math.inf):
+        room = min(room, float(((TORQUE_SHARE * limits - resting) / np.maximum(pushed, 1e-9)).min()))
+    return max(room, 0.0)
+
+
+def _on_way(
+    dynamics: InverseDynamics, path: Path, start: Floats, way: Floats, velocity: float, acceleration: float
+) -> Iterator[tuple[Floats, Floats]]:
+    """Torques at places on a path: without acceleration, and more for each rad/s^2 of the parameter [N m]."""
+    farthest, still = float(np.abs(way).max()), np.zeros_like(start)
+    along = way / farthest if farthest > 0.0 else still
+    speed = min(velocity, math.sqrt(acceleration * farthest)) * along
+    for share in np.linspace(0.0, 1.0, 17):
+        x = start + share * way
+        q = path.posture(x)
+        gravity = dynamics.gravity(q)
+        resting = np.maximum(np.abs(gravity), np.abs(dynamics.torque(*path.states(x, speed, still))))
+        yield resting, np.abs(dynamics.torque(*path.states(x, still, along)) - gravity)
+
+
+def torque_along(dynamics: InverseDynamics, references: Floats, period: float) -> Floats:
+    """Largest torques of references that are known, by central differences, shape (n,) [N m].
+
+    Every `LOOK_EVERY`th is looked at, and the last.
+
+    Args:
+        dynamics: Inverse dynamics with the declared payload.
+        references: One a tick, shape (k, n) [rad], k >= 3.
+        period: Tick [s].
+    """
+    q, qd, qdd = central_differences(references, period)
+    looked = np.append(np.arange(0, len(q) - 1, LOOK_EVERY), len(q) - 1)
+    states = zip(q[looked], qd[looked], qdd[looked], strict=True)
+    most: Floats = np.max([dynamics.effort(*state) for state in states], axis=0)
+    return most

@@ -1,0 +1,83 @@
+"""What the safety system allows: inputs that ask for less, and what stays until it is restarted."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from tvist_controller.refusal import RefusalError
+from tvist_protocol.modes import SafetyMode
+from tvist_protocol.transitions import Activity
+
+Emergency = Literal["robot", "system"]
+Latched = Literal["violation", "fault"]
+
+_EMERGENCIES = {
+    "robot": SafetyMode.ROBOT_EMERGENCY_STOP,
+    "system": SafetyMode.SYSTEM_EMERGENCY_STOP,
+}
+_LATCHED = {"violation": SafetyMode.VIOLATION, "fault": SafetyMode.FAULT}
+_MOTION = frozenset({"move_j", "servo_start", "resume"})
+_LIVE = frozenset({*_MOTION, "power_on", "power", "unlock_protective_stop"})
+
+
+@dataclass
+class SafetySystem:
+    """Its inputs, and what it has found. Any of these can be on beside whatever the robot is doing."""
+
+    reduced: bool = False
+    """Whether the speed is reduced."""
+    safeguard: bool = False
+    """Whether a safeguard asks for a stop."""
+    emergencies: set[Emergency] = field(default_factory=set)
+    """Whose emergency stops are pressed."""
+    latched: Latched | None = None
+    """What it has found wrong, until it is restarted."""
+
+    def mode(self, activity: Activity) -> SafetyMode:
+        """The gravest of what holds, as RTDE numbers it.
+
+        Args:
+            activity: What the robot is doing.
+        """
+        if self.latched is not None:
+            return _LATCHED[self.latched]
+        if self.emergencies:
+            return _EMERGENCIES["robot" if "robot" in self.emergencies else "system"]
+        if self.safeguard and not activity.protective:
+            return SafetyMode.SAFEGUARD_STOP
+        return activity.safety_mode(reduced=self.reduced)
+
+    def check(self, trigger: str, activity: Activity) -> None:
+        """Refuse what it does not allow.
+
+        Args:
+            trigger: A command's `type`.
+            activity: What the robot is doing.
+
+        Raises:
+            RefusalError: It is that.
+        """
+        mode = self.mode(activity)
+        if trigger in _LIVE and self.latched is not None:
+            raise RefusalError("wrong_mode", "", f"safety_mode is {mode.name}: send restart_safety first")
+        if trigger in _LIVE and self.emergencies:
+            why = f"safety_mode is {mode.name}: release the emergency stop first"
+            raise RefusalError("wrong_mode", "", why)
+        if trigger in _MOTION and self.safeguard:
+            why = f"safety_mode is {mode.name}: release the safeguard stop first"
+            raise RefusalError("wrong_mode", "", why)
+
+    def clear(self) -> None:
+        """Release safeguard and emergency stops, and forget what was found; the speed stays reduced where it is."""
+        self.safeguard, self.latched = False, None
+        self.emergencies.clear()
+
+    def restart(self) -> None:
+        """Forget what it has found.
+
+        Raises:
+            RefusalError: Nothing.
+        """
+        if self.latched is None:
+            why = "the safety system has found nothing wrong: there is nothing to restart it for"
+            raise RefusalError("wrong_mode", "", why)
+        self.latched = None

@@ -1,0 +1,166 @@
+"""How a controller starts: everything that decides what it will do, besides what clients send."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import msgspec
+
+from tvist_controller.mode_source import ModeSource, first_source
+from tvist_controller.own_shapers import OwnShaper
+from tvist_plant.description import Payload as Body
+from tvist_plant.description import RobotDescription, is_real_body
+from tvist_protocol.calibration import Calibration, calibration_of
+from tvist_protocol.content import checked
+from tvist_protocol.errors import ProtocolError
+from tvist_protocol.info import Clock
+from tvist_protocol.values import Payload, ResetMode
+from tvist_shaping.estimators.base import Estimator
+from tvist_shaping.named import Registry
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Start of a controller."""
+
+    description: RobotDescription
+    """The robot."""
+    q: tuple[float, ...]
+    """Where the arm rests [rad]."""
+    payload: Payload
+    """Declared."""
+    calibration: Calibration | None
+    """Of the estimator; None: it is `fixed` at 10 Hz and 0.2, for a robot to be identified."""
+    name: str = "ur5e"
+    """Name of the robot on the network."""
+    shaper: str = "zv"
+    """Name of the shaper."""
+    seed: int = 0
+    """Of sensor noise and gear errors."""
+    clock: Clock = "realtime"
+    """Who lets time pass. Only in real time do leases and streams time out."""
+    carried: Payload | None = None
+    """Carried until a client says otherwise; None: what is declared."""
+    mode: ResetMode = "RUNNING"
+    """Robot mode to start in."""
+    truth: bool = False
+    """Whether to tell what no robot can know."""
+    own_shapers: tuple[OwnShaper, ...] = ()
+    """Shapers from files, which go by their names beside those that come with the package."""
+
+    @cached_property
+    def registry(self) -> Registry:
+        """The shapers that this robot can use.
+
+        Raises:
+            DesignError: Two go by one name.
+        """
+        return Registry(own.shaper for own in self.own_shapers)
+
+    def check(self) -> None:
+        """Check what types cannot.
+
+        Raises:
+            ValueError: A value is out of range; the sentence names it.
+        """
+        joints = self.description.joints
+        if len(self.q) != joints:
+            model = self.description.robot.model
+            raise ValueError(f"start has {len(self.q)} angles; {model} has {joints} joints")
+        for number, (angle, limit) in enumerate(zip(self.q, self.description.limits.position, strict=True)):
+            if not abs(angle) <= limit:
+                raise ValueError(f"start q[{number}] is {angle}: must be within ±{limit} rad")
+        if self.carried is not None and not is_real_body(self.carried.inertia):
+            inertia = list(self.carried.inertia)
+            raise ValueError(f"payload.inertia is {inertia}: no body has these moments of inertia")
+        self.registry.check(self.shaper)
+
+    def source(self) -> ModeSource:
+        """Where modes come from to begin with."""
+        return first_source(self.description, self.calibration)
+
+    def estimator(self) -> Estimator:
+        """The lowest mode, to begin with."""
+        return self.source().estimator(1, self.payload)
+
+    def to_builtins(self) -> dict[str, Any]:
+        """As maps and lists, for a recording."""
+        return {
+            "description": msgspec.to_builtins(self.description),
+            "q": list(self.q),
+            "payload": msgspec.to_builtins(self.payload),
+            "carried": msgspec.to_builtins(self.carried),
+            "mode": self.mode,
+            "calibration": msgspec.to_builtins(self.calibration),
+            "name": self.name,
+            "shaper": self.shaper,
+            "seed": self.seed,
+            "clock": self.clock,
+            "truth": self.truth,
+            "own_shapers": [msgspec.to_builtins(own.recorded) for own in self.own_shapers],
+        }
+
+    @classmethod
+    def from_builtins(cls, content: dict[str, Any], own_shapers: Sequence[OwnShaper] = ()) -> "Setup":
+        """From a recording.
+
+        Args:
+            content: What `to_builtins` gave.
+            own_shapers: The shapers from files that it names, loaded again.
+
+        Raises:
+            ValueError: A part is missing or wrong.
+        """
+        try:
+            calibration = content["calibration"]
+            return replace(
+                cls(
+                    description=checked(content["description"], RobotDescription),
+                    q=tuple(map(float, content["q"])),
+                    payload=checked(content["payload"], Payload),
+                    carried=None if content["carried"] is None else checked(content["carried"], Payload),
+                    mode=msgspec.convert(content["mode"], ResetMode),
+                    calibration=None if calibration is None else calibration_of(calibration),
+                    own_shapers=tuple(own_shapers),
+                ),
+                **{key: content[key] for key in ("name", "shaper", "seed", "clock", "truth")},
+            )
+        except KeyError as error:
+            raise ValueError(f"start of the recording: {error.args[0]} is missing") from error
+        except TypeError as error:
+            raise ValueError(f"start of the recording: {error}") from error
+        except ProtocolError as error:
+            raise ValueError(f"start of the recording: {error.why}") from error
+
+
+def body(payload: Payload) -> Body:
+    """A payload of the wire as the plant takes it."""
+    return Body(mass=payload.mass, com=payload.com, inertia=payload.inertia)
+
+
+def paper_payload(description: RobotDescription, mass: float | None = None) -> Payload:
+    """The robot file's payload, its mass and inertia scaled to another mass [kg]."""
+    own = description.payload
+    xx, xy, xz, yy, yz, zz = own.inertia
+    share = 1.0 if mass is None or own.mass == 0.0 else mass / own.mass
+    return Payload(
+        mass=own.mass * share if mass is None or own.mass else mass,
+        com=own.com,
+        inertia=(xx * share, xy * share, xz * share, yy * share, yz * share, zz * share),
+    )
+
+
+def check_rating(declared: Payload, description: RobotDescription) -> None:
+    """Check that a robot is rated for what it starts with, as `set_payload` does later.
+
+    It is what is declared that counts: what the arm carries besides may be anything, to try what happens then.
+
+    Raises:
+        ValueError: The payload is too heavy.
+    """
+    rated = description.limits.payload
+    if declared.mass > rated:
+        raise ValueError(
+            f"payload is {declared.mass:g} kg, above the {description.robot.name}'s rating of {rated:g} kg"
+        )

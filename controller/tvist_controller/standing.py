@@ -1,0 +1,28 @@
+"""What others than its own thread may know of a controller."""
+
+from typing import NamedTuple
+
+from tvist_controller.planning.basis import Basis
+from tvist_controller.session import Lease
+from tvist_controller.stepping import ClockHold
+
+
+class Standing(NamedTuple):
+    """Of a controller, between two ticks; a new one takes its place, so that any thread may read it."""
+
+    lease: Lease | None
+    """Who has control."""
+    basis: Basis
+    """What plans for commands depend on."""
+    clock: ClockHold | None
+    """Who holds the clock."""
+
+    def sessions_of(self, client: str) -> set[str | None]:
+        """Sessions with whose going a client loses control or the clock; empty where it has neither."""
+        rights = (self.lease, self.clock)
+        return {right.session for right in rights if right is not None and right.client == client}
+
+    @property
+    def may_move(self) -> bool:
+        """Whether a point-to-point motion may begin."""
+        return self.basis.motion is not None

@@ -1,0 +1,32 @@
+"""Where references come from: planned motions along paths, streams of set-points, stops."""
+
+from tvist_controller.trajectory.base import Forecast, Rest, Trajectory
+from tvist_controller.trajectory.curve import Bends, Curve
+from tvist_controller.trajectory.double_s import DoubleS
+from tvist_controller.trajectory.known import Known
+from tvist_controller.trajectory.limits import Limits
+from tvist_controller.trajectory.motion import Motion, quickest_motion
+from tvist_controller.trajectory.path import JointLine, Path, Posture, Way
+from tvist_controller.trajectory.path_stop import PathStop
+from tvist_controller.trajectory.stop import Stop
+from tvist_controller.trajectory.stream import SetpointStream
+
+__all__ = [
+    "Bends",
+    "Curve",
+    "DoubleS",
+    "Forecast",
+    "JointLine",
+    "Known",
+    "Limits",
+    "Motion",
+    "Path",
+    "PathStop",
+    "Posture",
+    "Rest",
+    "SetpointStream",
+    "Stop",
+    "Trajectory",
+    "Way",
+    "quickest_motion",
+]

@@ -1,0 +1,284 @@
+"""Keep a stream inside limits of velocity, acceleration, jerk and torque; leave it untouched where it already is."""
+
+import math
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+import ruckig
+
+from tvist_controller.trajectory.limits import Floats, Limits
+
+Bools = npt.NDArray[np.bool_]
+
+
+class TorqueRoom(Protocol):
+    """What the joints' torques leave to a motion."""
+
+    def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
+        """Whether a state of motion needs no more torque than there is."""
+
+    def acceleration(self, q: Floats, qd: Floats) -> float:
+        """Largest acceleration that every joint may have at once, in any direction [rad/s^2]."""
+
+
+class Limiter:
+    """Follows a position signal exactly while that is within the limits; catches up time-optimally otherwise.
+
+    Limits hold for the reference's first, second and third differences. A signal within them passes to the bit:
+    differences of a sampled motion are means of its derivatives, so what keeps the limits in continuous time keeps
+    them here. What would be fast enough to pass the velocity limit while its acceleration is taken back at the jerk
+    limit counts as too fast already; and one that could not come to rest inside the joint's range as too far.
+
+    Each joint by itself. A joint that is behind moves relative to the signal: to where that is, at the velocity
+    and acceleration it has there, so that a signal in motion is caught up with, too.
+
+    Args:
+        q: Position at rest to start from, shape (n,) [rad].
+        limits: For every joint.
+        period: Tick [s].
+        reach: Joints' range either way, shape (n,) [rad]; None for no end.
+        torque: What torque leaves; None for enough.
+    """
+
+    TOLERANCE = 1e-6
+    """Share of a limit that rounding may exceed [-]."""
+    ROUNDING = 2e-15
+    """Error of a position's differences by the rounding of positions [rad]."""
+    ADVANTAGE = 0.001
+    """Share of the velocity limit by which one that is behind may always be faster than what it follows [-]."""
+    NEAR = 1e-4
+    """Way by which a signal that brakes may be overshot in any case [rad]."""
+    HOPELESS = 0.95
+    """Share of a limit above which a signal is as good as at it [-]."""
+    AUTHORITY = 0.001
+    """Share of the acceleration limit that is always left for catching up [-]."""
+
+    def __init__(
+        self,
+        q: Floats,
+        limits: Limits,
+        period: float,
+        *,
+        reach: Floats | None = None,
+        torque: TorqueRoom | None = None,
+    ) -> None:
+        n = len(q)
+        self._limits, self._period = limits, period
+        self._reach = np.full(n, np.inf) if reach is None else np.array(reach, dtype=float)
+        self._torque = torque
+        self.q = np.array(q, dtype=float)
+        """Where the reference is, shape (n,) [rad]."""
+        # Velocity of the signal; differences of the reference, first, second, and second of the tick before.
+        self._signal_qd, self._step, self._bend, self._bend_before = np.zeros((4, n))
+        self._state: Floats | None = None  # derivatives, where they are not those of the differences
+        self._behind = np.zeros(n, dtype=bool)
+        self.behind = 0.0
+        """Time by which joints are behind a signal that itself leaves nothing to catch up with [s]."""
+        # Inside this no state within the limits needs a look at the range.
+        ramp, swing = limits.acceleration / limits.jerk, limits.velocity / limits.acceleration
+        lasting = max(swing + ramp, 2.0 * math.sqrt(limits.velocity / limits.jerk))
+        self._inner = float(self._reach.min()) - 2.0 * limits.velocity * (ramp + lasting)
+        room = 1.0 + self.TOLERANCE
+        self._most = (
+            room * limits.velocity * period + self.ROUNDING,
+            room * limits.acceleration * period**2 + 2.0 * self.ROUNDING,
+            room * limits.jerk * period**3 + 4.0 * self.ROUNDING,
+        )
+        self._catcher, self._brake = ruckig.Ruckig(n, period), ruckig.Ruckig(n, period)
+        self._catch_request, self._brake_request = ruckig.InputParameter(n), ruckig.InputParameter(n)
+        self._brake_request.control_interface = ruckig.ControlInterface.Velocity
+        for request in (self._catch_request, self._brake_request):
+            request.target_position = request.target_velocity = request.target_acceleration = [0.0] * n
+            request.max_jerk = [limits.jerk] * n
+            request.synchronization = ruckig.Synchronization.No
+
+    @property
+    def limited(self) -> bool:
+        """Whether the reference is not where the signal is."""
+        return bool(self._behind.any())
+
+    def follow(self, q: Floats, qd: Floats) -> Floats:
+        """One tick towards a position that itself moves.
+
+        Args:
+            q: Where the signal is, shape (n,) [rad].
+            qd: How fast it moves there, shape (n,) [rad/s].
+
+        Returns:
+            Where the reference is, shape (n,) [rad].
+        """
+        step = q - self.q
+        bend = step - self._step
+        fits = self._fits(step, bend)
+        if self._behind.any():
+            fits &= ~self._behind | self._meets(qd, step, bend)
+        near = np.abs(q).max() > self._inner
+        if near:
+            fits &= self._stoppable(*self._passed(q, step, bend))
+        self.behind = 0.0
+        if fits.all() and self._allowed(q, step, bend):
+            self._state = None
+        else:
+            self._state, fits = self._held_back(q, qd, self._passed(q, step, bend), fits)
+            q = self._state[0]
+            step = q - self.q
+            bend = step - self._step
+        self._behind = ~fits
+        self._signal_qd, self._step = qd, step
+        self._bend, self._bend_before = bend, self._bend
+        self.q = q
+        return q
+
+    @property
+    def state(self) -> tuple[Floats, Floats, Floats]:
+        """Position, velocity and acceleration of the reference, each of shape (n,)."""
+        if self._state is None:
+            self._state = self._passed(self.q, self._step, self._bend, self._bend_before)
+        q, qd, qdd = self._state
+        return q, qd, qdd
+
+    def _allowed(self, q: Floats, step: Floats, bend: Floats) -> bool:
+        h = self._period
+        return self._torque is None or self._torque.allows(q, step / h, bend / (h * h))
+
+    def _passed(self, q: Floats, step: Floats, bend: Floats, bend_before: Floats | None = None) -> Floats:
+        """State, shape (3, n), on the signal: derivatives of the cubic through the last four positions."""
+        h, limit = self._period, self._limits.acceleration
+        change = bend - (self._bend if bend_before is None else bend_before)
+        mean = bend / (h * h)
+        # The acceleration's mean was within the limit; where it has got to by now is within it, too.
+        qdd = np.clip(mean + change / (h * h), np.minimum(mean, -limit), np.maximum(mean, limit))
+        return np.stack((q, step / h + h * (mean / 6.0 + qdd / 3.0), qdd))
+
+    def _fits(self, step: Floats, bend: Floats) -> Bools:
+        """Which joints' differences are within the limits, and can stay so."""
+        fastest, hardest, harshest = self._most
+        size, turn = np.abs(step), np.abs(bend)
+        fits: Bools = size <= fastest
+        fits &= turn <= hardest
+        fits &= np.abs(bend - self._bend) <= harshest
+        jerk = self._limits.jerk * self._period**3
+        if (size + turn * turn * (0.5 / jerk)).max() > fastest:
+            # Velocity when the acceleration, less a tick's worth of jerk each tick, has come to nothing.
+            ticks = np.floor(turn / jerk)
+            towards = step * np.sign(bend) + ticks * (turn - 0.5 * jerk * (ticks + 1.0))
+            fits &= towards <= fastest + self.TOLERANCE * turn
+            # Where it still rises, the same from what it has come to by now: it goes on from there when held back.
+            rise = (bend - self._bend) * np.sign(bend)
+            now = turn + rise
+            reached = step * np.sign(bend) + turn / 6.0 + now / 3.0 + now * now * (0.5 / jerk)
+            fits &= (rise <= self.TOLERANCE * jerk + 4.0 * self.ROUNDING) | (reached <= fastest + 2.0 * turn)
+        return fits
+
+    def _meets(self, qd: Floats, step: Floats, bend: Floats) -> Bools:
+        """Which joints, put onto the signal now, can go on with it inside the limits."""
+        h, limits = self._period, self._limits
+        signal = self._signal_acceleration(qd, limits.acceleration)
+        following = (qd - step / h) / h + 0.5 * signal  # second difference at the next tick
+        meets: Bools = np.abs(following) <= limits.acceleration
+        meets &= np.abs(following - bend / (h * h)) <= limits.jerk * h
+        meets &= np.abs(following - signal) <= limits.jerk * h
+        return meets
+
+    def _stoppable(self, q: Floats, qd: Floats, qdd: Floats) -> Bools:
+        """Which joints can come to rest inside their range, two ticks spare."""
+        limits, jerk = self._limits, self._limits.jerk
+        sign = np.sign(qd)
+        speed, rise = np.abs(qd), sign * qdd
+        ramp = np.abs(rise) / jerk
+        # The shortest stop from no acceleration, and the way from there to here or from here to there.
+        top = speed + 0.5 * jerk * ramp**2
+        gentle = top < limits.acceleration**2 / jerk
+        swing = top / limits.acceleration + limits.acceleration / jerk
+        stop = top * np.where(gentle, np.sqrt(top / jerk), 0.5 * swing)
+        rising = speed * ramp + jerk * ramp**3 / 3.0
+        falling = top * ramp - jerk * ramp**3 / 6.0
+        way = stop + np.where(rise > 0.0, rising, -falling)
+        way = np.where((rise < 0.0) & (speed <= 0.5 * jerk * ramp**2), speed * ramp, way)
+        inside: Bools = sign * q + way + 2.0 * self._period * speed <= self._reach
+        inside |= sign * q <= sign * self.q
+        return inside
+
+    def _time_behind(self, q: Floats, qd: Floats, reference: Floats) -> float:
+        limits, speed = self._limits, np.abs(qd)
+        at_limit = np.abs(qd - self._signal_qd) > self.HOPELESS * limits.acceleration * self._period
+        at_limit |= speed > self.HOPELESS * limits.velocity
+        at_limit &= speed > (1.0 - self.HOPELESS) * limits.velocity
+        times = np.where(at_limit, (q - reference) * np.sign(qd), 0.0) / np.maximum(speed, 1e-9)
+        return float(times.max())
+
+    def _signal_acceleration(self, qd: Floats, limit: float) -> Floats:
+        most = (1.0 - self.AUTHORITY) * limit
+        clipped: Floats = np.clip((qd - self._signal_qd) / self._period, -most, most)
+        return clipped
+
+    def _held_back(self, q: Floats, qd: Floats, passed: Floats, fits: Bools) -> tuple[Floats, Bools]:
+        """State, shape (3, n), where not all that fits passes, and which joints do."""
+        limits, limit = self._limits, self._limits.acceleration
+        if self._torque is not None:
+            limit = min(limit, self._torque.acceleration(*self.state[:2]))
+        state = passed if fits.all() else np.where(fits, passed, self._catch_up(q, qd, limit, fits))
+        if self._torque is not None and not self._torque.allows(*state):
+            gentle = fits & (np.abs(passed[2]) <= limit)
+            if (gentle != fits).any():
+                fits = gentle
+                state = np.where(fits, passed, self._catch_up(q, qd, limit, fits))
+        sign = np.sign(state[2])
+        fast = sign * state[1] + state[2] ** 2 / (2.0 * limits.jerk) > limits.velocity
+        for astray, goal in (
+            (fast, sign * limits.velocity),
+            (~self._stoppable(*state), np.zeros_like(q)),
+        ):
+            held = astray & ~fits
+            if held.any():
+                state = np.where(held, self._change_to(goal, limit), state)
+        self.behind = self._time_behind(q, qd, state[0])
+        return state, fits
+
+    def _catch_up(self, q: Floats, qd: Floats, limit: float, fits: Bools) -> Floats:
+        """State, shape (3, n), after a tick of the way onto a signal that goes on with its acceleration."""
+        request, limits, h = self._catch_request, self._limits, self._period
+        fastest = (1.0 - self.ADVANTAGE) * limits.velocity
+        present = self.state
+        qdd = self._signal_acceleration(qd, limit)
+        qd = np.clip(qd, -fastest, fastest)
+        request.enabled = (~fits).tolist()
+        request.current_position = (present[0] - (q - h * (qd - 0.5 * h * qdd))).tolist()
+        request.current_velocity = (present[1] - (qd - h * qdd)).tolist()
+        request.current_acceleration = (present[2] - qdd).tolist()
+        # If the signal brakes as hard as it may, the way that is gained by then is no longer than that behind.
+        closing = (np.abs(q - self.q) + self.NEAR) * limits.acceleration / np.maximum(np.abs(qd), 1e-9)
+        request.max_velocity = np.minimum(limits.velocity - qd, closing).tolist()
+        request.min_velocity = np.maximum(-limits.velocity - qd, -closing).tolist()
+        request.max_acceleration = (limit - qdd).tolist()
+        request.min_acceleration = (-limit - qdd).tolist()
+        relative = _after_a_tick(self._catcher, request)
+        if relative is None:  # it would take more than 7600 s
+            return self._change_to(np.zeros_like(q), limit)
+        return np.stack((q, qd, qdd)) + relative
+
+    def _change_to(self, qd: Floats, limit: float) -> Floats:
+        """State, shape (3, n), after a tick of the shortest way to a velocity."""
+        request, h = self._brake_request, self._period
+        present = self.state
+        request.current_position, request.current_velocity = present[0].tolist(), present[1].tolist()
+        request.current_acceleration = present[2].tolist()
+        request.target_velocity, request.max_acceleration = qd.tolist(), [limit] * len(qd)
+        state = _after_a_tick(self._brake, request)
+        if state is None:
+            q, qd, qdd = present
+            state = np.stack((q + h * (qd + 0.5 * h * qdd), qd + h * qdd, qdd))
+        return state
+
+
+def _after_a_tick(generator: ruckig.Ruckig, request: ruckig.InputParameter) -> Floats | None:
+    """State, shape (3, n), one tick further; None where no way can be computed."""
+    result = ruckig.OutputParameter(request.degrees_of_freedom)
+    generator.reset()  # or it would take a state that has come back for one that it knows the future of
+    try:
+        if generator.update(request, result) < 0:
+            return None
+    except (ruckig.RuckigError, ValueError):
+        return None
+    return np.array((result.new_position, result.new_velocity, result.new_acceleration))

@@ -1,0 +1,212 @@
+"""Planned motions: a time law along a path, with a rate at which their time goes."""
+
+import copy
+from collections.abc import Iterator
+from typing import Protocol, Self
+
+import numpy as np
+
+from tvist_controller.trajectory.base import Forecast, Trajectory
+from tvist_controller.trajectory.double_s import DoubleS
+from tvist_controller.trajectory.limits import Floats, Limits
+from tvist_controller.trajectory.pace import Pace
+from tvist_controller.trajectory.path import Path
+
+LOOK_AHEAD = 2.0
+"""Ticks by which the path is looked ahead of when its pace changes."""
+
+LONGEST_LOOK = 1500
+"""Ticks for which a motion is compared with its pause: one that lasts longer is not about to end."""
+SOONER = 25
+"""Ticks by which a pause must be over sooner than the motion, to be worth it."""
+
+SURELY = 0.12
+"""So long before the motion brakes, and as much more as it lasts longer, a pause is sooner for certain [s]."""
+
+
+class TimeLaw(Protocol):
+    """How the parameter of a path goes in time, from rest at its start to rest at its end; it never turns back."""
+
+    limits: Limits
+    """What every entry of the parameter keeps."""
+    duration: float
+    """From rest to rest [s]."""
+    brakes_at: float
+    """Until then it does not slow down [s]."""
+
+    def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
+        """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], m numbers each."""
+
+
+class Motion(Trajectory):
+    """A planned motion from rest to rest.
+
+    Its samples are the path's parameter: of a straight joint line the joint positions.
+
+    Args:
+        path: Where it goes.
+        law: When it is where; from the path's start to its end.
+        period: Tick [s].
+        speed: Rate of its time against the clock's to start with [-].
+    """
+
+    path: Path
+    limits: Limits
+
+    def __init__(self, path: Path, law: TimeLaw, period: float, speed: float = 1.0) -> None:
+        self.path, self._law, self._period = path, law, period
+        self.limits = law.limits
+        self.duration = law.duration
+        """From rest to rest at full speed [s]."""
+        self.speed = speed
+        """Rate that its time is to go at, 0 to 1 [-]."""
+        self._pace = Pace(law.limits, period, speed)
+        # Time on the path: whole ticks at an even rate since the rate last changed, so that nothing adds up.
+        self._since, self._ticks = 0.0, 0
+
+    @property
+    def share(self) -> float:
+        """How much of its way is done, 0 to 1 [-]."""
+        return 1.0 if self.finished else self._share_at(self.time)
+
+    def time_at(self, share: float) -> float:
+        """When a share of the way, 0 to 1, is behind it at full speed [s]."""
+        early, late = 0.0, self.duration
+        for _ in range(40):
+            middle = 0.5 * (early + late)
+            early, late = (middle, late) if self._share_at(middle) < share else (early, middle)
+        return late
+
+    def _share_at(self, time: float) -> float:
+        (start, *_), (now, *_), (end, *_) = (self._law.at(moment) for moment in (0.0, time, self.duration))
+        leading = self.path.leading
+        way = end[leading] - start[leading]
+        return (now[leading] - start[leading]) / way if way != 0.0 else 1.0
+
+    def states(self, count: int) -> Iterator[tuple[Floats, Floats, Floats]]:
+        """Position, velocity and acceleration of the joints at some moments of the whole motion at full speed.
+
+        Args:
+            count: How many; each state has three arrays of shape (n,).
+        """
+        for time in np.linspace(0.0, self.duration, count).tolist():
+            x, xd, xdd = (np.array(values) for values in self._law.at(time))
+            yield self.path.states(x, xd, xdd)
+
+    def next(self) -> Floats:
+        """Parameter one tick further; the path's end exactly from the first tick at or after the end."""
+        if self.steady:
+            self._ticks += 1
+        else:
+            time = self.time
+            ends = (time, time + LOOK_AHEAD * self._period)
+            curve = [np.array(self._law.at(end)[1:3]) for end in ends]
+            step = self._pace.advance(self.speed, curve)
+            self._since, self._ticks = time + step, 0
+        if self.finished:
+            return self.path.end
+        return np.array(self._law.at(self.time)[0])
+
+    @property
+    def rate(self) -> float:
+        """Rate at which its time goes [-]."""
+        return self._pace.rate
+
+    @property
+    def standing(self) -> bool:
+        """Whether it has reached its end, or is paused and has come to a standstill."""
+        return self.finished or (self.rate == 0.0 and self.steady)
+
+    @property
+    def forecast(self) -> Forecast:
+        """Its way; how soon it brakes is known where its rate does not change."""
+        time, rate = self.time, self._pace.rate
+        known = rate > 0.0 and self.steady
+        return Forecast(
+            self.path,
+            self.path.end,
+            self.limits.acceleration,
+            self.limits.jerk,
+            max(self._law.brakes_at - time, 0.0) / rate if known else 0.0,
+        )
+
+    @property
+    def steady(self) -> bool:
+        """Whether its rate is what it is to be."""
+        return self._pace.steady(self.speed)
+
+    @property
+    def velocity(self) -> float:
+        """Of the parameter's entry that goes farthest, now [rad/s]."""
+        return float(np.abs(self._law.at(self.time)[1]).max()) * self._pace.rate
+
+    def hold(self, acceleration: float) -> bool:
+        """Pause, where that lets it stand noticeably sooner than if it were let go on.
+
+        Near its end there is hardly any acceleration left to pause with: a pause would only draw the end out.
+
+        Args:
+            acceleration: Limit for every entry of the parameter while it slows down, no more than its own [rad/s^2].
+
+        Returns:
+            Whether it pauses.
+        """
+        paused = self.fork()
+        paused.speed, paused._pace.acceleration = 0.0, acceleration  # noqa: SLF001  one of its own kind
+        most, forecast = self.limits.acceleration, self.forecast
+        longer = self.velocity * (1.0 / acceleration - 1.0 / most) + 2.0 * most / self.limits.jerk
+        if forecast.steady == 0.0 and self.rate == 1.0 and self.steady:
+            return False  # it brakes as hard as it may
+        if forecast.steady < longer + SURELY and not _stands_sooner(paused, self.fork()):
+            return False
+        self.speed, self._pace.acceleration = 0.0, acceleration
+        return True
+
+    def release(self, speed: float) -> None:
+        """Go on after a pause, at a rate [-]."""
+        self.speed, self._pace.acceleration = speed, self.limits.acceleration
+
+    def fork(self) -> Self:
+        """An independent copy that goes on from here, with a pace of its own."""
+        other = copy.copy(self)
+        other._pace = self._pace.fork()  # noqa: SLF001  one of its own kind
+        return other
+
+    @property
+    def time(self) -> float:
+        """How much of it has passed, at full speed [s]."""
+        return self._since + self._ticks * self._pace.rate * self._period
+
+    @property
+    def finished(self) -> bool:
+        """Whether the end was reached."""
+        return self.time >= self.duration
+
+
+def quickest_motion(path: Path, limits: Limits, period: float, speed: float = 1.0) -> Motion:
+    """The motion along a path from rest to rest that a double S makes of limits.
+
+    Args:
+        path: Where to go.
+        limits: That every joint is to keep.
+        period: Tick [s].
+        speed: Rate of its time against the clock's to start with [-].
+
+    Raises:
+        ValueError: There is no such motion within these limits, or it would last for hours.
+    """
+    return Motion(path, DoubleS(path.start, path.end, path.planned(limits)), period, speed)
+
+
+def _stands_sooner(paused: Motion, free: Motion) -> bool:
+    """Whether the one stands noticeably sooner than the other, and is at no tick further on its way."""
+    for _ in range(LONGEST_LOOK):
+        if paused.standing or free.standing:
+            break
+        paused.next()
+        free.next()
+        if paused.time > free.time + 1e-12:
+            return False
+    for _ in range(SOONER):
+        free.next()
+    return not free.standing

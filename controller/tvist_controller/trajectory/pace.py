@@ -1,0 +1,86 @@
+"""How fast a trajectory's own time passes: the speed slider, pause and resume."""
+
+import copy
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+import ruckig
+
+from tvist_controller.trajectory.limits import Floats, Limits
+
+QUICKEST = 20.0
+"""Largest change of the rate in a second [1/s]: from standstill to full speed in a twentieth."""
+
+
+class Pace:
+    """Rate r of a trajectory's time against the clock's, 0 to 1, changed without leaving the limits.
+
+    Along a path q(s) with ṡ = r the acceleration is q̈ = q'' r² + q' ṙ. So ṙ may be anything with |q̈| within the
+    limit of every joint: near the limits a motion is neither slowed nor hurried until its own curve leaves room.
+    The rate goes to its target time-optimally inside that room, its own jerk limited (ruckig).
+
+    Args:
+        limits: Of the motion, for every joint.
+        period: Tick [s].
+        rate: To start with [-].
+    """
+
+    def __init__(self, limits: Limits, period: float, rate: float) -> None:
+        self._limits, self._period = limits, period
+        self.acceleration = limits.acceleration
+        """Limit for every joint [rad/s^2]: the motion's, or less."""
+        self.rate, self._slope = rate, 0.0
+        self._open()
+
+    def _open(self) -> None:
+        self._generator = ruckig.Ruckig(1, self._period)
+        self._request, self._result = ruckig.InputParameter(1), ruckig.OutputParameter(1)
+        self._request.control_interface = ruckig.ControlInterface.Velocity
+
+    def fork(self) -> Self:
+        """An independent copy that goes on from here."""
+        other = copy.copy(self)
+        other._open()  # noqa: SLF001  one of its own kind
+        return other
+
+    def steady(self, target: float) -> bool:
+        """Whether the rate is at its target and stays there."""
+        return self.rate == target and self._slope == 0.0
+
+    def advance(self, target: float, curve: Sequence[Floats]) -> float:
+        """Time that passes on the path in this tick [s].
+
+        Args:
+            target: Rate to go to [-].
+            curve: q' [rad/s] and q'' [rad/s^2] at the present point of the path and at the points just ahead, each
+                of shape (2, n): the rate must suit them all, since a tick is not infinitely short.
+        """
+        rooms = [self._room(qd, qdd) for qd, qdd in curve]
+        # A sliver of room either way: ruckig wants limits on both sides of zero.
+        lowest = min(max(room[0] for room in rooms), -1e-3)
+        highest = max(min(room[1] for room in rooms), 1e-3)
+        request = self._request
+        request.current_position, request.current_velocity = [0.0], [self.rate]
+        request.current_acceleration = [min(max(self._slope, lowest), highest)]
+        request.target_velocity, request.target_acceleration = [target], [0.0]
+        request.max_acceleration, request.min_acceleration = [highest], [lowest]
+        fastest = max(float(np.abs(qd).max()) for qd, _ in curve)
+        request.max_jerk = [self._limits.jerk / max(fastest, 0.05)]
+        self._generator.update(request, self._result)
+        self.rate = min(max(self._result.new_velocity[0], 0.0), 1.0)
+        self._slope = self._result.new_acceleration[0]
+        if abs(self.rate - target) < 1e-9 and abs(self._slope) < 1e-6:
+            self.rate, self._slope = target, 0.0
+        return max(float(self._result.new_position[0]), 0.0)
+
+    def _room(self, qd: Floats, qdd: Floats) -> tuple[float, float]:
+        """Lowest and highest ṙ that keep every joint inside its acceleration [1/s]."""
+        lowest, highest = -QUICKEST, QUICKEST
+        own = qdd * self.rate**2
+        for velocity, acceleration in zip(qd.tolist(), own.tolist(), strict=True):
+            if abs(velocity) < 1e-9:
+                continue
+            ends = sorted((sign * self.acceleration - acceleration) / velocity for sign in (-1.0, 1.0))
+            lowest, highest = max(lowest, ends[0]), min(highest, ends[1])
+        return lowest, highest

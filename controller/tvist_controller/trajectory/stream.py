@@ -1,0 +1,218 @@
+"""Set-points from a client, played out by their sequence numbers."""
+
+import math
+from collections import deque
+
+import numpy as np
+
+from tvist_controller.trajectory.b_spline import cubic, linear
+from tvist_controller.trajectory.base import Trajectory
+from tvist_controller.trajectory.limiter import Limiter, TorqueRoom
+from tvist_controller.trajectory.limits import Floats, Limits
+from tvist_controller.trajectory.play_out import PlayOut
+from tvist_controller.trajectory.stop import Stop
+
+BRIDGED = 2
+"""Set-points in a row that are made up where none came."""
+
+
+class SetpointStream(Trajectory):
+    """A reference made of a client's set-points.
+
+    At the controller's own rate set-points pass straight through. Slower ones are the control points of a cubic
+    B-spline, which keeps the limits that they keep: it needs two periods, and a third is spare for jitter, so it is
+    three periods less a tick late. Where they come later, or by another clock, play-out waits as long as it has
+    to (`PlayOut`). One that is missing when its turn
+    comes is made up, of the parabola through its neighbours; where none come at all, the reference comes to rest
+    inside the limits until the stream goes on. After a break, and where the sender runs ahead, the newest wins.
+    Whatever comes of it goes through the `Limiter`.
+
+    Args:
+        q: Where the arm rests, shape (n,) [rad].
+        stream_period: Time between set-points, at least a tick [s].
+        limits: Of velocity, acceleration and jerk, for every joint.
+        period: Tick [s].
+        reach: Joints' range either way, shape (n,) [rad]; None for no end.
+        torque: What torque leaves to acceleration; None for enough.
+    """
+
+    limits: Limits
+    foreseeable = False
+
+    def __init__(
+        self,
+        q: Floats,
+        stream_period: float,
+        limits: Limits,
+        period: float,
+        *,
+        reach: Floats | None = None,
+        torque: TorqueRoom | None = None,
+    ) -> None:
+        self._rest = np.array(q, dtype=float)
+        self._ticks = max(round(stream_period / period, 9), 1.0)
+        direct = self._ticks == 1.0
+        self._curve, self._look_ahead = (linear, 1) if direct else (cubic, 2)
+        self._period = period
+        self.limits = limits
+        """Of the reference."""
+        self._reach = math.inf if reach is None else np.array(reach, dtype=float)
+        self._limiter = Limiter(self._rest, limits, period, reach=reach, torque=torque)
+        self._play_out: PlayOut | None = None
+        self._waiting: dict[int, Floats] = {}
+        self._heard: list[int] = []
+        # The last four points of the curve, and the number of the newest: once there they stay what they are.
+        self._points: deque[Floats] = deque([self._rest] * 4, maxlen=4)
+        self._head = 0
+        # The last three set-points that really came, with their numbers.
+        self._real: deque[tuple[int, Floats]] = deque(maxlen=3)
+        self._speed = 0.0
+        self._pause: Stop | None = None
+        self.sequence: int | None = None
+        """Newest set-point that was taken in; the reference gets there by the delay later."""
+        self.late = 0
+        """Set-points that came too late to be played, or twice."""
+        self.lost = 0
+        """Sequence numbers that were passed over; a gap counts for no more than `MAX_WAITING`."""
+        self.limited = 0
+        """Ticks in which the reference could not be where the set-points were."""
+
+    MAX_WAITING = 1000
+    """Set-points that may wait for their play-out."""
+
+    def offer(self, sequence: int, q: Floats) -> bool:
+        """Take a set-point; False where it comes too late to be played, or the room to wait is full."""
+        known = bool(self._real) and sequence <= self._real[-1][0]
+        if known or sequence in self._waiting or len(self._waiting) >= self.MAX_WAITING:
+            self.late += 1
+            return False
+        self._waiting[sequence] = q
+        self._heard.append(sequence)
+        return True
+
+    def next(self) -> Floats:
+        """Reference of the next tick."""
+        if self._play_out is not None:
+            self._play_out.advance(self._speed, self._limiter.behind)
+        if self._heard:
+            self._receive()
+        if self._play_out is None:
+            return self._rest
+        q, qd = self._evaluate(self._play_out)
+        reference = self._limiter.follow(q, qd)
+        self.limited += self._limiter.limited
+        return reference
+
+    @property
+    def finished(self) -> bool:
+        """Never by itself: it is ended from outside."""
+        return False
+
+    @property
+    def state(self) -> tuple[Floats, Floats, Floats]:
+        """Position, velocity and acceleration of the reference, each of shape (n,)."""
+        return self._limiter.state
+
+    @property
+    def delay(self) -> float:
+        """Between a set-point that comes as early as any, and when the curve has got there [s]."""
+        return 0.0 if self._play_out is None else self._play_out.delay * self._period
+
+    def _receive(self) -> None:
+        """Take in what arrived since the last tick."""
+        play_out, newest = self._play_out, max(self._waiting)
+        self.sequence = newest
+        if play_out is None:
+            play_out = self._begin(min(self._waiting))
+        if newest in self._heard and play_out.breaks(newest):
+            # A break, or a sender ahead of its own clock: the newest wins from here.
+            play_out = self._restart(newest)
+        for sequence in self._heard:
+            play_out.hear(sequence)
+        self._heard.clear()
+        for sequence in sorted(number for number in self._waiting if number <= self._head):
+            # It was made up meanwhile; but what is made up next had better know it.
+            self._keep(sequence, self._waiting.pop(sequence))
+            self.late += 1
+
+    def _begin(self, first: int) -> PlayOut:
+        self._real.extend(((first - 2, self._rest), (first - 1, self._rest)))
+        self._head = first - 1
+        return self._play_from(first)
+
+    def _restart(self, newest: int) -> PlayOut:
+        """Go on with the newest set-point; those that wait with it are the curve's last points."""
+        self._head = self._real[-1][0]
+        for sequence in sorted(self._waiting):
+            if sequence != newest:
+                self._put(sequence)
+        self._heard.clear()
+        return self._play_from(newest)
+
+    def _play_from(self, sequence: int) -> PlayOut:
+        self._play_out = PlayOut(sequence, self._look_ahead, self._ticks, self.limits, self._period)
+        return self._play_out
+
+    def _needed(self, play_out: PlayOut) -> int:
+        """Number of the newest set-point that the curve needs now."""
+        origin, offset = play_out.position
+        return origin + math.ceil(offset) + self._look_ahead - 1
+
+    def _evaluate(self, play_out: PlayOut) -> tuple[Floats, Floats]:
+        """Position [rad] and velocity [rad/s] of the stream."""
+        if not self._complete(self._needed(play_out)):
+            return self._wait()
+        self._pause = None
+        _, offset = play_out.position
+        q, slope = self._curve(self._points, offset - math.ceil(offset) + 1.0)
+        qd = (play_out.rate / self._period) * slope
+        self._speed = float(np.abs(qd).max())
+        return q, qd
+
+    def _complete(self, needed: int) -> bool:
+        """Lengthen the curve up to a number, as far as there is something to make it of."""
+        while self._head < needed:
+            missing = self._head + 1
+            if self._waiting:
+                coming = min(self._waiting)
+                if coming == missing:
+                    self._put(coming)
+                else:
+                    missing = max(missing, min(coming, needed) - 3)  # earlier ones have gone off the curve
+                    self._make_up(missing, (*self._real, (coming, self._waiting[coming]))[-3:])
+            elif missing - self._real[-1][0] <= BRIDGED:
+                self._make_up(missing, tuple(self._real))
+            else:
+                return False
+        return True
+
+    def _put(self, sequence: int) -> None:
+        q = self._waiting.pop(sequence)
+        self._keep(sequence, q)
+        self._points.append(q)
+        self._head = sequence
+
+    def _keep(self, sequence: int, q: Floats) -> None:
+        self.lost += min(sequence - self._real[-1][0] - 1, self.MAX_WAITING)
+        self._real.append((sequence, q))
+
+    def _make_up(self, sequence: int, known: tuple[tuple[int, Floats], ...]) -> None:
+        """A point in the place of one that is missing, of the parabola through those before and after."""
+        (last, q), (before, q_before) = known[-1], known[-2]
+        chord = (q - q_before) / (last - before)
+        point = q + (sequence - last) * chord
+        if len(known) == 3 and last - before <= BRIDGED + 1:  # across a break it is the straight line
+            first, q_first = known[0]
+            bend = (chord - (q_before - q_first) / (before - first)) / (last - first)
+            point = point + (sequence - last) * (sequence - before) * bend
+        self._points.append(np.clip(point, -self._reach, self._reach))
+        self._head = sequence
+
+    def _wait(self) -> tuple[Floats, Floats]:
+        """Come to rest and stay until the stream goes on."""
+        if self._pause is None:
+            limits = self.limits
+            self._pause = Stop(
+                *self.state, acceleration=limits.acceleration, jerk=limits.jerk, period=self._period
+            )
+        return self._pause.next(), self._pause.velocity
