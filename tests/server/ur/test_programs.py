@@ -94,10 +94,20 @@ def test_folders_do_not_matter(programs, control):
     assert programs.path == "/ursim/programs/wait_program.urp"
     assert load(programs, "Q1.urp", control)
     assert programs.path == "/programs/Q1.urp"
-    assert not load(programs, "/programs/", control)
-    assert not load(programs, "", control)
-    assert not load(programs, "paper", control)
+    assert not programs.has("/programs/")
+    assert not programs.has("")
+    assert not programs.has("paper")
     assert programs.name == "Q1.urp"
+
+
+def test_a_file_that_is_not_there_and_a_load_that_is_refused_are_told_apart(robot, control):
+    from tvist_server.gateways.ur.dashboard.session import DashboardSession
+
+    said = []
+    dashboard = DashboardSession(host(robot), control, said.append)
+    control.refuse("busy")
+    dashboard.receive(b"load nothing.urp\nload Q1.urp\n")
+    assert said == [b"File not found: nothing.urp\n", b"Error while loading program: Q1.urp\n"]
 
 
 def test_a_line_that_cannot_be_carried_out_is_a_runtime_exception(programs, robot):

@@ -71,18 +71,19 @@ class Programs:
         """Whether one runs, or is paused, that moves the arm."""
         return self.state != "STOPPED" and bool(self._known.get(self.name or ""))
 
+    def has(self, path: str) -> bool:
+        """Whether there is such a file; folders before its name make no difference."""
+        return PurePosixPath(path).name in self._known
+
     def load(self, path: str, control: Control, heard: Heard) -> None:
         """Load a program, and stop the one that runs.
 
         Args:
             path: Of its file; folders before its name make no difference.
             control: Of who loads it.
-            heard: Called once; with False where there is no such file.
+            heard: Called once.
         """
         name = PurePosixPath(path).name
-        if name not in self._known:
-            heard(False)
-            return
 
         def then(reply: Reply) -> None:
             loaded = not isinstance(reply, Refused)

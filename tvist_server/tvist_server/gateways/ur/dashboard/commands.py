@@ -126,15 +126,17 @@ def _load(request: Request) -> None:
     moves = programs.moves
     failed = f"Error while loading program: {path}"
 
-    def heard(found: bool) -> None:
-        if found:
+    def heard(accepted: bool) -> None:
+        if accepted:
             loaded = f"Loading program: {path}"
             request.at_rest(moves, lambda well: request.answer(loaded if well else failed))
         else:
-            request.answer(f"File not found: {path}")
+            request.answer(failed)
 
     if request.control.held_by_other:
         request.answer(failed)
+    elif not programs.has(path):
+        request.answer(f"File not found: {path}")
     else:
         programs.load(path, request.control, heard)
 
