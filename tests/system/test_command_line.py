@@ -352,7 +352,7 @@ class TestMoveAndWatch:
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=PATIENCE)
         assert err.startswith("tvist: interrupted: ")
-        assert err.endswith(" s watched; the robot goes on\n")
+        assert err.endswith(" s; the robot keeps running\n")
         assert process.returncode == 130
 
 
