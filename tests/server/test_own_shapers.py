@@ -55,8 +55,8 @@ WRONG_NAMES = {
     "NUMBER": "NUMBER is of type int; it must be a function (f_d, zeta) -> Impulses",
     "Step": "Step is a class",
     "raises": "mine.py:raises raises RuntimeError: not today for f_d = 0.1 Hz and ζ = 0; it must support 0.1 to 200 Hz",
-    "somewhere": "gives NoneType where Impulses are wanted for f_d = 100.2",
-    "zvd": "name is 'zvd', but must be another: there is a shaper of that name already",
+    "somewhere": "returns NoneType instead of Impulses for f_d = 100.2",
+    "zvd": "name is 'zvd', but must be a name that no other shaper has",
     "": "the name of the shaper is missing",
 }
 WRONG_FILES = {
@@ -160,7 +160,7 @@ class TestStart:
         (tmp_path / "other.py").write_text(MINE + "# other\n")
         path = tmp_path / "state.toml"
         path.write_text(f'shaper = "{tmp_path}/other.py:mine"\n')
-        with pytest.raises(ConfigError, match="there is a shaper of that name already"):
+        with pytest.raises(ConfigError, match="must be a name that no other shaper has"):
             from_mapping({"shaper": f"{file}:mine", "state": str(path)}, "configuration").setup()
 
     def test_one_that_cannot_be_loaded_is_a_wrong_configuration(self, file):

@@ -158,7 +158,7 @@ class TestARobotThatStands:
     def test_an_unlock_that_does_not_hold_says_why_again(self, overloaded):
         ended = tvist("unlock", overloaded.endpoint)
         ended.assert_failed(1, "not ready", "torque of joint")
-        assert ended.out.splitlines() == ["unlocked the protective stop", "saw it stop again at once"]
+        assert ended.out.splitlines() == ["unlocked the protective stop", "the robot stopped again at once"]
         (tick,) = re.findall(r"since tick (\d+)", ended.err)
         assert int(tick) > 6
         overloaded.wait_until_said(f"protective stop at tick {tick}: ")

@@ -95,7 +95,7 @@ def later(f_d, zeta):
 """
     (folder / "mine.py").write_text(MINE + later, encoding="utf-8")
     ended = tvist("evaluate", "--random", 1, "--no-baselines", "--shaper", "mine.py:later", cwd=folder)
-    ended.assert_failed(1, "shaper later gives NoneType where Impulses are wanted for f_d = ")
+    ended.assert_failed(1, "shaper later returns NoneType instead of Impulses for f_d = ")
 
 
 class TestServed:

@@ -18,7 +18,7 @@ from tvist_server.gateways.ur.rtde.writing import InputWriter
 from tvist_server.instruments.snapshot import Snapshot
 
 RATE = 500.0
-"""Of control periods, and the highest frequency of packages [Hz]."""
+"""Rate of control periods, and the highest frequency of packages [Hz]."""
 RECIPES = 255
 """Input recipes that a connection can number."""
 SENTENCES = 64
