@@ -1,4 +1,4 @@
-"""An authority and the certificates it signs, for mutual TLS between a robot and its clients.
+"""A certificate authority and the certificates it signs, for mutual TLS between a robot and its clients.
 
 ECDSA on P-256: Zenoh takes Ed25519 as well, but the TLS of small devices often does not.
 """
@@ -17,31 +17,33 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 AUTHORITY_DAYS = 7300
-"""How long an authority lasts [days]; what it signs ends before it does."""
+"""Validity of an authority [days]; the certificates it signs expire earlier."""
 SLACK = timedelta(hours=1)
-"""How much a client's or robot's clock may be behind."""
+"""How far a client's or robot's clock may be behind."""
 USAGES = {"robot": ExtendedKeyUsageOID.SERVER_AUTH, "client": ExtendedKeyUsageOID.CLIENT_AUTH}
-"""So that no client's certificate can stand for the robot's, nor the other way round."""
+"""Extended key usage of each kind, so that a client's certificate cannot pass as the robot's, or the reverse."""
 
 Host = x509.DNSName | x509.IPAddress
 
 
 class CertificateError(ValueError):
-    """A file holds no certificate or key that will do; the sentence names it."""
+    """A file contains no suitable certificate or key; the message names it."""
 
 
 def host(text: str) -> Host:
-    """A name or address under which clients reach a robot.
+    """Parse a host name or IP address under which clients reach a robot.
 
     Raises:
-        ValueError: It is neither.
+        ValueError: The text is neither.
     """
     try:
         return x509.IPAddress(ipaddress.ip_address(text))
     except ValueError:
         labels = text.split(".")
         if len(text) > 253 or not all(_is_label(label) for label in labels) or labels[-1].isdigit():
-            raise ValueError(f"host is {text!r:.80}: must be a name as robot.lab, or an IP address") from None
+            raise ValueError(
+                f"host is {text!r:.80}: must be a name such as robot.lab, or an IP address"
+            ) from None
         return x509.DNSName(text)
 
 
@@ -54,14 +56,14 @@ class Pair:
 
     @property
     def until(self) -> datetime:
-        """When the certificate ends."""
+        """When the certificate expires."""
         return self.certificate.not_valid_after_utc
 
     def write(self, certificate: Path, key: Path) -> None:
-        """Write both as PEM, the key for its owner alone.
+        """Write both as PEM; only the owner may read the key.
 
         Raises:
-            FileExistsError: One is there already.
+            FileExistsError: One of the files exists already.
         """
         form = serialization.PrivateFormat.PKCS8
         secret = self.key.private_bytes(serialization.Encoding.PEM, form, serialization.NoEncryption())
@@ -70,11 +72,11 @@ class Pair:
 
 
 class Authority(Pair):
-    """Signs certificates."""
+    """A certificate authority, which signs certificates."""
 
     @classmethod
     def make(cls) -> Self:
-        """A new one."""
+        """Create a new authority."""
         key = ec.generate_private_key(ec.SECP256R1())
         # A name of its own: a client that holds certificates of two authorities can tell them apart.
         name = f"tvist authority {x509.random_serial_number():x}"[:40]
@@ -88,10 +90,10 @@ class Authority(Pair):
 
     @classmethod
     def read(cls, certificate: Path, key: Path) -> Self:
-        """One made before.
+        """Read an existing authority.
 
         Raises:
-            CertificateError: The files hold no certificate and key that belong together.
+            CertificateError: The files do not contain a certificate and its key.
         """
         pair = cls(read_certificate(certificate), _read_key(key))
         if pair.certificate.public_key() != pair.key.public_key():
@@ -105,8 +107,8 @@ class Authority(Pair):
 
         Args:
             name: Common name.
-            usage: Who it is for.
-            days: How long it lasts.
+            usage: Whether it is for a robot or a client.
+            days: Validity [days].
             hosts: Names and addresses of a robot.
 
         Raises:
@@ -128,11 +130,11 @@ class Authority(Pair):
             builder = builder.add_extension(x509.SubjectAlternativeName(hosts), critical=False)
         pair = Pair(builder.sign(self.key, hashes.SHA256()), key)
         if pair.until > self.until:
-            raise CertificateError(f"days is {days}: the authority itself ends on {self.until:%Y-%m-%d}")
+            raise CertificateError(f"days is {days}: the authority itself expires on {self.until:%Y-%m-%d}")
         return pair
 
     def signed(self, certificate: x509.Certificate) -> bool:
-        """Whether a certificate is one of this authority's."""
+        """Whether this authority signed a certificate."""
         try:
             certificate.verify_directly_issued_by(self.certificate)
         except (ValueError, TypeError, InvalidSignature):
@@ -141,35 +143,35 @@ class Authority(Pair):
 
 
 def common_name(certificate: x509.Certificate) -> str:
-    """Whose certificate it is."""
+    """Return the common name of a certificate's owner."""
     return str(certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)[0].value)
 
 
 def hosts_of(certificate: x509.Certificate) -> set[Host]:
-    """Under which names and addresses it is good."""
+    """Return the names and addresses for which a certificate is valid."""
     found = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName)
     return {name for name in found.value if isinstance(name, Host)}
 
 
 def read_certificate(path: Path) -> x509.Certificate:
-    """A certificate.
+    """Read a certificate.
 
     Raises:
-        CertificateError: The file cannot be read, or holds none.
+        CertificateError: The file cannot be read, or contains no certificate.
     """
     try:
         return x509.load_pem_x509_certificate(path.read_bytes())
     except OSError as error:
         raise CertificateError(f"{path}: {error.strerror}") from error
     except ValueError as error:
-        raise CertificateError(f"{path} is no certificate in PEM") from error
+        raise CertificateError(f"{path} is not a PEM certificate") from error
 
 
 def write_new(path: Path, content: bytes, mode: int) -> None:
-    """Write a file that is not there yet, with its permissions from the first byte on.
+    """Write a new file and create it with its final permissions.
 
     Raises:
-        FileExistsError: It is there.
+        FileExistsError: The file exists already.
     """
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
     with open(descriptor, "wb") as file:  # noqa: PTH123  a descriptor, not a path
@@ -182,9 +184,9 @@ def _read_key(path: Path) -> ec.EllipticCurvePrivateKey:
     except OSError as error:
         raise CertificateError(f"{path}: {error.strerror}") from error
     except (ValueError, TypeError) as error:
-        raise CertificateError(f"{path} is no private key in PEM without a password") from error
+        raise CertificateError(f"{path} is not a PEM private key without a password") from error
     if not isinstance(key, ec.EllipticCurvePrivateKey):
-        raise CertificateError(f"{path} is no key for ECDSA")
+        raise CertificateError(f"{path} is not an ECDSA key")
     return key
 
 

@@ -1,4 +1,4 @@
-"""How a command ends badly: one sentence, and an exit code."""
+"""How a command reports a failure: one sentence and an exit code."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,8 +8,8 @@ from tvist_plant.user_file import UserFileError
 from tvist_protocol.errors import ProtocolError, TvistError
 
 
-class Failure(Exception):  # noqa: N818  what a person calls it
-    """A sentence for the person at the terminal; exit code 1 for failure, 2 for misuse, 130 for Control+C."""
+class Failure(Exception):  # noqa: N818  the plain word for it
+    """A message for the user and an exit code: 1 for a failure, 2 for misuse, 130 for Control+C."""
 
     def __init__(self, why: str, *, code: int = 1) -> None:
         super().__init__(why)
@@ -17,19 +17,19 @@ class Failure(Exception):  # noqa: N818  what a person calls it
 
 
 def interrupted(what: str) -> Failure:
-    """Control+C came: what was done until then, and what was not.
+    """Return the failure for Control+C, which says what was done and what was not.
 
     Args:
-        what: Such as "the motion was stopped; the robot is at rest".
+        what: Text such as "the motion was stopped; the robot is at rest".
     """
     return Failure(f"interrupted: {what}", code=130)
 
 
 @contextmanager
 def told(*errors: type[Exception], code: int = 1) -> Iterator[None]:
-    """Errors of these kinds, and those of client and protocol, become a failure with their sentence.
+    """Turn errors of these types, and those of client and protocol, into a `Failure` with the same message.
 
-    A file that is there and is not what is asked for is a failure, exit code 1, whatever the others are.
+    A file that exists but has the wrong content always gives exit code 1, whatever `code` is.
     """
     kinds: tuple[type[Exception], ...] = (*errors, ClientError, TvistError)
     try:
@@ -41,7 +41,7 @@ def told(*errors: type[Exception], code: int = 1) -> Iterator[None]:
 
 
 def _sentence(error: Exception) -> str:
-    """A refusal keeps its code, which programs look for; a fault found here has nobody to tell it to."""
+    """Return the message without the code that a protocol error found here carries for a remote client."""
     if isinstance(error, ProtocolError):
         return error.why
     if type(error).__module__ == "builtins" and isinstance(error, OSError) and error.strerror:

@@ -1,4 +1,4 @@
-"""What `tvist identify` found, for people and for programs."""
+"""Print the results of `tvist identify` as tables or as JSON."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from tvist_protocol.calibration import ModalParameter, Spread
 
 PAPER_MASS = 5.0
-"""What a served robot carries unless told otherwise [kg]."""
-UNSEEN = "ring-downs at poses that a fit did not see"
+"""Default payload of a served robot [kg]."""
+UNSEEN = "ring-downs at poses that were left out of the fit"
 QUANTITIES = {
     "gear_stiffness": ("gear stiffness", "N m/rad"),
     "velocity_gain": ("velocity gain", "N m s/rad"),
@@ -25,7 +25,7 @@ QUANTITIES = {
 
 
 def report_polynomial(done: "Identification", output: Path, *, json: bool) -> None:
-    """Polynomials and how far they are off."""
+    """Print the deviations of a polynomial calibration."""
     how = done.calibration.provenance
     if json:
         print_json(
@@ -58,7 +58,7 @@ def report_polynomial(done: "Identification", output: Path, *, json: bool) -> No
         [
             _row("its own measurements", how.residual_f_d_percent, how.residual_zeta_percent),
             _row(
-                "measurements it did not see",
+                "measurements left out of the fit",
                 how.cross_validated_f_d_percent,
                 how.cross_validated_zeta_percent,
             ),
@@ -72,7 +72,7 @@ def report_polynomial(done: "Identification", output: Path, *, json: bool) -> No
 
 
 def report_modal(done: "ModalIdentification", output: Path, *, json: bool) -> None:
-    """Springs and drives, and how far the modes they make are off."""
+    """Print the parameters of a modal calibration and the deviations of its modes."""
     how, model = done.calibration.provenance, done.calibration.modal
     if model is None:
         raise TypeError("an identification of springs and drives has a modal model")
@@ -125,13 +125,14 @@ def report_modal(done: "ModalIdentification", output: Path, *, json: bool) -> No
     if lost:
         names = ", ".join(f"{QUANTITIES[p.quantity][0]} of {_joints(p)}" for p in lost)
         out.print(
-            f"Not identifiable by these ring-downs: {names}. What rings hardly depends on it, so the guess stays."
+            f"Not identifiable from these ring-downs: {names}. The vibration hardly depends on it; the initial guess "
+            "is kept."
         )
     out.print(f"written to {output}; use it with: tvist serve --calibration {output}")
 
 
 def report_payload(found: "PayloadFound", *, declared: bool, json: bool) -> None:
-    """Mass and centre of mass."""
+    """Print the identified mass and centre of mass."""
     payload = found.payload
     if json:
         print_json(
@@ -150,7 +151,7 @@ def report_payload(found: "PayloadFound", *, declared: bool, json: bool) -> None
         )
         return
     table(
-        f"what the arm carries, by its torques in {found.poses} poses",
+        f"payload identified from the joint torques in {found.poses} poses",
         ("", "found", "± (one standard deviation)", "declared before"),
         [
             (
@@ -168,13 +169,15 @@ def report_payload(found: "PayloadFound", *, declared: bool, json: bool) -> None
         ],
     )
     out.print(
-        f"A short motion says {found.mass_in_motion:.2f} ± {found.mass_in_motion_deviation:.2f} kg. The inertia is not "
-        "identifiable beside that of the rotors: a steel ball's is taken."
+        f"A short motion gives {found.mass_in_motion:.2f} ± {found.mass_in_motion_deviation:.2f} kg. The inertia "
+        "cannot be told apart from that of the rotors: the inertia of a steel ball is assumed."
     )
     what = f"mass={payload.mass:.3f}, com=({', '.join(f'{c:.4f}' for c in payload.com)})"
     inertia = ", ".join(f"{moment:.5f}" for moment in payload.inertia)
     out.print(
-        "It is declared now." if declared else f"To declare it: set_payload {what}, inertia=({inertia})"
+        "The payload has been declared."
+        if declared
+        else f"To declare it: set_payload {what}, inertia=({inertia})"
     )
 
 

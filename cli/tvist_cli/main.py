@@ -1,4 +1,4 @@
-"""Entry of the `tvist` program: which commands there are. Each is imported when it is called."""
+"""Entry point of the `tvist` program and its list of commands; each command is imported when it is called."""
 
 import os
 import signal
@@ -8,28 +8,28 @@ from tvist_server.ending import ending_signals
 
 COMMANDS = {
     "serve": "Run a robot on the network.",
-    "demo": "See it work: the paper's motions in real time, with figures.",
-    "check": "Is a robot there, and ready to be moved? Exit code 0 if so.",
-    "unlock": "Make a robot that has stopped ready again; exit code 0 if it is then.",
+    "demo": "Run the paper's motions in real time and draw figures.",
+    "check": "Check that a robot answers and is ready to be moved; exit code 0 if so.",
+    "unlock": "Make a stopped robot ready to be moved again; exit code 0 if it is.",
     "move": "Move a served robot to a pose.",
-    "watch": "See live what a served robot does.",
+    "watch": "Show live what a served robot is doing.",
     "record": "Record a served robot as MCAP.",
     "analyze": "Measure the motions of a recording.",
     "replay": "Run a recording's commands again and compare bit by bit.",
     "paper": "Run the paper's experiment and print its tables beside ours.",
-    "shapers": "List the shapers: how long they are and what they forgive.",
+    "shapers": "List the shapers with their durations and their robustness to a wrong frequency.",
     "identify": "Calibrate a robot from its own accelerometer.",
-    "evaluate": "Shape any moves and say what it does to their vibration.",
-    "shaperbench": "Judge shapers, yours too, on eight arms.",
-    "search": "Look for ways to make a robot break what it promises.",
-    "bench": "Measure how fast it is on this machine.",
-    "keys": "Make certificates for a robot that others may reach.",
+    "evaluate": "Compare the vibration of any moves unshaped and shaped.",
+    "shaperbench": "Rank shapers, your own included, on eight simulated arms.",
+    "search": "Search for cases in which a robot breaks its promises.",
+    "bench": "Measure how fast tvist runs on this machine.",
+    "keys": "Create TLS certificates for a robot and its clients.",
 }
-"""What there is, in the order of a first acquaintance."""
+"""The commands with their one-line help, in the order in which a new user meets them."""
 
 
 def main() -> None:
-    """Run the program; Control+C ends it with exit code 130 and without a traceback, whenever it comes."""
+    """Run the program; Control+C ends it at any time, with exit code 130 and without a traceback."""
     try:
         _run()
     except KeyboardInterrupt:
@@ -39,12 +39,12 @@ def main() -> None:
 
 def _run() -> None:
     if sys.argv[1:2] == ["serve"]:
-        # Nothing is served yet, so whoever ends it gets what was asked for. As the first process of a container
-        # it has no default to end by.
+        # Nothing is served yet, so a signal can end the process at once. As the first process of a container,
+        # it has no default action for signals.
         for number in ending_signals():
             if number != signal.SIGINT:
                 signal.signal(number, lambda *_: os._exit(0))
-    # Matrices here are small: threads for them only get in each other's, and in the ticks', way.
+    # The matrices are small: threads for them would only slow down each other and the control loop.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from importlib.metadata import version
 

@@ -1,4 +1,4 @@
-"""What is wrong with a command line, in one sentence that says what to do."""
+"""Explain a wrong command line in one sentence that says what to do."""
 
 import math
 import re
@@ -26,20 +26,20 @@ _KINDS: dict[object, str] = {int: "a whole number", float: "a number", bool: "tr
 
 
 def readable(arguments: Iterable[str]) -> list[str]:
-    """Arguments in which a list of angles that begins with a minus is no option: a blank goes before it."""
+    """Put a blank before every list of angles that begins with a minus, so that it is not taken for an option."""
     return [f" {argument}" if _ANGLES.fullmatch(argument) else argument for argument in arguments]
 
 
 def lower(name: str | None) -> str | None:
-    """A name that a person may type in any case; FILE.py:NAME stays as it is."""
+    """Convert a name to lower case, so that users may type it in any case; FILE.py:NAME stays as it is."""
     return name if name is None or ".py:" in name or name.endswith(".py") else name.lower()
 
 
 def check_whole(_app: Any, _commands: Any, arguments: "ArgumentCollection") -> None:
-    """Refuse fractions where a whole number is meant: the parser would round them.
+    """Refuse fractions for whole numbers, which the parser would round.
 
     Raises:
-        CoercionError: There is one.
+        CoercionError: A value is not a whole number.
     """
     for argument in arguments:
         if argument.hint is not int and int not in get_args(argument.hint):
@@ -50,7 +50,7 @@ def check_whole(_app: Any, _commands: Any, arguments: "ArgumentCollection") -> N
 
 
 def finite(_: Any, value: Any) -> None:
-    """Refuse NaN and infinity, which no option means.
+    """Refuse NaN and infinity, which no option accepts.
 
     Raises:
         ValueError: The value is one of them.
@@ -60,23 +60,23 @@ def finite(_: Any, value: Any) -> None:
 
 
 def sentence(error: CycloptsError, commands: Sequence[str]) -> str:
-    """What is wrong, and what to do.
+    """Say what is wrong and what to do.
 
     Args:
-        error: What the parser found.
+        error: Error from the parser.
         commands: Names of all commands.
     """
     command = " ".join(["tvist", *(error.command_chain or ())])
-    seek = f"{command} --help lists what there is"
+    seek = f"see {command} --help"
     match error:
         case UnknownCommandError():
             name = (error.unused_tokens or [""])[0]
-            said = f"there is no command {quoted(name)}: {_near(name, commands)}tvist --help lists them"
+            said = f"there is no command {quoted(name)}: {_near(name, commands)}see tvist --help"
         case UnknownOptionError():
             name = error.token.keyword or error.token.value
             known = [known for argument in error.argument_collection for known in argument.names]
             near = _near(name, [known for known in known if known.startswith("--")])
-            said = f"{short(name)} is no option of {command}: {near}{seek}"
+            said = f"{command} has no option {short(name)}: {near}{seek}"
         case CoercionError():
             given = "" if error.token is None else f" is {quoted(error.token.value)}"
             said = f"{_name(error)}{given}: must be {_wanted(error.target_type)}"
@@ -85,12 +85,12 @@ def sentence(error: CycloptsError, commands: Sequence[str]) -> str:
         case ValidationError():
             said = f"{_name(error)} {error.exception_message}"
         case MissingArgumentError() if error.keyword or not _positional(error):
-            said = f"{error.keyword or _name(error)} needs a value behind it: {seek}"
+            said = f"{error.keyword or _name(error)} needs a value: {seek}"
         case MissingArgumentError():
             said = f"{_name(error)} is missing: {seek}"
         case UnusedCliTokensError():
             extra = " ".join(error.unused_tokens or ())
-            said = f"{command} does not know what to do with {quoted(extra)}: {seek}"
+            said = f"{command} does not accept {quoted(extra)}: {seek}"
         case _:
             said = f"{' '.join(str(error).split())}: {seek}"
     return said

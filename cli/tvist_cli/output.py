@@ -1,4 +1,4 @@
-"""What commands print: tables and progress for people on stderr and stdout, one JSON object for machines."""
+"""Output of the commands: tables and progress for people, one JSON object for programs."""
 
 import os
 import sys
@@ -14,24 +14,24 @@ from rich.table import Table
 from tvist_cli.failure import interrupted
 
 WIDTH = 120
-"""Columns where there is no terminal to ask."""
+"""Number of columns when the output is not a terminal."""
 out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH)
 """Results."""
 err = Console(stderr=True, highlight=False, width=None if sys.stderr.isatty() else WIDTH)
-"""Progress and messages: nothing of it mixes with `--json`."""
+"""Progress and messages, on stderr so that they do not mix with `--json`."""
 
 
 def say(message: str) -> None:
-    """A message for a person, in one line however long: it may stand in a log, or hold a path to be copied."""
+    """Print a message in one line, however long, since it may go to a log or contain a path to copy."""
     try:
         err.print(message, soft_wrap=True, markup=False)
     except OSError:
-        # The terminal is gone, with whoever would have read it; what was not written would fail again at the end.
+        # The terminal is closed. Without this, the unwritten rest would fail again when the process ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
 
 
 def print_json(value: Any) -> None:
-    """One JSON object and nothing else."""
+    """Print one JSON object and nothing else."""
     print(msgspec.json.encode(value).decode())
 
 
@@ -39,15 +39,15 @@ def print_json(value: Any) -> None:
 def progress(
     total: int, what: str, kept: str = "nothing was written"
 ) -> Iterator[Callable[[int, str | None], None]]:
-    """A bar on stderr, where that is a terminal; the function given advances it and may rename what is done.
+    """Show a progress bar if stderr is a terminal; the function it gives advances and optionally renames the bar.
 
     Args:
-        total: How many there are.
-        what: Of what, in the plural.
-        kept: What is left of it at Control+C.
+        total: Number of steps.
+        what: Name of the steps, in the plural.
+        kept: What remains after Control+C.
 
     Raises:
-        Failure: Control+C came; the sentence says how far it was.
+        Failure: Control+C was pressed; the message says how many steps were done.
     """
     done = 0
 
@@ -66,7 +66,7 @@ def progress(
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table: text to the left, numbers to the right."""
+    """Print a table with text aligned left and numbers aligned right."""
     drawn = Table(title=title, title_justify="left", title_style="bold", show_edge=False, pad_edge=False)
     for number, column in enumerate(columns):
         drawn.add_column(column, no_wrap=number == 0, justify="left" if number == 0 else "right")
@@ -77,5 +77,5 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A figure, or a dash where there is none."""
+    """Format a number; None gives a dash."""
     return "–" if value is None else f"{value:.{digits}f}"

@@ -1,4 +1,4 @@
-"""Poses as a person types them: a name in any case, or angles."""
+"""Poses as users type them: a name in any case, or angles."""
 
 import math
 from collections.abc import Mapping
@@ -10,16 +10,16 @@ from tvist_protocol.errors import quoted
 def pose(
     text: str, poses: Mapping[str, tuple[float, ...]], what: str, *, degrees: bool = False
 ) -> tuple[float, ...]:
-    """Joint angles [rad] that a text stands for.
+    """Return the joint angles [rad] that a text describes.
 
     Args:
-        text: Name of a pose in any case, or angles with commas.
-        poses: Those with a name [rad].
-        what: Name of the argument, for the sentence.
+        text: Name of a pose in any case, or angles separated by commas.
+        poses: Named poses [rad].
+        what: Name of the argument, for the message.
         degrees: Whether the angles are in degrees.
 
     Raises:
-        Failure: It is neither.
+        Failure: The text is neither.
     """
     for name, q in poses.items():
         if name.lower() == text.strip().lower():
@@ -30,6 +30,9 @@ def pose(
         angles = ()
     if not angles or not all(map(math.isfinite, angles)):
         unit = "degrees" if degrees else "rad"
-        why = f"{what} is {quoted(text)}: must be one of {', '.join(poses)}, or joint angles in {unit} with commas"
+        known = ", ".join(poses)
+        why = (
+            f"{what} is {quoted(text)}: must be one of {known}, or joint angles in {unit} separated by commas"
+        )
         raise Failure(why, code=2)
     return tuple(map(math.radians, angles)) if degrees else angles

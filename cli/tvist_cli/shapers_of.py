@@ -1,4 +1,4 @@
-"""Shapers as commands are given them: by name, or as FILE.py:NAME."""
+"""Load shapers that a command line names, or gives as FILE.py:NAME."""
 
 from typing import TYPE_CHECKING
 
@@ -9,13 +9,13 @@ if TYPE_CHECKING:
 
 
 def loaded(shaper: str) -> "tuple[str, tuple[OwnShaper, ...]]":
-    """The name of a shaper, and what was loaded for it.
+    """Return the name of a shaper, and the shaper loaded from its file, if any.
 
     Args:
         shaper: A name in any case, or FILE.py:NAME.
 
     Raises:
-        Failure: The file holds no such shaper.
+        Failure: The file contains no such shaper.
     """
     from tvist_controller.own_shapers import is_file
 
@@ -26,10 +26,10 @@ def loaded(shaper: str) -> "tuple[str, tuple[OwnShaper, ...]]":
 
 
 def load_given(place: str) -> "OwnShaper":
-    """The shaper of FILE.py:NAME.
+    """Load the shaper of FILE.py:NAME.
 
     Raises:
-        Failure: The file holds no such shaper, or no file is named.
+        Failure: The file contains no such shaper, or no file is named.
     """
     from tvist_controller.own_shapers import OwnShaperError, load_own
 

@@ -1,4 +1,4 @@
-"""The paper's tables beside ours, for people."""
+"""Print the paper's tables beside ours."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ COLUMNS = ("delay_ms", "stabilisation_ms", "cycle_ms", "overshoot_m", "residual_
 
 
 def print_paper(result: dict[str, Any]) -> None:
-    """Print what `tvist paper` and `tvist demo` found."""
+    """Print the results of `tvist paper` and `tvist demo`."""
     from tvist_lab.paper.published import published
 
     theirs = published()

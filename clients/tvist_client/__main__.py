@@ -15,19 +15,21 @@ def main(arguments: list[str] | None = None) -> int:
     commands = parser.add_subparsers(dest="command", required=True)
     checking = commands.add_parser(
         "check",
-        help="shake hands with a robot, see a state, have a command refused; is it ready to be moved?",
+        help="check that a robot answers, sends its state, refuses a command without control and is ready to be moved",
     )
     checking.add_argument(
-        "endpoint", nargs="?", default=ENDPOINT, help="where its server listens (%(default)s)"
+        "endpoint", nargs="?", default=ENDPOINT, help="Zenoh endpoint of the robot's server (%(default)s)"
     )
-    checking.add_argument("--name", help=f"the robot's name ({NAME}, or the first that is there)")
+    checking.add_argument(
+        "--name", help=f"name of the robot ({NAME}, or else the first robot at the endpoint)"
+    )
     checking.add_argument(
         "--security", metavar="DIR", help="folder with this client's certificate, for tls/HOST:PORT"
     )
     checking.add_argument(
         "--alive",
         action="store_true",
-        help="ask only whether the server answers and ticks, even if the robot has stopped: for orchestrators",
+        help="check only that the server answers and ticks, even if the robot has stopped (for orchestrators)",
     )
     checking.add_argument("--json", action="store_true", help="print one JSON object")
     chosen = parser.parse_args(arguments)
@@ -38,7 +40,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def describe(report: Report) -> str:
-    """A report for a person: a line a step."""
+    """Format a report for people, one line per step."""
     lines = [f"{'ok  ' if step.ok else 'FAIL'}  {step.what:<8} {step.said}" for step in report.findings]
     return "\n".join(lines)
 

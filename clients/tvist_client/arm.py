@@ -62,7 +62,7 @@ class Arm(Terminals, Simulation):
 
     Attributes:
         robot: The robot it belongs to.
-        token: Names the lease; goes with every command.
+        token: Token of the lease, sent with every command.
     """
 
     # ------------------------------------------------------------------ motion
@@ -89,7 +89,7 @@ class Arm(Terminals, Simulation):
             The motion; `started` and `done` are ticks once they are known.
 
         Raises:
-            MotionStoppedError: It ended before its target.
+            MotionStoppedError: The motion ended before its target.
         """
         reply = await self.robot.request(
             MoveJ(
@@ -101,7 +101,7 @@ class Arm(Terminals, Simulation):
             )
         )
         if not isinstance(reply, Accepted) or reply.id is None:
-            raise UnexpectedReplyError(f"move_j was answered by {reply}, without the number of a motion")
+            raise UnexpectedReplyError(f"move_j was answered by {reply}, without the id of a motion")
         motion = self.robot.motions.motion(reply.id)
         return await motion.wait() if wait else motion
 
@@ -118,9 +118,9 @@ class Arm(Terminals, Simulation):
 
         Args:
             period: Time between two set-points [s].
-            velocity: Velocity beyond which the stream is limited [rad/s].
-            acceleration: Acceleration beyond which the stream is limited [rad/s²].
-            jerk: Jerk beyond which the stream is limited [rad/s³].
+            velocity: Velocity to which every joint is limited [rad/s].
+            acceleration: Acceleration to which every joint is limited [rad/s²].
+            jerk: Jerk to which every joint is limited [rad/s³].
         """
         joints = JointRange(await self.robot.info())
         every = number(period, "period")
@@ -146,10 +146,10 @@ class Arm(Terminals, Simulation):
         await self.robot.rest()
 
     async def stop(self, deceleration: float | None = None) -> None:
-        """Come to rest now, past the shaper.
+        """Come to rest now, bypassing the shaper.
 
         Args:
-            deceleration: Largest deceleration of any joint [rad/s²]; None: what the torque allows.
+            deceleration: Largest deceleration of any joint [rad/s²]; None: as much as the torque limits allow.
         """
         limit = None if deceleration is None else number(deceleration, "deceleration")
         await self.robot.request(Stop(token=self.token, deceleration=limit))
@@ -159,7 +159,7 @@ class Arm(Terminals, Simulation):
         await self.robot.request(Pause(token=self.token))
 
     async def resume(self) -> None:
-        """Go on with a paused motion."""
+        """Continue a paused motion."""
         await self.robot.request(Resume(token=self.token))
 
     async def set_speed(self, fraction: float) -> None:
@@ -181,7 +181,7 @@ class Arm(Terminals, Simulation):
         await self.robot.request(PowerOff(token=self.token))
 
     async def unlock_protective_stop(self) -> None:
-        """Leave a protective stop, once the arm rests.
+        """Leave a protective stop; the arm must be at rest.
 
         In real time it waits for `UNLOCKED_TICKS` to see that the robot does not stop again. In lockstep and free time
         is the caller's: a stop that comes with it is an event, and stands in `Robot.info` as `stop`.
@@ -209,13 +209,13 @@ class Arm(Terminals, Simulation):
                 raise ProtectiveStopError(event)
 
     async def restart_safety(self) -> None:
-        """Restart the safety system after a violation or a fault; the arm is without power then."""
+        """Restart the safety system after a violation or a fault; afterwards the arm has no power."""
         await self.robot.request(RestartSafety(token=self.token))
 
     # ------------------------------------------------------------------ programs
 
     async def load_program(self, name: str) -> None:
-        """Load a program, one of `programs` in `info`; the one that runs is stopped, and the arm with it."""
+        """Load a program, one of `programs` in `info`; a running program and the arm are stopped first."""
         await self.robot.request(ProgramLoad(token=self.token, name=name))
 
     async def play_program(self) -> None:
@@ -223,7 +223,7 @@ class Arm(Terminals, Simulation):
         await self.robot.request(ProgramPlay(token=self.token))
 
     async def pause_program(self) -> None:
-        """Hold the program and its motion; `play_program` goes on."""
+        """Pause the program and its motion; `play_program` continues it."""
         await self.robot.request(ProgramPause(token=self.token))
 
     async def stop_program(self) -> None:
@@ -244,13 +244,13 @@ class Arm(Terminals, Simulation):
         zeta: float | Iterable[float] | None = None,
         calibration: str | Mapping[str, Any] | None = None,
     ) -> None:
-        """Choose where the shaper's frequency and damping come from.
+        """Choose the estimator that gives the shaper frequency and damping ratio.
 
         Args:
             name: `fixed` with `f_d` and `zeta`, `polynomial` or `modal` with `calibration`.
             f_d: Damped frequency of each mode [Hz]; a number stands for one mode.
             zeta: Damping ratio of each mode [-]; likewise.
-            calibration: Name of one of those in `info`, or the content as a map.
+            calibration: Name of a calibration in `info`, or its content as a map.
         """
         await self.robot.request(
             SetEstimator(
@@ -263,7 +263,7 @@ class Arm(Terminals, Simulation):
         )
 
     async def set_payload(self, mass: float, com: Iterable[float], inertia: Iterable[float]) -> None:
-        """Declare what hangs on the flange: what the controller believes.
+        """Declare the payload to the controller.
 
         Args:
             mass: Mass [kg].
@@ -276,10 +276,10 @@ class Arm(Terminals, Simulation):
         )
 
     async def set_tcp(self, offset: Iterable[float]) -> None:
-        """Say where the tool centre point is.
+        """Set the tool centre point.
 
         Args:
-            offset: In the flange frame: x y z [m] and rotation vector [rad].
+            offset: Tool centre point in the flange frame: x y z [m] and rotation vector [rad].
         """
         x, y, z, rx, ry, rz = floats(offset, "offset", "x y z rx ry rz")
         await self.robot.request(SetTcp(token=self.token, offset=(x, y, z, rx, ry, rz)))
@@ -314,7 +314,7 @@ async def hold_control(
     """Hold control for as long as the block lasts; see `Robot.control`.
 
     Args:
-        robot: Which one.
+        robot: Robot to control.
         transport: The robot's; the client is announced there first.
         client: Who asks.
         lease_s: How long control lasts without a sign of life [s].

@@ -89,11 +89,11 @@ class Robot:
         self.close()
 
     def info(self) -> Info:
-        """Ask what the robot is and how it is set up."""
+        """Request the robot's description and settings."""
         return self._portal.call(self._robot.info)
 
     def clock(self) -> Clock:
-        """Who lets time pass."""
+        """What advances simulation time."""
         return self._portal.call(self._robot.clock)
 
     def state(self) -> State:
@@ -113,19 +113,19 @@ class Robot:
         return self._portal.subscription(lambda: self._robot.on_state(callback))
 
     def on_event(self, callback: Callable[[Event], object]) -> Callable[[], None]:
-        """As `on_state`, with every event."""
+        """Call a function with every event; see `on_state`."""
         return self._portal.subscription(lambda: self._robot.on_event(callback))
 
     def on_truth(self, callback: Callable[[Truth], object]) -> Callable[[], None]:
-        """As `on_state`, with what no robot can know."""
+        """Call a function with every truth message; see `on_state`."""
         return self._portal.subscription(lambda: self._robot.on_truth(callback))
 
     def on_telemetry(self, callback: Callable[[Telemetry], object]) -> Callable[[], None]:
-        """As `on_state`, with the server's own figures."""
+        """Call a function with every telemetry message; see `on_state`."""
         return self._portal.subscription(lambda: self._robot.on_telemetry(callback))
 
     def on_io(self, callback: Callable[[Io], object]) -> Callable[[], None]:
-        """As `on_state`, with inputs, outputs, registers and tool."""
+        """Call a function with every message about inputs, outputs, registers and tool; see `on_state`."""
         return self._portal.subscription(lambda: self._robot.on_io(callback))
 
     def io(self) -> Io:

@@ -88,7 +88,7 @@ class Arm:
 
     @property
     def token(self) -> str:
-        """Names the lease."""
+        """Token of the lease."""
         return self._arm.token
 
     def move_j(
@@ -121,7 +121,7 @@ class Arm:
             yield Servo(self._portal, servo)
 
     def stop(self, deceleration: float | None = None) -> None:
-        """Come to rest now, past the shaper."""
+        """Come to rest now, bypassing the shaper."""
         self._portal.call(lambda: self._arm.stop(deceleration))
 
     def pause(self) -> None:
@@ -129,7 +129,7 @@ class Arm:
         self._portal.call(self._arm.pause)
 
     def resume(self) -> None:
-        """Go on with a paused motion."""
+        """Continue a paused motion."""
         self._portal.call(self._arm.resume)
 
     def set_speed(self, fraction: float) -> None:
@@ -145,15 +145,15 @@ class Arm:
         self._portal.call(self._arm.power_off)
 
     def unlock_protective_stop(self) -> None:
-        """Leave a protective stop, once the arm rests; in real time, look whether it holds."""
+        """Leave a protective stop; the arm must be at rest. In real time, check that it does not stop again."""
         self._portal.call(self._arm.unlock_protective_stop)
 
     def restart_safety(self) -> None:
-        """Restart the safety system after a violation or a fault; the arm is without power then."""
+        """Restart the safety system after a violation or a fault; afterwards the arm has no power."""
         self._portal.call(self._arm.restart_safety)
 
     def set_tcp(self, offset: Iterable[float]) -> None:
-        """Say where the tool centre point is."""
+        """Set the tool centre point."""
         self._portal.call(lambda: self._arm.set_tcp(offset))
 
     def set_digital_output(self, number: int, on: bool) -> None:
@@ -165,7 +165,7 @@ class Arm:
         self._portal.call(lambda: self._arm.set_analog_output(number, share, voltage=voltage))
 
     def set_registers(self, bank: Bank, values: Iterable[float], first: int = 0) -> None:
-        """Write registers that stand in a row."""
+        """Write consecutive registers."""
         self._portal.call(lambda: self._arm.set_registers(bank, values, first))
 
     def set_digital_input(self, number: int, on: bool) -> None:
@@ -173,7 +173,7 @@ class Arm:
         self._portal.call(lambda: self._arm.set_digital_input(number, on))
 
     def load_program(self, name: str) -> None:
-        """Load a program; the one that runs is stopped."""
+        """Load a program; a running program is stopped first."""
         self._portal.call(lambda: self._arm.load_program(name))
 
     def play_program(self) -> None:
@@ -181,7 +181,7 @@ class Arm:
         self._portal.call(self._arm.play_program)
 
     def pause_program(self) -> None:
-        """Hold the program and its motion."""
+        """Pause the program and its motion."""
         self._portal.call(self._arm.pause_program)
 
     def stop_program(self) -> None:
@@ -200,11 +200,11 @@ class Arm:
         zeta: float | Iterable[float] | None = None,
         calibration: str | Mapping[str, Any] | None = None,
     ) -> None:
-        """Choose where the shaper's frequency and damping come from."""
+        """Choose the estimator that gives the shaper frequency and damping ratio."""
         self._portal.call(lambda: self._arm.set_estimator(name, f_d=f_d, zeta=zeta, calibration=calibration))
 
     def set_payload(self, mass: float, com: Iterable[float], inertia: Iterable[float]) -> None:
-        """Declare what hangs on the flange."""
+        """Declare the payload to the controller."""
         self._portal.call(lambda: self._arm.set_payload(mass, com, inertia))
 
     def reset(
@@ -216,7 +216,7 @@ class Arm:
         mode: ResetMode | None = None,
         shaper: str | None = None,
     ) -> int | None:
-        """Put the simulated arm somewhere at rest."""
+        """Put the simulated arm at rest in a given state."""
         return self._portal.call(
             lambda: self._arm.reset(q, seed=seed, payload=payload, mode=mode, shaper=shaper)
         )
@@ -254,7 +254,7 @@ class Stepper:
 
     @property
     def token(self) -> str:
-        """Names the hold of the clock."""
+        """Token of the clock."""
         return self._stepper.token
 
     def step(self, ticks: int) -> int:

@@ -1,4 +1,4 @@
-"""Is there a robot, does it work, and is it ready to be moved? A real handshake, not a port scan."""
+"""Check that a robot answers, works and is ready to be moved, with real commands rather than a port scan."""
 
 import asyncio
 from collections.abc import Callable
@@ -29,7 +29,7 @@ class Finding(msgspec.Struct, frozen=True):
     what: str
     ok: bool
     said: str
-    """What came of it, for a person."""
+    """Result of the step, for people."""
 
 
 class Report(msgspec.Struct, frozen=True):
@@ -45,15 +45,15 @@ class Report(msgspec.Struct, frozen=True):
     protocol: int | None
     """Version of the protocol the robot speaks; null where it did not answer."""
     state_rate_hz: float | None
-    """States a second, by their ticks [Hz]; null where time does not pass by itself, or none came."""
+    """States per second, by their ticks [Hz]; null in lockstep, or if no state came."""
     findings: list[Finding]
     """Step by step; a step that fails is the last."""
     ready: bool | None
     """Whether the robot may be moved; null where that was not looked at."""
     robot_mode: str | None
-    """By its RTDE name; null where it was not looked at, or is not known."""
+    """RTDE name of the robot mode; null if it was not checked or is unknown."""
     safety_mode: str | None
-    """Likewise."""
+    """RTDE name of the safety mode; null if it was not checked or is unknown."""
     stop: StopReason | None
     """The stop that keeps the robot from moving; null: there is none, or it is not known."""
     next: str | None
@@ -72,9 +72,9 @@ def check(
     It changes nothing.
 
     Args:
-        endpoint: Where the server listens, `tcp/<host>:<port>`.
-        name: The robot's name; None: `ur5e` where it is there, otherwise the first of those that are.
-        alive: Ask only whether the server answers and, in real time, ticks: so an orchestrator does not kill a robot
+        endpoint: Endpoint of the server, `tcp/<host>:<port>`.
+        name: Name of the robot; None: `ur5e` if it is there, otherwise the first robot at the endpoint.
+        alive: Check only that the server answers and, in real time, ticks; an orchestrator then does not kill a robot
             that has stopped, and that somebody is about to unlock.
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
     """
@@ -123,9 +123,9 @@ class _Check:
         )
 
     def beside(self) -> str:
-        """Which other robots there are."""
+        """List the other robots at the endpoint."""
         others = [robot for robot in self.robots if robot != self.name]
-        return f", beside {', '.join(others)}" if others else ""
+        return f"; also there: {', '.join(others)}" if others else ""
 
     def passed(self, what: str, said: str) -> None:
         self.findings.append(Finding(what, ok=True, said=said))
@@ -135,7 +135,7 @@ class _Check:
         self.protocol = info.protocol
         if info.protocol != PROTOCOL_VERSION:
             raise UnexpectedReplyError(
-                f"the robot speaks protocol {info.protocol}, this client {PROTOCOL_VERSION}: update one"
+                f"the robot speaks protocol {info.protocol}, this client {PROTOCOL_VERSION}: update the older one"
             )
         said = f"{info.model}, {len(info.joints)} joints, clock {info.clock}, protocol {info.protocol}"
         return f"{said}{_doubt(info.calibration)}"
@@ -143,8 +143,8 @@ class _Check:
     async def state(self, robot: Robot) -> str:
         if await robot.clock() != "realtime":
             if (await robot.info()).tick == 0:
-                return "none yet, since a client lets time pass and none has"
-            return f"tick {(await robot.state()).tick}; no rate, since a client lets time pass"
+                return "none yet, since a client must step the time and none has done so"
+            return f"tick {(await robot.state()).tick}; no rate, since a client steps the time"
         self.rate = await _rate(robot)
         return f"{self.rate:.1f} Hz"
 
@@ -164,8 +164,8 @@ class _Check:
             if self.security is None:
                 raise
             await robot.info()  # the robot is still there, so it is this client that is not heard
-            return "its commands are not heard: this certificate is a viewer's"
-        raise ClientError("a command with a stale token was obeyed: the server does not guard control")
+            return "commands are not delivered: this certificate has the role viewer"
+        raise ClientError("a command with an invalid token was accepted: the server does not check control")
 
     async def ready(self, robot: Robot) -> str:
         command = unlock_command(self.endpoint, str(self.name), self.security)
@@ -173,17 +173,17 @@ class _Check:
         if not found.ready:
             raise ClientError(found.sentence)
         if found.robot_mode is None:
-            return "as far as it says before its first tick"
+            return "as far as is known before its first tick"
         return f"robot_mode {found.robot_mode}, safety_mode {found.safety_mode}"
 
 
 def _doubt(calibration: CalibrationInfo | None) -> str:
     """What a person should know of the calibration in use; empty where it is in order."""
     if calibration is not None and calibration.fits_arm is False:
-        return f"; calibration {calibration.name!r} was measured on another arm: frequencies will be off"
+        return f"; calibration {calibration.name!r} was measured on a different arm: the frequencies will be wrong"
     if calibration is not None and not calibration.fits_payload:
         mass = f"{calibration.payload_mass:g} kg"
-        return f"; calibration {calibration.name!r} was made with {mass}, not with what is declared"
+        return f"; calibration {calibration.name!r} was made with {mass}, not with the declared payload"
     return ""
 
 

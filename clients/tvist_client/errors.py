@@ -5,7 +5,7 @@ TvistError
 ├── ProtocolError            a value cannot be sent: no number, no name (of `tvist_protocol`)
 └── ClientError
     ├── NotConnectedError    nobody answers; also a ConnectionError
-    ├── AnswerTimeoutError   somebody is there and does not answer; also a TimeoutError
+    ├── AnswerTimeoutError   the robot is connected but does not answer; also a TimeoutError
     ├── StoppedError         the robot ended something, and told why in an event
     │   ├── MotionStoppedError   a motion ended before its target
     │   ├── StreamStoppedError   the robot ended the stream of set-points
@@ -36,16 +36,16 @@ class UnexpectedReplyError(ClientError):
 
 
 class MisuseError(ClientError):
-    """A call that makes no sense now; the sentence says what to do first."""
+    """A call that is not possible now; the message says what to do first."""
 
 
 class ArgumentError(ClientError, ValueError):
     """An argument that cannot be meant: nothing was sent.
 
     Attributes:
-        where: Which, `q[3]`.
+        where: Argument at fault, such as `q[3]`.
         why: A sentence with argument, value and what is allowed.
-        limit: The bound that was passed, in the argument's unit; None where there is none.
+        limit: Limit that was exceeded, in the argument's unit; None if there is none.
     """
 
     def __init__(self, where: str, why: str, limit: float | None = None) -> None:

@@ -29,8 +29,8 @@ class Feed(Generic[M]):
     """Messages of one topic. Subscribes when somebody first listens.
 
     Args:
-        transport: Where they come from.
-        topic: Which.
+        transport: Transport that delivers the messages.
+        topic: Topic to subscribe to.
         decode: Bytes to message.
         once_a_tick: Whether there is one a tick; then what is not newer than the last one is a repetition.
     """
@@ -91,7 +91,7 @@ class Feed(Generic[M]):
             async with asyncio.timeout(timeout_s):
                 return await message
         except TimeoutError:
-            why = f"no {self._topic} came within {timeout_s:g} s: the robot stands still, or the link does"
+            why = f"no {self._topic} came within {timeout_s:g} s: the robot does not tick, or the connection is broken"
             raise AnswerTimeoutError(why) from None
         finally:
             self._waiting.pop(message, None)
@@ -120,7 +120,7 @@ class Feed(Generic[M]):
             message = self._decode(data)
         except ProtocolError as error:
             if not self.malformed:
-                log.warning("a %s that is none: %s", self._topic, error)
+                log.warning("an invalid %s: %s", self._topic, error)
             self.malformed += 1
             return
         if self._once_a_tick and self.latest is not None and message.tick <= self.latest.tick:

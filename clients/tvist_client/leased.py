@@ -11,7 +11,7 @@ class Leased:
 
     Attributes:
         robot: The robot it belongs to.
-        token: Names the lease; goes with every command.
+        token: Token of the lease, sent with every command.
     """
 
     def __init__(self, robot: "Robot", token: str) -> None:

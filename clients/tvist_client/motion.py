@@ -40,7 +40,7 @@ class Motion:
         """Wait for the end; in lockstep and free let time pass until it comes.
 
         Raises:
-            MotionStoppedError: It ended before its target.
+            MotionStoppedError: The motion ended before its target.
             NotConnectedError: The robot went away.
         """
         await self._pass_time(self)

@@ -39,7 +39,7 @@ class Portal:
         if self.closed:
             raise NotConnectedError("the connection is closed: open another one")
         if threading.current_thread() is self._thread:
-            raise MisuseError("a callback may not wait for the robot: hand the work to another thread")
+            raise MisuseError("a callback may not wait for the robot: pass the work to another thread")
 
         async def awaited() -> T:
             return await function()

@@ -11,7 +11,7 @@ from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.stream import State
 
 _MAY_MOVE = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
-"""Safety modes in which a robot that has its power moves."""
+"""Safety modes in which a robot with power can move."""
 _RELEASE = "release it (in simulation: simulation.inject with the fault normal)"
 _NEXT: dict[int, str] = {
     SafetyMode.PROTECTIVE_STOP: "remove its cause, then run {unlock}",
@@ -28,11 +28,11 @@ class Readiness(Struct, frozen=True):
     """What keeps a robot from being moved, if anything does."""
 
     ready: bool
-    """Whether it has its power, and its safety system allows motion."""
+    """Whether the robot has power and its safety system allows motion."""
     robot_mode: str | None
-    """By its RTDE name; null where the robot has not said, since it has not ticked yet."""
+    """RTDE name of the robot mode; null before the robot's first tick, when it is unknown."""
     safety_mode: str | None
-    """Likewise."""
+    """RTDE name of the safety mode; null before the robot's first tick, when it is unknown."""
     stop: StopReason | None
     """The stop that keeps it from moving; null: there is none, or the robot does not say why."""
     why: str
@@ -42,7 +42,7 @@ class Readiness(Struct, frozen=True):
 
     @property
     def sentence(self) -> str:
-        """Both for a person, in one line."""
+        """Reason and next step in one line, for people."""
         return f"{self.why}. Next: {self.next}" if self.next else self.why
 
 

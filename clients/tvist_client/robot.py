@@ -77,9 +77,9 @@ class Robot:
         """Connect over Zenoh and shake hands.
 
         Args:
-            endpoint: Where the server listens, `tcp/<host>:<port>`.
-            name: The robot's name.
-            security: Folder with this client's certificate, as `tvist keys` makes it; the endpoint is then
+            endpoint: Endpoint of the server, `tcp/<host>:<port>`.
+            name: Name of the robot.
+            security: Folder with this client's certificate, made by `tvist keys`; the endpoint is then
                 `tls/<host>:<port>`.
 
         Raises:
@@ -117,13 +117,13 @@ class Robot:
     # ------------------------------------------------------------------ what it is and what it tells
 
     async def info(self) -> Info:
-        """Ask what the robot is and how it is set up."""
+        """Request the robot's description and settings."""
         info = _understood(decode_info, await self._transport.info())
         self._clock = info.clock
         return info
 
     async def clock(self) -> Clock:
-        """Who lets time pass, asked once."""
+        """What advances simulation time; requested only once."""
         return self._clock or (await self.info()).clock
 
     async def state(self) -> State:
@@ -141,7 +141,9 @@ class Robot:
         if clock != "realtime" and self._states.latest is not None:
             return self._states.latest
         if clock == "free":
-            raise MisuseError("this robot tells its state with its first tick: take control and advance(1)")
+            raise MisuseError(
+                "this robot sends its state from the first tick on: take control and call advance(1)"
+            )
         return await self._next_state()
 
     def states(self, buffer: int = BUFFER) -> Stream[State]:
@@ -161,19 +163,19 @@ class Robot:
         return self._states.listen(callback)
 
     def on_event(self, callback: Callable[[Event], object]) -> Callable[[], None]:
-        """As `on_state`, with every event."""
+        """Call a function with every event; see `on_state`."""
         return self._events.listen(callback)
 
     def on_truth(self, callback: Callable[[Truth], object]) -> Callable[[], None]:
-        """As `on_state`, with what no robot can know, where the server tells it."""
+        """Call a function with every truth message, if the server publishes them; see `on_state`."""
         return self._truths.listen(callback)
 
     def on_telemetry(self, callback: Callable[[Telemetry], object]) -> Callable[[], None]:
-        """As `on_state`, with the server's own figures, once a second."""
+        """Call a function with every telemetry message, once a second; see `on_state`."""
         return self._telemetries.listen(callback)
 
     def on_io(self, callback: Callable[[Io], object]) -> Callable[[], None]:
-        """As `on_state`, with inputs, outputs, registers and tool: at every change, and once a second."""
+        """Call a function with every message about inputs, outputs, registers and tool; see `on_state`."""
         return self._ios.listen(callback)
 
     async def io(self) -> Io:
@@ -272,7 +274,7 @@ class Robot:
         by = self.stepper or self.arm
         if by is None:
             raise MisuseError(
-                "time passes here for who has `robot.clock_control(…)`, or else `robot.control(…)`"
+                "only a client with `robot.clock_control(…)`, or else `robot.control(…)`, can step this robot's time"
             )
         tick = 0
         for first in range(0, ticks, MAX_STEP):
@@ -288,7 +290,7 @@ class Robot:
         return await self._states.next(lambda state: state.tick >= tick, STATE_S)
 
     async def rest(self) -> State:
-        """Let time pass until the shaped reference rests, or wait where another client steps; the arm may still ring.
+        """Step time until the shaped reference is at rest, or wait if another client steps; the arm may still vibrate.
 
         Returns:
             The first state seen that says so.
@@ -331,5 +333,5 @@ def _understood(decode: Callable[[bytes], T], data: bytes) -> T:
     try:
         return decode(data)
     except ProtocolError as error:
-        why = f"the robot's answer is not understood, maybe of a newer protocol: update the client ({error})"
+        why = f"the robot's answer is invalid, perhaps because it uses a newer protocol: update the client ({error})"
         raise UnexpectedReplyError(why) from error

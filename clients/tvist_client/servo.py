@@ -22,7 +22,7 @@ class Servo:
     """What `Arm.servo` gives. Numbers the set-points from 0, and checks them: a robot answers none of them.
 
     Args:
-        arm: Which streams.
+        arm: Arm to stream to.
         period: Time between two set-points [s].
         joints: The angles that the robot takes.
 
@@ -55,13 +55,13 @@ class Servo:
         In real time the first one counts: 250 ms without one end the stream.
 
         Args:
-            q: Where to be [rad], one a joint.
+            q: Set-point, one angle per joint [rad].
 
         Returns:
             Its number; `state.setpoint_sequence` says when it was accepted.
 
         Raises:
-            ArgumentError: It has another number of angles, or one that is not finite or beyond its joint's range.
+            ArgumentError: The number of angles is wrong, or an angle is not finite or outside its joint's range.
             StreamStoppedError: The robot has ended the stream.
             MisuseError: The block of `Arm.servo` has been left.
         """
@@ -76,19 +76,19 @@ class Servo:
         """Play set-points in lockstep and free, each for one period, letting that time pass.
 
         Args:
-            qs: Where to be [rad], one entry a period, each one angle a joint.
+            qs: Set-points, one per period, each with one angle per joint [rad].
 
         Returns:
             The tick of the last one's end; its state has arrived.
 
         Raises:
-            ArgumentError: As `set`; then none of them was played.
+            ArgumentError: See `set`; none of the set-points was played.
             MisuseError: Time passes by itself here, or there are no set-points.
             StreamStoppedError: The robot has ended the stream.
         """
         robot = self._arm.robot
         if await robot.clock() == "realtime":
-            raise MisuseError("time passes by itself here: call set(q) once a period")
+            raise MisuseError("this robot runs in real time: call set(q) once per period")
         setpoints = [
             StepSetpoint(sequence=self.sequence + place, q=self._joints.check(q, f"qs[{place}]"))
             for place, q in enumerate(qs)
@@ -116,7 +116,7 @@ class Servo:
         if self._stopped is not None:
             raise StreamStoppedError(self._stopped)
         if self._left:
-            raise MisuseError("this stream has ended with its block: `servo` begins a new one")
+            raise MisuseError("this stream ended with its `async with` block: call `servo` for a new one")
 
     def _on_event(self, event: Event) -> None:
         if event.kind == "stream_stopped":

@@ -22,14 +22,14 @@ class Simulation(Leased):
         mode: ResetMode | None = None,
         shaper: str | None = None,
     ) -> int | None:
-        """Put the simulated arm somewhere at rest; what is None stays.
+        """Put the simulated arm at rest in a given state; arguments that are None change nothing.
 
         Args:
-            q: Where [rad].
-            seed: Seed of the sensors' noise, which starts anew.
-            payload: What the arm carries, whatever the controller believes; `make_payload` makes one.
-            mode: Robot mode to put it into.
-            shaper: Shaper to choose.
+            q: Configuration to put the arm into [rad].
+            seed: New seed of the sensors' noise.
+            payload: Payload that the arm carries, independent of the declared one; `make_payload` makes one.
+            mode: Robot mode to set.
+            shaper: Shaper to select.
 
         Returns:
             The tick at which it was done.
@@ -53,7 +53,7 @@ class Simulation(Leased):
 
         Args:
             ticks: How many control periods.
-            setpoints: Set-points of a running stream, at most 1000, one a tick in order; `Servo.step_through`
+            setpoints: Set-points of a running stream, at most 1000, in order and one per tick; `Servo.step_through`
                 numbers them.
 
         Returns:
@@ -77,9 +77,9 @@ class Simulation(Leased):
 
         Args:
             fault: Its name.
-            joint: Joint that it concerns, from the base on.
-            seconds: How long it lasts [s].
-            value: How strong it is, in the fault's own unit.
+            joint: Index of the joint that it affects, 0 for the base.
+            seconds: Duration of the fault [s].
+            value: Magnitude of the fault, in the fault's own unit.
         """
         await self.robot.request(
             SimulationInject(

@@ -28,7 +28,7 @@ class Stepper:
 
     Attributes:
         robot: The robot it belongs to.
-        token: Names the hold of the clock.
+        token: Token of the clock.
     """
 
     def __init__(self, robot: "Robot", token: str) -> None:
@@ -93,10 +93,10 @@ async def step(
 
     Args:
         robot: Whose time passes.
-        token: Names the hold of the clock, or the lease where nobody holds it.
+        token: Token of the clock, or of the lease if no client holds the clock.
         ticks: How many control periods, 1 to 100000.
-        setpoints: Of a running stream, one a tick in order.
-        motion_token: Names the lease, where `token` does not and there are set-points.
+        setpoints: Set-points of a running stream in order, one per tick.
+        motion_token: Token of the lease, if there are set-points and `token` is that of the clock.
 
     Returns:
         The last tick that passed; its state has arrived.

@@ -26,7 +26,7 @@ class Terminals(Leased):
 
         Args:
             number: 0 or 1.
-            share: Of its range [-].
+            share: Value as a share of the output's range [-].
             voltage: Whether it gives 0 to 10 V; otherwise 4 to 20 mA.
         """
         bit = 1 << whole(number, "number", 0, LAST_ANALOG)
@@ -42,11 +42,11 @@ class Terminals(Leased):
         )
 
     async def set_registers(self, bank: Bank, values: Iterable[float], first: int = 0) -> None:
-        """Write registers that stand in a row.
+        """Write consecutive registers.
 
         Args:
-            bank: Which: `input_int`, `output_double` …
-            values: Booleans, integers or numbers, as the bank has them.
+            bank: Bank of registers: `input_int`, `output_double` …
+            values: Booleans, integers or numbers, depending on the bank.
             first: Number of the first.
         """
         written = entries(values, "values")

@@ -35,7 +35,7 @@ class Report(msgspec.Struct, frozen=True):
     robot_mode: str | None
     """After that, by its RTDE name."""
     safety_mode: str | None
-    """Likewise."""
+    """RTDE name of the safety mode."""
     stop: StopReason | None
     """The stop that keeps it from moving still, or again."""
     why: str
@@ -56,9 +56,9 @@ def unlock(
     A robot that is ready already is left alone. In lockstep time passes by some hundred ticks.
 
     Args:
-        endpoint: Where the server listens, `tcp/<host>:<port>`.
-        name: The robot's name; None: the only one there, or `ur5e`.
-        power_on: Switch the power on and release the brakes where the arm has none.
+        endpoint: Endpoint of the server, `tcp/<host>:<port>`.
+        name: Name of the robot; None: the only one at the endpoint, or `ur5e`.
+        power_on: Switch the power on and release the brakes if the arm has no power.
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
 
     Raises:
@@ -96,7 +96,7 @@ async def make_ready(robot: Robot, arm: Arm, *, power_on: bool = False) -> list[
             pass  # who looks sees why
         found = await look(robot)
         if found.safety_mode == SafetyMode.PROTECTIVE_STOP.name:
-            done.append("saw it stop again at once")
+            done.append("the robot stopped again at once")
     if power_on and found.safety_mode in _ALLOW_POWER and found.robot_mode != RobotMode.RUNNING.name:
         await _rest(robot)
         await arm.power_on()

@@ -17,10 +17,10 @@ def number(value: float, where: str) -> float:
 
     Args:
         value: Anything that stands for one number.
-        where: Name of the argument, for the sentence.
+        where: Name of the argument, for the message.
 
     Raises:
-        ArgumentError: It is none.
+        ArgumentError: The value has the wrong type or length.
     """
     # `float` reads text, which nobody means who moves a robot.
     if not isinstance(value, str | bytes):
@@ -34,12 +34,12 @@ def whole(value: int, where: str, low: int, high: int | None = None) -> int:
 
     Args:
         value: Anything that stands for an integer.
-        where: Name of the argument, for the sentence.
+        where: Name of the argument, for the message.
         low: Smallest that is allowed.
         high: Largest that is allowed; None: there is no bound.
 
     Raises:
-        ArgumentError: It is none, or outside.
+        ArgumentError: The value is not a number, or out of range.
     """
     allowed = f"at least {low}" if high is None else f"from {low} to {high}"
     try:
@@ -56,7 +56,7 @@ def floats(values: Iterable[float], where: str, meaning: str | None = None) -> J
 
     Args:
         values: List, tuple, array.
-        where: Name of the argument, for the sentence.
+        where: Name of the argument, for the message.
         meaning: One word for each number, where their count is known here; otherwise the robot checks it.
 
     Raises:
@@ -73,7 +73,7 @@ def entries(values: Iterable[float], where: str) -> tuple[float, ...]:
     """What a sequence holds, as it stands there.
 
     Raises:
-        ArgumentError: It is none.
+        ArgumentError: The value has the wrong type or length.
     """
     if not isinstance(values, str | bytes):
         with contextlib.suppress(TypeError):
@@ -96,8 +96,8 @@ class JointRange:
         """Plain floats of joint angles that the robot takes.
 
         Args:
-            q: One angle a joint [rad].
-            where: Name of the argument, for the sentence.
+            q: One angle per joint [rad].
+            where: Name of the argument, for the message.
 
         Raises:
             ArgumentError: They are no numbers, another count, not finite or beyond a joint's range.
@@ -105,14 +105,14 @@ class JointRange:
         angles = floats(q, where)
         joints, ranges = self._joints, self._ranges
         if len(angles) != len(joints):
-            why = f"{where} has {len(angles)} angles; this arm has {len(joints)} joints: give one a joint"
+            why = f"{where} has {len(angles)} angles; this arm has {len(joints)} joints: give one per joint"
             raise ArgumentError(where, why, len(joints))
         for place, (angle, (low, high)) in enumerate(zip(angles, ranges, strict=True)):
             if low <= angle <= high:
                 continue
             field = f"{where}[{place}]"
             if not math.isfinite(angle):
-                raise ArgumentError(field, f"{field} is {angle}: an angle is a finite number of rad")
-            why = f"{field} is {angle:g} rad; joint {joints[place]} goes from {low:g} to {high:g} rad"
+                raise ArgumentError(field, f"{field} is {angle}: must be a finite number of rad")
+            why = f"{field} is {angle:g} rad; joint {joints[place]} allows {low:g} to {high:g} rad"
             raise ArgumentError(field, why, low if angle < low else high)
         return angles

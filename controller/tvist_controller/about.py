@@ -12,7 +12,7 @@ from tvist_protocol.values import PROTOCOL_VERSION
 
 VERSION = version("tvist")
 FIELDS = {tag(kind): list(kind.__struct_fields__) for kind in COMMANDS}
-"""Of each command."""
+"""Fields of each command."""
 
 
 def info_of(controller: Controller) -> Info:

@@ -38,7 +38,7 @@ def at_rest(activity: Activity, *, emergency: bool) -> Activity:
     """What is left of an activity where the arm was put somewhere at rest.
 
     Args:
-        activity: Of before.
+        activity: Previous activity.
         emergency: Whether an emergency stop is pressed.
     """
     if activity.protective:

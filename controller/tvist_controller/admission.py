@@ -42,7 +42,7 @@ class Admitted(NamedTuple):
 
     command: Command
     content: dict[str, Any]
-    """The same in Python's own types, for the journal."""
+    """Content in Python's own types, for the journal."""
     session: str | None = None
     """Session of the client that it gives control or the clock to, where its going will be told."""
     client: str | None = None

@@ -20,7 +20,7 @@ class Ahead:
     Args:
         trajectory: What is followed; it is used up.
         line_filter: What shapes it, used up likewise; None for a stop, which bypasses it.
-        shaped: Where the shaped reference is, used up likewise.
+        shaped: Shaped reference, consumed in the same way.
     """
 
     def __init__(

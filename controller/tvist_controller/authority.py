@@ -48,7 +48,7 @@ class Authority:
     def watch(self, now: float) -> None:
         """End a lease that nobody has renewed."""
         if self.session.expired(now):
-            self._lose("the lease ran out: no command renewed it")
+            self._lose("the lease expired: no command renewed it")
 
     def client_gone(self, client: str, session: str) -> None:
         """A client's session has ended; where it held control, motion ends with it, and its hold of the clock ends."""
@@ -70,7 +70,7 @@ class Authority:
 
     def _check_steppable(self) -> None:
         if not self._steppable:
-            why = "time passes by itself here: start with --clock lockstep to step"
+            why = "the robot runs in real time: start it with --clock lockstep to step"
             raise RefusalError("wrong_mode", "type", why)
 
     def _take_clock(self, call: Call[TakeClock]) -> Reply:

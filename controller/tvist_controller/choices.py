@@ -1,4 +1,4 @@
-"""Shapers and estimators as clients name them."""
+"""Choose shapers and estimators by the names that clients send."""
 
 from tvist_controller.calibrations import available, load
 from tvist_controller.mode_source import ModeSource, modal_source
@@ -18,32 +18,32 @@ ESTIMATORS = ("fixed", "polynomial", "modal")
 
 
 def wanted_modes(name: str, modes: int, where: str, known: Registry = BUILT_IN) -> int:
-    """How many modes a filter wants to know.
+    """Return the number of modes that a filter needs.
 
     Args:
-        name: Of the filter.
-        modes: How many it shall suppress.
+        name: Name of the filter.
+        modes: Number of modes that it shall suppress.
         where: Field that the name comes from.
-        known: The filters there are.
+        known: Available filters.
 
     Raises:
-        RefusalError: There is no such filter, or it has a number of its own.
+        RefusalError: There is no such filter, or it has a fixed number of modes.
     """
     try:
         own = known.modes_of(name, modes)
     except UnknownShaperError as error:
         raise RefusalError("unknown_shaper", where, str(error)) from error
     if modes not in {1, own}:
-        why = f"modes is {modes}; {name} has {own}, its own number"
+        why = f"modes is {modes}; the filter {name} always has {own}"
         raise RefusalError("out_of_range", "modes", why, own)
     return own
 
 
 def make_estimator(source: ModeSource, modes: int, payload: Payload, where: str) -> Estimator:
-    """The estimator that was chosen, for so many modes.
+    """Make the chosen estimator for a number of modes.
 
     Raises:
-        RefusalError: It does not have them.
+        RefusalError: It cannot estimate so many modes.
     """
     try:
         return source.estimator(modes, payload)
@@ -54,17 +54,17 @@ def make_estimator(source: ModeSource, modes: int, payload: Payload, where: str)
 def choose_filter(
     name: str, estimator: Estimator, joints: int, *, where: str = "shaper", known: Registry = BUILT_IN
 ) -> Filter:
-    """A filter with a shaper.
+    """Make a filter by name.
 
     Args:
-        name: Of the filter.
-        estimator: The modes as functions of q.
-        joints: Of the arm.
+        name: Name of the filter.
+        estimator: Modes as functions of q.
+        joints: Number of joints of the arm.
         where: Field that the name comes from.
-        known: The filters there are.
+        known: Available filters.
 
     Raises:
-        RefusalError: There is no such shaper, or it does not go with the estimator.
+        RefusalError: There is no such shaper, or it does not work with the estimator.
     """
     try:
         return known.make_filter(name, estimator, joints=joints)
@@ -75,10 +75,10 @@ def choose_filter(
 
 
 def choose_source(command: SetEstimator, setup: Setup) -> ModeSource:
-    """The estimator that a command asks for.
+    """Return the source of modes for the estimator that a command asks for.
 
     Raises:
-        RefusalError: There is none of that name, or its parameters are wrong.
+        RefusalError: There is no estimator of that name, or its parameters are invalid.
     """
     if command.name == "fixed":
         return _fixed(command, setup)
@@ -130,11 +130,11 @@ def _calibration(command: SetEstimator, setup: Setup) -> Calibration:
             return found.calibration
     if command.calibration is None or (own is not None and own.name == command.calibration):
         if own is None:
-            why = "calibration is missing: this server was started without"
+            why = "calibration is missing: this server was started without one"
             raise RefusalError("missing_field", "calibration", why)
         return own
     if command.calibration not in available():
         known = ", ".join(available())
-        why = f"calibration is {command.calibration!r}: there is {known}"
+        why = f"calibration is {command.calibration!r}: must be one of {known}"
         raise RefusalError("unknown_calibration", "calibration", why)
     return load(command.calibration)

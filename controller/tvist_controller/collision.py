@@ -1,4 +1,4 @@
-"""Where the arm would meet itself or the floor: capsules of the robot file, distances by coal."""
+"""Collisions of the arm with itself and the floor: capsules of the robot file, distances by coal."""
 
 import math
 from dataclasses import dataclass
@@ -79,7 +79,7 @@ class CollisionModel:
         """The first meeting on a way, found by long steps where everything is far apart and short ones elsewhere.
 
         Args:
-            way: Where it goes; `Path.whole` and `Path.way` give those of a path.
+            way: Joint positions along the path; `Path.whole` and `Path.way` give those of a path.
             before: Posture that the way begins from, shape (n,) [rad]: what is in a meeting there may move out of it.
                 None: the beginning of the way itself.
 

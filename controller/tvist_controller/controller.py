@@ -152,7 +152,7 @@ class Controller:
         Args:
             command: The command.
             plan: For it, where it was planned beforehand; it must hold on `basis`.
-            session: Of the client that it gives control to, where its going is told by `client_gone`.
+            session: Session of the client that gets control, if `client_gone` will report its end.
         """
         self.counters.commands += 1
         row = self._rows[type(command)]
@@ -338,7 +338,7 @@ class Controller:
             raise RefusalError("wrong_mode", "setpoints", "no stream is running: send servo_start first")
         setpoints = command.setpoints or ()
         if len(setpoints) > command.ticks:
-            why = f"setpoints has {len(setpoints)} entries, one a tick; ticks is {command.ticks}"
+            why = f"setpoints has {len(setpoints)} entries; it must have one per tick, and ticks is {command.ticks}"
             raise RefusalError("out_of_range", "setpoints", why, command.ticks)
         for number, setpoint in enumerate(setpoints):
             check_joints(setpoint.q, self.setup.description, f"setpoints[{number}].q")

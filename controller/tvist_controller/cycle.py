@@ -43,7 +43,7 @@ class Sample(Struct, frozen=True, eq=False, gc=False):
     torque: Floats
     """τ* of the rigid arm for that target, shape (n,) [N m]."""
     fed_forward: Floats
-    """The same with rotors and friction, as the drives get it, shape (n,) [N m]."""
+    """Torque with rotors and friction, as the drives receive it, shape (n,) [N m]."""
     measured: Measurement
     """What the arm did."""
 
@@ -54,10 +54,10 @@ class ControlCycle:
     Args:
         description: The robot.
         tvist: The filter, with its shaper and estimator.
-        q: Where the arm rests at the start, shape (n,) [rad].
+        q: Joint angles at which the arm rests at the start, shape (n,) [rad].
         declared: The payload that inverse dynamics counts on.
         carried: The payload that the arm has.
-        seed: Of the arm's noise and gear errors.
+        seed: Seed of the arm's noise and gear errors.
         plant: What the line moves; None: the flexible arm that the description describes.
 
     Raises:
@@ -167,7 +167,7 @@ class ControlCycle:
 
     @property
     def position(self) -> Floats:
-        """Where the shaped reference is, shape (n,) [rad]."""
+        """Position of the shaped reference, shape (n,) [rad]."""
         return self._shaped.joints.position
 
     def plan(self, target: Floats, limits: Limits, speed: float = 1.0) -> Motion:

@@ -27,4 +27,4 @@ class Emit(Protocol):
     """Puts down an event."""
 
     def __call__(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
-        """Of the tick that is being made, or of the next one between two."""
+        """Emit an event of the tick that is being computed, or of the next one between two ticks."""

@@ -105,7 +105,9 @@ class Faults:
         ):
             plant = type(self._motion.cycle.plant).__name__
             missing = "push" if fault == "torque" else "make_nan"
-            why = f"fault is {fault!r}: the plant, {plant}, cannot have it, since it has no method {missing}"
+            why = (
+                f"fault is {fault!r}: the plant {plant} cannot simulate it, since it has no method {missing}"
+            )
             raise RefusalError("unknown_fault", "fault", why)
 
     def _forget(self, faults: set[str]) -> None:
@@ -125,7 +127,7 @@ class Faults:
 def _check(command: SimulationInject, joints: int) -> None:
     fault = FAULTS.get(command.fault)
     if fault is None:
-        why = f"fault is {command.fault!r}: there is {', '.join(FAULTS)}"
+        why = f"fault is {command.fault!r}: must be one of {', '.join(FAULTS)}"
         raise RefusalError("unknown_fault", "fault", why)
     for field in ("joint", "value", "seconds"):
         given = getattr(command, field) is not None

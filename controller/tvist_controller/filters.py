@@ -17,7 +17,7 @@ class Filters:
 
     Args:
         motion: What may not be spoiled by another filter; it has the control line.
-        source: Where the modes of the line's first filter come from.
+        source: Source of the modes of the line's first filter.
         declared: What the controller believes that the arm carries.
         emit: Takes what happens.
     """
@@ -26,7 +26,7 @@ class Filters:
         self._motion, self._cycle, self._emit = motion, motion.cycle, emit
         self._declared, self._clipped = declared, False
         self.source = source
-        """Where the filter's modes come from."""
+        """Source of the filter's modes."""
         self.rows = (Row(SetShaper, self._choose), Row(SetEstimator, self._estimate))
         self._warn_of_payload()
         self._warn_of_arm()
@@ -85,8 +85,8 @@ class Filters:
         calibration = self.source.calibration
         if calibration is not None and self.source.fits_arm is False:
             why = (
-                f"calibration {calibration.name!r} was measured on another arm than the robot file describes: "
-                "frequencies will be off; tvist identify measures this one"
+                f"calibration {calibration.name!r} was measured on a different arm than the one in the robot file: "
+                "the shaper's frequencies will be wrong; measure this arm with tvist identify"
             )
             self._emit("warning", why=why)
 
@@ -95,6 +95,6 @@ class Filters:
         clipped = self._cycle.tvist.clipped
         if clipped and not self._clipped:
             name = self._cycle.tvist.name
-            why = f"{name} cannot do here what it should: a delay is beyond what it holds, or more is left"
+            why = f"{name} cannot meet its specification here: it needs a longer delay line, or leaves more vibration"
             self._emit("warning", code="out_of_range", why=why)
         self._clipped = clipped

@@ -21,7 +21,7 @@ from tvist_protocol.stream import Event
 
 Attend = Callable[[], bool]
 """Does what waits before a tick of a step; False where the step has to end."""
-_BUSY = Refused(code="busy", where="", why="a step is under way: send the next when it is answered")
+_BUSY = Refused(code="busy", where="", why="a step is in progress: send the next one after its answer")
 
 
 class Host:

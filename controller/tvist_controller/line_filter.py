@@ -16,14 +16,14 @@ class LineFilter:
 
     Args:
         tvist: The first filter.
-        limits: Of the motion that is shaped.
+        limits: Limits of the motion that is shaped.
     """
 
     def __init__(self, tvist: Filter, limits: Limits) -> None:
         self.tvist = tvist
         """The filter chosen last: in force, or about to be."""
         self.limits = limits
-        """Of the present motion."""
+        """Limits of the current motion."""
         self._fade: Fade | None = None
 
     @property
@@ -88,7 +88,7 @@ class LineFilter:
 
         Args:
             tvist: The filter.
-            sample: Where the reference rests: joint positions, shape (n,), or a path's parameter, shape (m,) [rad].
+            sample: Rest of the reference: joint positions, shape (n,), or a path's parameter, shape (m,) [rad].
             posture_of: From a path's parameter to joint positions; None: samples are joint positions.
         """
         self.tvist, self._fade = tvist, None

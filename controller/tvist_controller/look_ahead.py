@@ -28,7 +28,7 @@ class LookAhead:
     angles turned times its reach. What room there is around a posture is remembered until it is used up.
 
     Args:
-        collisions: Where the arm would meet something.
+        collisions: Collision model of the arm.
         stops: Plans stops.
         room: What torque leaves.
     """

@@ -23,15 +23,15 @@ class ModeSource:
     """An estimator that was chosen."""
 
     name: SourceName
-    """As on the wire."""
+    """Name on the wire."""
     description: RobotDescription
     """The robot."""
     calibration: Calibration | None = None
-    """Of `polynomial` and `modal`."""
+    """Calibration of `polynomial` and `modal`."""
     f_d: Sequence[float] = ()
-    """Of `fixed` [Hz]."""
+    """Damped frequencies of `fixed` [Hz]."""
     zeta: Sequence[float] = ()
-    """Of `fixed` [-]."""
+    """Damping ratios of `fixed` [-]."""
 
     @property
     def knows_payload(self) -> bool:

@@ -36,7 +36,7 @@ class MotionControl:
 
     Args:
         cycle: The control line.
-        collisions: Where the arm would meet something.
+        collisions: Collision model of the arm.
         emit: Takes what happens.
         mode: Robot mode to start in.
     """
@@ -102,7 +102,7 @@ class MotionControl:
         """Start a point-to-point motion that was planned on what is so now; its number.
 
         Raises:
-            RefusalError: As `check_move`.
+            RefusalError: See `check_move`.
         """
         self._go("move_j")
         return self.motions.begin(planned)
@@ -181,12 +181,12 @@ class MotionControl:
 
         Args:
             error: What the arm said.
-            seed: Of its noise and gear errors.
+            seed: Seed of the noise and gear errors.
 
         Returns:
             A tick of the line with it.
         """
-        why = f"{error}: the simulation put it at rest where its reference was"
+        why = f"{error}: the simulation put the arm at rest at its reference"
         self.abandon(why, "plant_failure")
         self.cycle.reset(self.cycle.position, seed=seed)
         self._protection.forget()
@@ -218,7 +218,7 @@ class MotionControl:
         """
         target = self._check("servo_start")
         if self.safety.reduced and limits.velocity > (most := self.motions.reduced_velocity):
-            why = f"velocity is {limits.velocity:g} rad/s; safety_mode is REDUCED, which leaves {most:.3g}"
+            why = f"velocity is {limits.velocity:g} rad/s; safety_mode is REDUCED, which allows {most:.3g}"
             raise RefusalError("limit_velocity", "velocity", why, most)
         self.activity = target
         self.streams.begin(self.cycle.stream(period, limits), now)
@@ -269,12 +269,12 @@ class MotionControl:
         """Go where a trigger leads, and stop on the way what moves. One that leads nowhere is none of ours.
 
         Args:
-            trigger: Of the table.
+            trigger: Trigger of the table of transitions.
             why: The reason, for a person.
             code: The reason, for a program.
             deceleration: Wanted limit [rad/s^2]; None for what the torque allows.
-            kind: Of an event that tells of the stop itself; None for none.
-            category: Of the stop.
+            kind: Kind of the event that reports the stop; None for no event.
+            category: Category of the stop.
         """
         target = after(self.activity, trigger)
         if target is None:

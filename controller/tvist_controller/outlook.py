@@ -50,7 +50,7 @@ class Outlook:
         return np.array(ahead.references) if ahead.rests else None
 
     def _ahead(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Ahead:
-        """As `foresee`, to be run as far as one likes."""
+        """Start a simulation like that of `foresee`, to be run as far as needed."""
         stopping = self._cycle.stopping
         present, line_filter, shaped = self._cycle.fork()
         trajectory = present if trajectory is None else trajectory.fork()

@@ -1,7 +1,7 @@
-"""Shapers from a person's own file, named FILE.py:NAME.
+"""Shapers from the user's own files, given as FILE.py:NAME.
 
-Only the command line, a configuration and a state file name files: a client on the network chooses among the names of
-what is loaded, and a recording never makes anybody run a file.
+Only the command line, a configuration and a state file can name files. A client on the network chooses among the names
+of loaded shapers, and a recording never causes a file to be run.
 """
 
 import hashlib
@@ -27,20 +27,20 @@ _FILE = re.compile(r"(?P<file>.*\.py)(?::(?P<attribute>.*))?", re.DOTALL)
 
 
 class OwnShaperError(ValueError):
-    """A file holds no such shaper; the sentence names file and name, and says why."""
+    """A file contains no such shaper; the message gives the file, the name and the reason."""
 
 
 class RecordedShaper(Struct, frozen=True):
-    """What a recording says of a shaper from a file."""
+    """Description of a shaper from a file, as a recording contains it."""
 
     name: str
-    """What it is called on the wire and in tables."""
+    """Name on the wire and in tables."""
     file: str
-    """Path, as it was given."""
+    """Path of the file, as it was given."""
     attribute: str
-    """Name in the file."""
+    """Name of the shaper in the file."""
     sha256: str
-    """Of the file, in hexadecimal."""
+    """SHA-256 of the file, in hexadecimal."""
 
 
 @dataclass(frozen=True)
@@ -48,58 +48,58 @@ class OwnShaper:
     """A shaper that was loaded from a file."""
 
     file: str
-    """Path, as it was given."""
+    """Path of the file, as it was given."""
     attribute: str
-    """Name in the file."""
+    """Name of the shaper in the file."""
     sha256: str
-    """Of the file's bytes that were run, in hexadecimal. What the file imports is not in it."""
+    """SHA-256 of the bytes that were run, in hexadecimal; it does not cover what the file imports."""
     shaper: AnyShaper = field(compare=False)
-    """Tried out over every mode that a client may tell a robot."""
+    """The shaper, checked for every mode that a client may send."""
 
     @property
     def name(self) -> str:
-        """What it is called on the wire and in tables."""
+        """Name on the wire and in tables."""
         return self.shaper.name
 
     @property
     def place(self) -> str:
-        """FILE.py:NAME."""
+        """The shaper as FILE.py:NAME."""
         return f"{self.file}:{self.attribute}"
 
     @property
     def recorded(self) -> RecordedShaper:
-        """What a recording says of it."""
+        """Description of the shaper for a recording."""
         return RecordedShaper(self.name, self.file, self.attribute, self.sha256)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Travel to another process as the file's name: a function cannot."""
+        """Pickle the shaper as the name of its file, since a function cannot be pickled."""
         return _load_again, (self.place, self.sha256)
 
 
 def is_file(shaper: str) -> bool:
-    """Whether a shaper is named by a file, FILE.py:NAME, rather than by its name."""
+    """Whether a shaper is given as FILE.py:NAME rather than by its name."""
     return _FILE.fullmatch(shaper) is not None
 
 
 def load_own(place: str) -> OwnShaper:
-    """Run a file, and try out the shaper of a name in it.
+    """Run a file and check the shaper that it contains under a name.
 
     Args:
         place: FILE.py:NAME. NAME is a function (f_d [Hz], ζ [-]) -> `Impulses`, a `Shaper` or a `FirShaper`.
 
     Raises:
-        OwnShaperError: There is no such file or name, running the file raises, what the name stands for is no shaper,
-            or that fails for a mode.
-        UserFileError: It is no file with a text of at most 4 MiB.
+        OwnShaperError: The file or the name does not exist, running the file raises an exception, the name is not a
+            shaper, or the shaper fails for a mode.
+        UserFileError: The file is not text, or is larger than 4 MiB.
     """
     named = _FILE.fullmatch(place)
     if named is None:
         raise OwnShaperError(
-            f"shaper is {place!r}: must be FILE.py:NAME, a Python file and the name of a shaper in it"
+            f"shaper is {place!r}: must be FILE.py:NAME, a Python file and the name of a shaper in that file"
         )
     file, attribute = named["file"], named["attribute"]
     if not attribute:
-        raise OwnShaperError(f"shaper {place}: the name of a shaper in the file is missing: give {file}:NAME")
+        raise OwnShaperError(f"shaper {place}: the name of the shaper is missing: give {file}:NAME")
     try:
         content = read_bytes(file, "shaper")
     except OSError as error:
@@ -108,15 +108,15 @@ def load_own(place: str) -> OwnShaper:
     module = _run(content, place, file, sha256)
     if attribute not in vars(module):
         there = ", ".join(name for name, value in vars(module).items() if _may_be_one(value, module.__name__))
-        known = f"it has {there}" if there else "nothing in it is a shaper"
-        raise OwnShaperError(f"shaper {place}: {file} has no {attribute}; {known}")
+        known = f"it contains {there}" if there else "it contains no shaper"
+        raise OwnShaperError(f"shaper {place}: {file} does not contain {attribute}; {known}")
     found = vars(module)[attribute]
     try:
         shaper = _shaper(found, attribute, place)
         Registry([shaper])
     except ShaperFailureError as error:
         limits = f"{TRIED_F_D[0]:g} to {TRIED_F_D[1]:g} Hz and any damping ratio below its zeta_max"
-        raise OwnShaperError(f"shaper {place} {error.why}; it must serve {limits}") from error
+        raise OwnShaperError(f"shaper {place} {error.why}; it must support {limits}") from error
     except ShapingError as error:
         raise OwnShaperError(f"shaper {place}: {error}") from error
     return OwnShaper(file, attribute, sha256, shaper)
@@ -160,12 +160,12 @@ def _may_be_one(value: object, module: str) -> bool:
 
 @lru_cache(maxsize=8)
 def _load_again(place: str, sha256: str) -> OwnShaper:
-    """Load a shaper in a process that works for the one that loaded it first.
+    """Load a shaper again in a worker process.
 
     Raises:
-        OwnShaperError: The file has changed since, or cannot be loaded.
+        OwnShaperError: The file has changed since it was first loaded, or cannot be loaded.
     """
     found = load_own(place)
     if found.sha256 != sha256:
-        raise OwnShaperError(f"shaper {place}: the file has changed since it was loaded first")
+        raise OwnShaperError(f"shaper {place}: the file has changed since it was first loaded")
     return found

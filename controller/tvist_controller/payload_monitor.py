@@ -117,5 +117,5 @@ class PayloadMonitor:
         felt = max(self.payload.mass + mass, 0.0)
         return (
             f"{self.payload.mass:g} kg are declared, but the drives hold about {felt:.1f} kg (within {bound:.1f} kg): "
-            "declare what the arm carries, or see what pushes it"
+            "declare the actual payload, or find out what pushes the arm"
         )

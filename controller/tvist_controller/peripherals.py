@@ -22,9 +22,9 @@ from tvist_protocol.values import Payload
 CURRENT = (0.004, 0.020)
 """Range of an analogue terminal as current [A]."""
 VOLTAGE = (0.0, 10.0)
-"""The same as voltage [V]."""
+"""Range as voltage [V]."""
 LEAST, MOST = -(2**31), 2**31 - 1
-"""Of an integer register."""
+"""Range of an integer register."""
 
 
 def analog_value(share: float, *, voltage: bool) -> float:
@@ -47,7 +47,7 @@ class LoadedProgram(Protocol):
 
     @property
     def line(self) -> int:
-        """As in `Io`."""
+        """Current line, as in `Io`."""
 
 
 class Peripherals:
@@ -110,7 +110,7 @@ class Peripherals:
         """Write registers; input registers anyone may."""
         command = call.command
         if command.token is None and command.bank.startswith("output"):
-            why = f"token is missing: {command.bank} registers are the robot's own, and take control to write"
+            why = f"token is missing: {command.bank} registers belong to the robot, and writing them needs control"
             raise RefusalError("missing_field", "token", why)
         self.set_registers(command)
 

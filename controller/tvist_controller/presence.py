@@ -42,8 +42,8 @@ class Presence:
         there = self._sessions.get(client, set())
         if len(there) > 1:
             why = (
-                f"{len(there)} programs are connected as {client!r}, and nobody can tell which of them asks: give each "
-                "a name of its own; one that has lost its connection is forgotten within some 10 s"
+                f"{len(there)} programs are connected as {client!r}, and the server cannot tell which of them sent "
+                "this: give each its own name; a program that has lost its connection is forgotten within about 10 s"
             )
             raise NoControlError("no_control", why, "client")
         return next(iter(there), None)

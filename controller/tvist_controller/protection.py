@@ -38,7 +38,7 @@ class Protection:
         if joint is not None:
             name, limit = self._cycle.description.robot.joints[joint], self._overload.limits[joint]
             moment = sample.measured.moment[joint]
-            why = f"torque of joint {name} is {moment:.0f} N m; beyond its {limit:g} for more than 10 ms"
+            why = f"torque of joint {name} is {moment:.0f} N m, beyond its limit of {limit:g} for more than 10 ms"
             found.append(Danger(why, "limit_torque"))
         fault = self._cycle.line_filter.fault
         if fault is not None:  # the filter only goes on with old weights, because its shaper's function fails

@@ -1,4 +1,4 @@
-"""Saying no: a refusal raised where it is found, answered where the command came in."""
+"""Refusals of commands: raised where a problem is found, sent as an answer where the command came in."""
 
 import math
 from collections.abc import Sequence
@@ -10,15 +10,15 @@ from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload
 
 SLOWEST = {"velocity": 1e-3, "acceleration": 1e-2, "jerk": 0.1}
-"""Limits of a motion below which it would take for ever [rad/s, rad/s^2, rad/s^3]."""
+"""Lowest accepted limits of a motion, which would otherwise take too long [rad/s, rad/s^2, rad/s^3]."""
 
 _NOTHING_TO = {
     "pause": "no motion is running: there is nothing to pause",
     "resume": "no motion is paused: there is nothing to resume",
     "servo_stop": "no stream is running: send servo_start first",
     "unlock_protective_stop": "there is no protective stop to unlock",
-    "power_on": "the arm has its power",
-    "power": "the arm has its power",
+    "power_on": "the arm already has power",
+    "power": "the arm already has power",
 }
 
 
@@ -31,15 +31,15 @@ class RefusalError(Exception):
 
 
 def out_of_turn(command: str, activity: Activity) -> RefusalError:
-    """The refusal of a command that leads nowhere from what the robot is doing.
+    """Return the refusal of a command that is not allowed in the current activity.
 
     Args:
-        command: Its `type`.
-        activity: What the robot is doing.
+        command: `type` of the command.
+        activity: Current activity of the robot.
     """
     code: Code = "wrong_mode"
     if activity is Activity.PROTECTIVE_STOPPING:
-        why = "safety_mode is PROTECTIVE_STOP: send unlock_protective_stop once the arm rests"
+        why = "safety_mode is PROTECTIVE_STOP: send unlock_protective_stop once the arm is at rest"
     elif activity is Activity.PROTECTIVE_STOP:
         why = "safety_mode is PROTECTIVE_STOP: send unlock_protective_stop first"
     elif command in _NOTHING_TO:

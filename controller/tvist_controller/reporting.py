@@ -112,6 +112,6 @@ def truth_of(plant: Plant) -> PlantTruth:
     truth = plant.truth()
     if truth is None:
         raise ValueError(
-            f"truth is on, and plant {type(plant).__name__} does not know the truth: turn it off"
+            f"truth is on, but the plant {type(plant).__name__} cannot report it: turn truth off"
         )
     return truth

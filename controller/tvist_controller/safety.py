@@ -19,7 +19,7 @@ GENTLEST_STOP = 1.0
 """Deceleration below which no stop goes: neither for torque, nor because a client wants it [rad/s^2]."""
 
 MOMENTS = 32
-"""Of a stop at which its torque is looked at."""
+"""Number of moments of a stop at which its torque is checked."""
 _SHARES = np.arange(1, MOMENTS + 1) / MOMENTS
 LOOK_EVERY = 4
 """Ticks between two looks at the torque of references that are known."""
@@ -62,8 +62,8 @@ class StopTorque:
 
     Args:
         dynamics: Inverse dynamics with the declared payload.
-        state: Where the stop begins.
-        limits: Of the joints' torque, shape (n,) [N m].
+        state: State at which the stop begins.
+        limits: Torque limits of the joints, shape (n,) [N m].
         asked: Largest that the motion itself would ask from now on, shape (n,) [N m]; None: what it asks now.
     """
 
@@ -121,9 +121,9 @@ def largest_torque(dynamics: InverseDynamics, path: Path, velocity: float, accel
 
     Args:
         dynamics: Inverse dynamics with the declared payload.
-        path: Where it goes.
+        path: Path of the stop.
         velocity: Limit for the path's parameter [rad/s].
-        acceleration: Likewise [rad/s^2].
+        acceleration: Acceleration of the path's parameter [rad/s^2].
     """
     most = np.zeros(len(path.posture(path.start)))
     way = path.end - path.start
@@ -139,11 +139,11 @@ def acceleration_on_way(
 
     Args:
         dynamics: Inverse dynamics with the declared payload.
-        path: Where the motion goes.
+        path: Path of the motion.
         start: Parameter where it is looked at first, shape (m,) [rad].
         way: From there to where it is looked at last, shape (m,) [rad].
         velocity: Largest there [rad/s].
-        limits: Of the joints' torque, shape (n,) [N m].
+        limits: Torque limits of the joints, shape (n,) [N m].
     """
     room = math.inf
     for resting, pushed in _on_way(dynamics, path, start, way, velocity, math.inf):

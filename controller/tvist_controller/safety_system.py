@@ -78,6 +78,6 @@ class SafetySystem:
             RefusalError: Nothing.
         """
         if self.latched is None:
-            why = "the safety system has found nothing wrong: there is nothing to restart it for"
+            why = "the safety system has found no violation or fault: there is no need to restart it"
             raise RefusalError("wrong_mode", "", why)
         self.latched = None

@@ -46,9 +46,9 @@ def check_token(lease: Lease | None, token: str, where: str = "token") -> Lease:
         NoControlError: Nobody has control, or the token is another one's or an old one.
     """
     if lease is None:
-        raise NoControlError("no_control", "nobody has control: send take_control first", where)
+        raise NoControlError("no_control", "no client has control: send take_control first", where)
     if token != lease.token:
-        why = f"{where} is not that of the present lease, held by {lease.client!r}"
+        why = f"{where} is not that of the current lease, held by {lease.client!r}"
         raise NoControlError("stale_token", why, where)
     return lease
 
@@ -96,7 +96,7 @@ class Session:
         """Check a token and renew its lease.
 
         Raises:
-            NoControlError: As `check_token`.
+            NoControlError: See `check_token`.
         """
         lease = check_token(self.lease, token)
         self.lease = replace(lease, ends=now + lease.seconds)
@@ -108,7 +108,7 @@ class Session:
         Args:
             client: Its name.
             now: Time [s].
-            session: As in `take`.
+            session: Session of the client, see `take`.
         """
         if self.lease is not None:
             self.lease = self._grant(client, self.lease.seconds, now, session)

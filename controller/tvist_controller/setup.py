@@ -1,4 +1,4 @@
-"""How a controller starts: everything that decides what it will do, besides what clients send."""
+"""Initial setup of a controller: everything besides the clients' messages that determines its behaviour."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -22,47 +22,47 @@ from tvist_shaping.named import Registry
 
 @dataclass(frozen=True)
 class Setup:
-    """Start of a controller."""
+    """Initial setup of a controller."""
 
     description: RobotDescription
-    """The robot."""
+    """Description of the robot."""
     q: tuple[float, ...]
-    """Where the arm rests [rad]."""
+    """Joint angles at which the arm rests [rad]."""
     payload: Payload
-    """Declared."""
+    """Declared payload."""
     calibration: Calibration | None
-    """Of the estimator; None: it is `fixed` at 10 Hz and 0.2, for a robot to be identified."""
+    """Calibration of the estimator; None for a robot yet to be identified, with the estimator `fixed` at 10 Hz, 0.2."""
     name: str = "ur5e"
     """Name of the robot on the network."""
     shaper: str = "zv"
     """Name of the shaper."""
     seed: int = 0
-    """Of sensor noise and gear errors."""
+    """Seed of sensor noise and gear errors."""
     clock: Clock = "realtime"
-    """Who lets time pass. Only in real time do leases and streams time out."""
+    """What advances simulation time. Leases and streams time out only in real time."""
     carried: Payload | None = None
-    """Carried until a client says otherwise; None: what is declared."""
+    """Carried payload until a client changes it; None: the declared one."""
     mode: ResetMode = "RUNNING"
-    """Robot mode to start in."""
+    """Initial robot mode."""
     truth: bool = False
-    """Whether to tell what no robot can know."""
+    """Whether to publish what a real robot cannot measure."""
     own_shapers: tuple[OwnShaper, ...] = ()
-    """Shapers from files, which go by their names beside those that come with the package."""
+    """Shapers from files, available by name beside those that come with the package."""
 
     @cached_property
     def registry(self) -> Registry:
-        """The shapers that this robot can use.
+        """Shapers that this robot can use.
 
         Raises:
-            DesignError: Two go by one name.
+            DesignError: Two shapers have the same name.
         """
         return Registry(own.shaper for own in self.own_shapers)
 
     def check(self) -> None:
-        """Check what types cannot.
+        """Check what the types of the fields cannot express.
 
         Raises:
-            ValueError: A value is out of range; the sentence names it.
+            ValueError: A value is out of range; the message names it.
         """
         joints = self.description.joints
         if len(self.q) != joints:
@@ -77,15 +77,15 @@ class Setup:
         self.registry.check(self.shaper)
 
     def source(self) -> ModeSource:
-        """Where modes come from to begin with."""
+        """Return the initial source of the vibration modes."""
         return first_source(self.description, self.calibration)
 
     def estimator(self) -> Estimator:
-        """The lowest mode, to begin with."""
+        """Return the initial estimator of the lowest mode."""
         return self.source().estimator(1, self.payload)
 
     def to_builtins(self) -> dict[str, Any]:
-        """As maps and lists, for a recording."""
+        """Convert the setup to maps and lists for a recording."""
         return {
             "description": msgspec.to_builtins(self.description),
             "q": list(self.q),
@@ -103,14 +103,14 @@ class Setup:
 
     @classmethod
     def from_builtins(cls, content: dict[str, Any], own_shapers: Sequence[OwnShaper] = ()) -> "Setup":
-        """From a recording.
+        """Restore a setup from a recording.
 
         Args:
-            content: What `to_builtins` gave.
-            own_shapers: The shapers from files that it names, loaded again.
+            content: Result of `to_builtins`.
+            own_shapers: Shapers from files that the recording names, loaded again.
 
         Raises:
-            ValueError: A part is missing or wrong.
+            ValueError: A part is missing or invalid.
         """
         try:
             calibration = content["calibration"]
@@ -127,20 +127,20 @@ class Setup:
                 **{key: content[key] for key in ("name", "shaper", "seed", "clock", "truth")},
             )
         except KeyError as error:
-            raise ValueError(f"start of the recording: {error.args[0]} is missing") from error
+            raise ValueError(f"initial setup in the recording: {error.args[0]} is missing") from error
         except TypeError as error:
-            raise ValueError(f"start of the recording: {error}") from error
+            raise ValueError(f"initial setup in the recording: {error}") from error
         except ProtocolError as error:
-            raise ValueError(f"start of the recording: {error.why}") from error
+            raise ValueError(f"initial setup in the recording: {error.why}") from error
 
 
 def body(payload: Payload) -> Body:
-    """A payload of the wire as the plant takes it."""
+    """Convert a payload from the wire to the plant's type."""
     return Body(mass=payload.mass, com=payload.com, inertia=payload.inertia)
 
 
 def paper_payload(description: RobotDescription, mass: float | None = None) -> Payload:
-    """The robot file's payload, its mass and inertia scaled to another mass [kg]."""
+    """Return the robot file's payload, with mass and inertia scaled to another mass [kg]."""
     own = description.payload
     xx, xy, xz, yy, yz, zz = own.inertia
     share = 1.0 if mass is None or own.mass == 0.0 else mass / own.mass
@@ -152,9 +152,9 @@ def paper_payload(description: RobotDescription, mass: float | None = None) -> P
 
 
 def check_rating(declared: Payload, description: RobotDescription) -> None:
-    """Check that a robot is rated for what it starts with, as `set_payload` does later.
+    """Check the declared payload against the robot's rating, as `set_payload` does later.
 
-    It is what is declared that counts: what the arm carries besides may be anything, to try what happens then.
+    Only the declared payload is checked: the carried one may be anything, to test what happens then.
 
     Raises:
         ValueError: The payload is too heavy.

@@ -8,7 +8,7 @@ from tvist_controller.stepping import ClockHold
 
 
 class Standing(NamedTuple):
-    """Of a controller, between two ticks; a new one takes its place, so that any thread may read it."""
+    """State of a controller between two ticks; a new one replaces it, so that any thread may read it."""
 
     lease: Lease | None
     """Who has control."""

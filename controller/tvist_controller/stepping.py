@@ -26,7 +26,7 @@ def check_clock_token(hold: ClockHold | None, token: str) -> ClockHold:
         NoControlError: Nobody holds the clock, or the token is another one's or an old one.
     """
     if hold is None:
-        raise NoControlError("no_control", "nobody holds the clock: send take_clock first")
+        raise NoControlError("no_control", "no client holds the clock: send take_clock first")
     if token != hold.token:
         raise NoControlError("stale_token", f"token is not that of the clock, held by {hold.client!r}")
     return hold
@@ -62,9 +62,7 @@ def check_step_token(hold: ClockHold | None, lease: Lease | None, token: str) ->
     if hold is None:
         return check_token(lease, token).client
     if lease is not None and token == lease.token:
-        why = (
-            f"the clock is held by {hold.client!r}: control does not let time pass until that one releases it"
-        )
+        why = f"the clock is held by {hold.client!r}: a client with control cannot step until the clock is released"
         raise NoControlError("no_control", why)
     return check_clock_token(hold, token).client
 
@@ -82,7 +80,7 @@ def check_step(hold: ClockHold | None, lease: Lease | None, step: SimulationStep
     if step.motion_token is not None:
         check_token(lease, step.motion_token, "motion_token")
     elif step.setpoints and hold is not None:
-        why = "motion_token is missing: set-points take control, and the clock's token gives none"
+        why = "motion_token is missing: set-points need control, and the clock's token does not give it"
         raise NoControlError("missing_field", why, "motion_token")
     return client
 
@@ -114,7 +112,7 @@ class Stepping:
         """Give the clock back.
 
         Raises:
-            NoControlError: As `check_clock_token`.
+            NoControlError: See `check_clock_token`.
         """
         check_clock_token(self.hold, token)
         self.hold = None

@@ -20,7 +20,7 @@ class StopReasons:
         """Remember a stop.
 
         Args:
-            event: Of kind `protective_stop` or `safety_stop`.
+            event: Event of kind `protective_stop` or `safety_stop`.
             mode: What the safety system allows now: the gravest of what holds, which another stop may have led to.
         """
         cause = _cause(event, mode)

@@ -91,7 +91,7 @@ class StopPlanner:
         with more jerk; and a gentler one that is over before the motion, braking as hard as it may, could be.
 
         Args:
-            state: Of the path's parameter, a tick before the newest shaped reference.
+            state: State of the path's parameter, a tick before the newest shaped reference.
             newest: The parameter there, shape (m,) [rad].
             forecast: What is known of the motion.
             wanted: Deceleration asked for [rad/s^2]; None for as much as possible.
@@ -130,9 +130,9 @@ class StopPlanner:
 
         Args:
             ahead: The motion; it is run ahead as far as a stop lasts. One that may turn back is known until it rests.
-            state: As in `on_path`.
-            forecast: As in `on_path`.
-            wanted: As in `on_path`.
+            state: State, see `on_path`.
+            forecast: Forecast, see `on_path`.
+            wanted: Requested stop, see `on_path`.
             asked: Largest torques that the motion itself would ask for from now on, shape (n,) [N m]; None: they are
                 not known, and a stop may ask for its share alone.
 
@@ -166,7 +166,7 @@ class StopPlanner:
         """The quickest stop of every joint by itself that is clear all along and keeps the torque.
 
         Args:
-            state: Of the newest shaped reference.
+            state: State of the newest shaped reference.
             wanted: Deceleration asked for [rad/s^2]; None for as much as possible.
             clear: Whether nothing meets on its way.
 

@@ -23,7 +23,7 @@ class WayAhead:
     Args:
         cycle: The control line.
         outlook: On it.
-        collisions: Where the arm would meet something.
+        collisions: Collision model of the arm.
     """
 
     def __init__(self, cycle: ControlCycle, outlook: Outlook, collisions: CollisionModel) -> None:
@@ -109,7 +109,7 @@ class WayAhead:
         met = met or self.rest_of_way(tvist)
         if met is not None:
             collisions.carry(before)
-            why = f"{met} on the rest of the way with this payload"
+            why = f"{met} on the rest of the path with this payload"
             raise RefusalError("collision", "com", why, CLEARANCE)
 
     def check_filter(self, tvist: Filter) -> None:

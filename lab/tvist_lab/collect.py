@@ -18,7 +18,7 @@ class Collected:
     truths: list[Truth] = field(default_factory=list)
 
     def recording(self) -> Recording:
-        """As columns, from the first to the last tick of which everything has arrived.
+        """The messages as columns, from the first to the last tick of which everything has arrived.
 
         On a network the truth of a tick may come before or after its state.
         """

@@ -29,7 +29,7 @@ class Demo:
     """What came out."""
 
     report: dict[str, Any]
-    """As of `tvist paper`, with the checks."""
+    """Report of `tvist paper`, with the checks."""
     recording: Path
     figures: list[Path]
     equal: bool
@@ -46,7 +46,7 @@ def run_demo(folder: Path, seed: int, progress: Callable[[str], None]) -> Demo:
 
     Args:
         folder: For recording and figures; an earlier demonstration's recording there is replaced.
-        seed: Of noise and gear errors.
+        seed: Seed of noise and gear errors.
         progress: Told of each motion done.
 
     Raises:

@@ -49,11 +49,11 @@ class RecordingFile:
     start: dict[str, Any] | None
     """How its server was started; None in a file of another program."""
     states: tuple[State, ...]
-    """As they were recorded, at least one; NaN where a number was not finite."""
+    """Recorded states, at least one; NaN where a number was not finite."""
     events: tuple[Event, ...]
-    """As they were recorded."""
+    """Recorded events."""
     truths: tuple[Truth, ...]
-    """As they were recorded; none unless the robot told the truth."""
+    """Recorded truth; empty unless the robot published it."""
     journal: tuple[Entry, ...]
     """What reached the controller."""
     complete: bool

@@ -8,7 +8,7 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import Measurement, PlantError, Truth
 
 TIMESTEP = 0.00025
-"""Of MuJoCo, at which it agrees with `FlexibleArm` [s]."""
+"""Time step of MuJoCo at which it agrees with `FlexibleArm` [s]."""
 
 
 class MujocoArm:

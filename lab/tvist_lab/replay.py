@@ -30,7 +30,7 @@ class Replay:
     events: list[Event] = field(default_factory=list)
     truths: list[Truth] = field(default_factory=list)
     first_difference: str | None = None
-    """Where it leaves the first run; None: nowhere."""
+    """First difference from the first run; None if there is none."""
     notes: list[str] = field(default_factory=list)
     """What a person should know of it."""
 

@@ -29,7 +29,7 @@ class SecondOpinion:
     Args:
         description: The robot.
         payload: What it carries.
-        timestep: Of MuJoCo's integrator, a fraction of 2 ms [s]. 1 ms is unstable for the UR5e.
+        timestep: Time step of MuJoCo's integrator, a fraction of 2 ms [s]. 1 ms is unstable for the UR5e.
 
     Raises:
         ValueError: 2 ms is no multiple of the time step.
@@ -111,7 +111,7 @@ class SecondOpinion:
         return felt[3:], np.array(data.xmat[self._flange]).reshape(3, 3)
 
     def flange_position(self) -> Floats:
-        """Where the flange is, shape (3,) [m]."""
+        """Position of the flange, shape (3,) [m]."""
         return np.array(self._data.xpos[self._flange])
 
     @property
@@ -228,7 +228,7 @@ def _add_mass(body: "mujoco.MjsBody", mass: float, com: tuple[float, float, floa
 def _lump_places(
     description: RobotDescription, number: int
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Where the two halves of a bending link sit in its frame: the one nearer to its joint, the other."""
+    """Return the positions of a bending link's two halves in its frame, the one nearer to its joint first."""
     x, y, z = description.links.com[number]
     arm = float(np.sqrt(description.links.inertia[number][3] / description.links.mass[number]))
     joint = -description.kinematics.a[number]

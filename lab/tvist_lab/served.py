@@ -57,7 +57,7 @@ async def served(
     """`tvist serve` with options, and a client of it; SIGTERM and a clean exit at the end.
 
     Args:
-        options: Of `tvist serve`, besides the endpoint.
+        options: Options of `tvist serve`, besides the endpoint.
         name: The robot's name, or that of one of several.
         several: Whether the options name the robots.
         core: Processor the server is bound to.
@@ -90,7 +90,7 @@ async def served(
 
 @asynccontextmanager
 async def served_robot(options: Sequence[str], name: str = "ur5e") -> AsyncIterator[tuple[Robot, str]]:
-    """As `served`, for one robot; a client of it, and its endpoint.
+    """Serve one robot, see `served`; gives a client of it and its endpoint.
 
     Raises:
         ServedError: It does not answer, or its exit code is not 0.

@@ -40,4 +40,4 @@ WORKSPACE = Region(
 )
 """Above the stand, the wrist's two outer joints at zero."""
 IDENTIFIED = Region(low=(0.0, *WORKSPACE.low[1:]), high=(0.0, *WORKSPACE.high[1:]))
-"""The same without the base: turning an arm on a rigid stand changes none of its modes."""
+"""Workspace without the base: turning an arm on a rigid stand changes none of its modes."""

@@ -1,4 +1,4 @@
-"""What a robot was found to be: the content of a calibration file, and of `set_estimator`'s `calibration`."""
+"""The result of an identification: content of a calibration file and of `set_estimator`'s `calibration`."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -16,36 +16,36 @@ Percent = Annotated[float, Meta(ge=0, le=1e4)]
 
 
 class _Part(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Unknown keys are mistakes, and refused."""
+    """Base of all parts of a calibration, which refuses unknown keys."""
 
 
 class PolynomialModel(_Part, frozen=True, kw_only=True):
     """Two multivariate polynomials in the joint angles, f_d(q) and ζ(q), of the lowest mode."""
 
     joints: Annotated[tuple[Annotated[int, Meta(ge=0, le=6)], ...], Meta(min_length=1, max_length=7)]
-    """Numbers of the joints they depend on, 0 the first."""
+    """Indices of the joints that they depend on, 0 for the first."""
     basis: Literal["angles", "trigonometric"]
     """Monomials in the scaled angles, or trigonometric polynomials, which repeat with every turn."""
     degree: Annotated[int, Meta(ge=0, le=12)]
     """Highest total degree."""
     centre: Annotated[tuple[Angle, ...], Meta(min_length=1, max_length=7)] | None = None
-    """Subtracted from the angles [rad]; null: zeros."""
+    """Angles that are subtracted from the joint angles [rad]; null: zeros."""
     scale: (
         Annotated[tuple[Annotated[float, Meta(gt=0, le=1e3)], ...], Meta(min_length=1, max_length=7)] | None
     ) = None
-    """Divides them [rad]; null: ones."""
+    """Divisors of the angles after that [rad]; null: ones."""
     f_d_coefficients: Coefficients
-    """One a term [Hz]."""
+    """Coefficients of f_d, one per term [Hz]."""
     zeta_coefficients: Coefficients
-    """One a term [-]."""
+    """Coefficients of ζ, one per term [-]."""
     f_d_range: tuple[Frequency, Frequency]
-    """Values are held within [Hz]."""
+    """Range to which values of f_d are clipped [Hz]."""
     zeta_range: tuple[DampingRatio, DampingRatio]
-    """Values are held within [-]."""
+    """Range to which values of ζ are clipped [-]."""
 
 
 class Spread(_Part, frozen=True, kw_only=True):
-    """How far values lie from the model, by magnitude [%]."""
+    """Absolute deviations of values from the model [%]."""
 
     median: Percent
     p90: Percent
@@ -57,42 +57,42 @@ Quantity = Literal[
 """K_g [N m/rad], K_d [N m s/rad], K_p [1/s], B [kg m²] of a joint and damping over stiffness of its gear [s];
 stiffness of a link that bends [N m/rad]."""
 Status = Literal["identified", "not identifiable", "assumed"]
-"""Whether measurements narrowed a parameter down, left it where it was guessed, or were not asked."""
+"""Whether the measurements determined a parameter, left it at its initial guess, or were not used for it."""
 Parameter = Annotated[float, Meta(gt=0, le=1e9)]
 
 
 class ModalParameter(_Part, frozen=True, kw_only=True):
-    """A parameter of the arm's linear model, the same for every joint or link it names."""
+    """A parameter of the arm's linear model, with the same value for every joint or link that it names."""
 
     quantity: Quantity
-    """What it is."""
+    """Physical quantity."""
     joints: Annotated[tuple[Annotated[int, Meta(ge=0, le=6)], ...], Meta(min_length=1, max_length=7)]
-    """Numbers of the joints, 0 the first; of the links for `bending_stiffness`."""
+    """Indices of the joints, or of the links for `bending_stiffness`, 0 for the first."""
     value: Parameter
-    """In SI units."""
+    """Value in SI units."""
     deviation: Annotated[float, Meta(ge=0, le=10)]
-    """Standard deviation of its logarithm, about that of its relative error; 0: assumed [-]."""
+    """Standard deviation of its logarithm, which is about that of its relative error; 0 if assumed [-]."""
     interval: tuple[Parameter, Parameter]
-    """Where it lies with 95 %, if the model holds."""
+    """95 % confidence interval, provided that the model is right."""
     status: Status
-    """How it came about."""
+    """Origin of the value."""
 
 
 class RingDownFit(_Part, frozen=True, kw_only=True):
-    """One ring-down that parameters were fitted to."""
+    """One ring-down that the parameters were fitted to."""
 
     q: Annotated[tuple[Angle, ...], Meta(min_length=1, max_length=7)]
-    """Where the arm rang [rad]."""
+    """Configuration of the arm [rad]."""
     payload: Annotated[int, Meta(ge=0, le=99)]
-    """Which of the payloads it carried, 0 the first."""
+    """Index of the payload that the arm carried, 0 for the first."""
     rms: Annotated[float, Meta(ge=0, le=1e4)]
-    """Of its acceleration, an axis [m/s²]."""
+    """rms of the acceleration per axis [m/s²]."""
     residual_to_noise: Annotated[float, Meta(ge=0, le=1e4)]
-    """rms of what the model leaves of it, over that of the noise [-]."""
+    """rms of the residual of the fit, relative to that of the noise [-]."""
 
 
 class ModalModel(_Part, frozen=True, kw_only=True):
-    """Stiffnesses and drive gains that make modes out of the arm's mass matrix with any payload."""
+    """Stiffnesses and drive gains, which give the modes together with the arm's mass matrix for any payload."""
 
     parameters: Annotated[tuple[ModalParameter, ...], Meta(min_length=1, max_length=50)]
     """Each quantity once for every joint, and `bending_stiffness` for every link that bends, whose damping over
@@ -100,76 +100,76 @@ class ModalModel(_Part, frozen=True, kw_only=True):
     f_d_min: Frequency
     """Lowest damped frequency over the workspace, up to the rated payload [Hz]."""
     zeta_max: DampingRatio
-    """Highest damping ratio there [-]."""
+    """Highest damping ratio over the workspace, up to the rated payload [-]."""
     payloads: Annotated[tuple[Payload, ...], Meta(min_length=1, max_length=100)]
-    """What the arm carried."""
+    """Payloads that the arm carried."""
     ring_downs: Annotated[tuple[RingDownFit, ...], Meta(min_length=1, max_length=10_000)]
-    """What was fitted."""
+    """Ring-downs that were fitted."""
     noise: Annotated[float, Meta(gt=0, le=1e3)]
-    """rms of the accelerometer at rest, an axis [m/s²]."""
+    """rms of the accelerometer at rest, per axis [m/s²]."""
     residual_to_noise: Annotated[float, Meta(ge=0, le=1e4)]
-    """rms of what the model leaves of all ring-downs, over that of the noise: 1 is a perfect fit [-]."""
+    """rms of the residual of all ring-downs, relative to that of the noise: 1 is a perfect fit [-]."""
     cross_validated_f_d_percent: Annotated[tuple[Spread | None, ...], Meta(min_length=1, max_length=8)]
-    """One a mode, the lowest first: fits that did not see a configuration, against poles fitted to its ring-downs
-    alone; null where too few of these were certain."""
+    """Deviation of each mode's frequency, the lowest mode first: fits without a configuration are compared with poles
+    fitted to that configuration's ring-downs alone; null if too few of these poles were certain."""
     cross_validated_zeta_percent: Annotated[tuple[Spread | None, ...], Meta(min_length=1, max_length=8)]
-    """Likewise."""
+    """Deviation of each mode's damping ratio, computed in the same way."""
 
 
 class Provenance(_Part, frozen=True, kw_only=True):
-    """How the calibration came about."""
+    """Origin of a calibration."""
 
     command: Annotated[str, Meta(max_length=500)]
-    """The command that made it."""
+    """Command that made it."""
     version: Annotated[str, Meta(max_length=50)]
     """Version of the package."""
     seed: Seed | None
-    """Of the choice of configurations and of the simulated arm; null on a real one."""
+    """Seed of the choice of configurations and of the simulated arm; null for a real arm."""
     configurations: Annotated[int, Meta(ge=1, le=100_000)]
-    """Configurations measured."""
+    """Number of configurations measured."""
     ring_downs: Annotated[int, Meta(ge=1, le=1_000_000)]
-    """Ring-downs measured in all."""
+    """Total number of ring-downs measured."""
     rejected: Annotated[int, Meta(ge=0, le=1_000_000)]
-    """Further configurations that were tried: the arm could not reach them, or no ring-down could be fitted."""
+    """Number of rejected configurations: the arm could not reach them, or no ring-down could be fitted."""
     measured_f_d_range: tuple[Frequency, Frequency]
-    """Span of the lowest mode's damped frequency where it was measured [Hz]."""
+    """Range of the measured damped frequency of the lowest mode [Hz]."""
     measured_zeta_range: tuple[DampingRatio, DampingRatio]
-    """Span of its damping ratio there [-]."""
+    """Range of the measured damping ratio of the lowest mode [-]."""
     residual_f_d_percent: Spread | None = None
-    """Of the fit of polynomials."""
+    """Deviation of the polynomial for f_d from the measurements it was fitted to."""
     residual_zeta_percent: Spread | None = None
-    """Of the fit of polynomials."""
+    """Deviation of the polynomial for ζ from the measurements it was fitted to."""
     cross_validated_f_d_percent: Spread | None = None
-    """Of configurations that a fit of polynomials did not see."""
+    """Deviation of the polynomial for f_d at configurations left out of the fit."""
     cross_validated_zeta_percent: Spread | None = None
-    """Of configurations that a fit of polynomials did not see."""
+    """Deviation of the polynomial for ζ at configurations left out of the fit."""
     arm: Annotated[str, Meta(max_length=64)] | None = None
     """Fingerprint of the arm it was measured on, as `info` has it; null: unknown."""
 
 
 class Calibration(_Part, frozen=True, kw_only=True):
-    """A calibration: for which robot with which payload, the models, and where they come from.
+    """A calibration: robot, payload, models and origin.
 
     Raises:
-        ValueError: It holds no model.
+        ValueError: The calibration contains no model.
     """
 
     name: Name
-    """What it is called in `info`."""
+    """Name in `info`."""
     robot: Annotated[str, Meta(max_length=64)]
     """Model of the arm."""
     payload: Payload
-    """What the arm carried: polynomials hold for that alone. The heaviest, where there were several."""
+    """Payload that the arm carried, the heaviest if there were several. Polynomials hold only for this payload."""
     polynomial: PolynomialModel | None = None
     """The lowest mode with that payload, for the estimator `polynomial`."""
     modal: ModalModel | None = None
     """Any mode with any payload, for the estimator `modal`."""
     provenance: Provenance
-    """How it came about."""
+    """Origin of the calibration."""
 
     def __post_init__(self) -> None:
         if self.polynomial is None and self.modal is None:
-            raise ValueError("neither polynomial nor modal is there")
+            raise ValueError("polynomial and modal are both missing")
 
 
 class CalibrationError(ValueError):
@@ -195,7 +195,7 @@ def calibration_from_json(text: bytes) -> Calibration:
     """Check a file's content.
 
     Raises:
-        CalibrationError: It is no JSON, or a key is unknown, missing or out of range.
+        CalibrationError: The content is not JSON, or a key is unknown, missing or out of range.
     """
     try:
         return checked(parse_json(text), Calibration)

@@ -1,4 +1,4 @@
-"""Which message goes where: the keys of a robot as a table, for the documents made from it and for tests."""
+"""The keys of a robot and their messages as a table, for the generated documents and for tests."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -20,10 +20,10 @@ class Channel:
         name: Short name.
         key: The key, with `{robot}` and `{client}` where names go.
         kind: `put`, a queryable, or a liveliness token.
-        by: Who puts, asks or holds.
-        messages: Types of what is put or asked.
-        answers: Types of what is answered.
-        meaning: A sentence.
+        by: Side that puts, asks or declares.
+        messages: Types of the messages that are put or asked.
+        answers: Types of the answers.
+        meaning: Description for the documents.
     """
 
     name: str
@@ -39,7 +39,7 @@ COMMANDS: tuple[type[Struct], ...] = get_args(Command)
 REPLIES: tuple[type[Struct], ...] = get_args(Reply)
 STREAMS: tuple[type[Struct], ...] = (State, Event, Truth, Telemetry, Io)
 MESSAGES: tuple[type[Struct], ...] = (*COMMANDS, Setpoint, *REPLIES, *STREAMS, Info)
-"""Every message there is."""
+"""Every message of the protocol."""
 
 CHANNELS = (
     Channel(
@@ -48,7 +48,7 @@ CHANNELS = (
         kind="put",
         by="server",
         messages=(State,),
-        meaning="controller and arm, 500 Hz: dropped rather than late in real time, never in lockstep",
+        meaning="state of controller and arm, 500 Hz; dropped rather than sent late in real time, never in lockstep",
     ),
     Channel(
         name="truth",
@@ -56,7 +56,7 @@ CHANNELS = (
         kind="put",
         by="server",
         messages=(Truth,),
-        meaning="what no robot can know, 500 Hz; only when `serve --truth`",
+        meaning="values that a real robot cannot measure, 500 Hz; only with `serve --truth`",
     ),
     Channel(
         name="event",
@@ -64,7 +64,7 @@ CHANNELS = (
         kind="put",
         by="server",
         messages=(Event,),
-        meaning="what happened, at its tick",
+        meaning="an event, with its tick",
     ),
     Channel(
         name="telemetry",
@@ -72,7 +72,7 @@ CHANNELS = (
         kind="put",
         by="server",
         messages=(Telemetry,),
-        meaning="how the server is doing, 1 Hz",
+        meaning="timing and counters of the server, 1 Hz",
     ),
     Channel(
         name="io",
@@ -80,7 +80,7 @@ CHANNELS = (
         kind="put",
         by="server",
         messages=(Io,),
-        meaning="inputs, outputs, registers and tool: before the state of the tick that has a change, and 1 Hz",
+        meaning="inputs, outputs, registers and tool; sent before the state of a tick with a change, and at 1 Hz",
     ),
     Channel(
         name="command",
@@ -97,7 +97,7 @@ CHANNELS = (
         kind="put",
         by="client",
         messages=(Setpoint,),
-        meaning="a stream of set-points; what is wrong with one is counted, not answered",
+        meaning="a stream of set-points; errors are counted, not answered",
     ),
     Channel(
         name="info",
@@ -105,26 +105,26 @@ CHANNELS = (
         kind="queryable",
         by="client",
         answers=(Info,),
-        meaning="what the robot is and how it is set up; the query has no payload",
+        meaning="description and current settings of the robot; the query has no payload",
     ),
     Channel(
         name="alive",
         key="tvist/{robot}/alive",
         kind="liveliness",
         by="server",
-        meaning="there as long as the server is",
+        meaning="exists as long as the server runs",
     ),
     Channel(
         name="client",
         key="tvist/{robot}/client/{client}",
         kind="liveliness",
         by="client",
-        meaning="optional; where it is there when control is taken, its going ends the lease at once. "
-        "`/<session>`, Zenoh's id of the client's session, may follow: it tells the client from another of that name",
+        meaning="optional; if it exists when control is taken, the lease ends at once when it disappears. "
+        "`/<session>`, Zenoh's id of the client's session, may follow, to distinguish clients of the same name",
     ),
 )
 
 
 def tag(message: type[Struct]) -> str:
-    """What a message's field `type` says."""
+    """Return the value of a message's field `type`."""
     return str(message.__struct_config__.tag)

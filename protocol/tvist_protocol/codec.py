@@ -132,7 +132,7 @@ def decode_envelope(data: bytes) -> Envelope:
     """Type and token of a message that may be anything else but sound.
 
     Raises:
-        ProtocolError: It is no map, or type or token is no string.
+        ProtocolError: The message is not a map, or type or token is not a string.
     """
     try:
         return _ENVELOPE.decode(data)

@@ -1,6 +1,6 @@
-"""What a client sends: commands, and set-points.
+"""Messages from clients: commands and set-points.
 
-A constructor does not validate; `tvist_protocol.codec.check` does, and the server does with every message.
+A constructor does not validate; `tvist_protocol.codec.check` does, and the server checks every message.
 """
 
 from math import isfinite
@@ -39,16 +39,16 @@ from tvist_protocol.values import (
 )
 
 CALIBRATION_DEPTH = 16
-"""Levels of maps and lists a calibration may have: more than any needs, few enough to walk without care."""
+"""Largest depth of maps and lists in a calibration: more than any needs, and safe for recursion."""
 
 
 class TakeControl(ClientMessage, frozen=True, kw_only=True, tag="take_control"):
     """Take the lease; answered by `accepted` with `token` and `lease_s`."""
 
     client: ClientName
-    """Who asks: shown to the others while it holds control."""
+    """Name of the client, shown to other clients while it has control."""
     lease_s: Lease = 30.0
-    """How long control lasts without a command [s]."""
+    """Time without a command after which control ends [s]."""
     protocol: Version = PROTOCOL_VERSION
     """Version of the protocol the client speaks."""
 
@@ -57,48 +57,48 @@ class KeepAlive(ClientMessage, frozen=True, kw_only=True, tag="keep_alive"):
     """Renew the lease; send one every `lease_s`/3."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
 
 
 class ReleaseControl(ClientMessage, frozen=True, kw_only=True, tag="release_control"):
     """Give the lease back."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
 
 
 class HandOver(ClientMessage, frozen=True, kw_only=True, tag="hand_over"):
-    """Give the lease to another client, without a moment in which nobody has it."""
+    """Give the lease directly to another client, so that no third client can take it."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
     client: ClientName
-    """Who shall have control."""
+    """Name of the client that gets control."""
 
 
 class TakeClock(ClientMessage, frozen=True, kw_only=True, tag="take_clock"):
-    """Take the clock, where time does not pass by itself; answered by `accepted` with the `token` of its steps."""
+    """Take the clock of a robot in lockstep; answered by `accepted` with the `token` for `simulation.step`."""
 
     client: ClientName
-    """Who asks: shown to the others while it holds the clock."""
+    """Name of the client, shown to other clients while it holds the clock."""
     protocol: Version = PROTOCOL_VERSION
     """Version of the protocol the client speaks."""
 
 
 class ReleaseClock(ClientMessage, frozen=True, kw_only=True, tag="release_clock"):
-    """Give the clock back; who has control may let time pass again."""
+    """Give the clock back; the client that has control may then step time again."""
 
     token: Token
-    """Names the hold of the clock."""
+    """Token of the clock."""
 
 
 class MoveJ(ClientMessage, frozen=True, kw_only=True, tag="move_j"):
     """Move to a joint configuration, all joints in phase; answered by `accepted` with `id`, then events."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
     q: Joints
-    """Target, one angle a joint [rad]."""
+    """Target, one angle per joint [rad]."""
     velocity: Velocity = 1.5
     """Largest velocity of any joint [rad/s]."""
     acceleration: Acceleration = 2.0
@@ -111,63 +111,63 @@ class ServoStart(ClientMessage, frozen=True, kw_only=True, tag="servo_start"):
     """Begin to follow a stream of set-points."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
     period: Period = 0.002
     """Time between two set-points [s]."""
     velocity: Velocity = 1.5
-    """Velocity beyond which the stream is limited [rad/s]."""
+    """Velocity to which every joint is limited [rad/s]."""
     acceleration: Acceleration = 2.0
-    """Acceleration beyond which the stream is limited [rad/s²]."""
+    """Acceleration to which every joint is limited [rad/s²]."""
     jerk: Jerk = 100.0
-    """Jerk beyond which the stream is limited [rad/s³]."""
+    """Jerk to which every joint is limited [rad/s³]."""
 
 
 class ServoStop(ClientMessage, frozen=True, kw_only=True, tag="servo_stop"):
     """End the stream of set-points and come to rest."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
 
 
 class Stop(ClientMessage, frozen=True, kw_only=True, tag="stop"):
-    """Come to rest now, past the shaper; anyone may."""
+    """Come to rest now, bypassing the shaper; any client may send this."""
 
     token: Token | None = None
-    """Names the lease, where the client has one."""
+    """Token of the lease, if the client has one."""
     deceleration: Acceleration | None = None
-    """Largest deceleration of any joint [rad/s²]; null: what the torque allows."""
+    """Largest deceleration of any joint [rad/s²]; null: as much as the torque limits allow."""
 
 
 class Pause(ClientMessage, frozen=True, kw_only=True, tag="pause"):
-    """Hold the motion, to be resumed."""
+    """Pause the motion, so that it can be resumed."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
 
 
 class Resume(ClientMessage, frozen=True, kw_only=True, tag="resume"):
-    """Go on with a paused motion."""
+    """Continue a paused motion."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
 
 
 class SetShaper(ClientMessage, frozen=True, kw_only=True, tag="set_shaper"):
     """Choose the input shaper."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
     name: Name
-    """Its name, one of those in `info`; `none` does not shape."""
+    """Name of the shaper, one of those in `info`; `none` does not shape."""
     modes: ModeCount = 1
-    """How many modes it shall cancel, the lowest first."""
+    """Number of modes to suppress, the lowest first."""
 
 
 class SetEstimator(ClientMessage, frozen=True, kw_only=True, tag="set_estimator", gc=True):
-    """Choose where the shaper's frequency and damping come from."""
+    """Choose the estimator that gives the shaper frequency and damping ratio."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
     name: Name
     """`fixed` (with `f_d` and `zeta`), `polynomial` or `modal` (with `calibration`)."""
     f_d: Frequencies | None = None
@@ -175,24 +175,24 @@ class SetEstimator(ClientMessage, frozen=True, kw_only=True, tag="set_estimator"
     zeta: DampingRatios | None = None
     """Damping ratio of each mode [-]."""
     calibration: Name | dict[str, Any] | None = None
-    """Name of one of those in `info`, or the content as a map; never a path."""
+    """Name of a calibration in `info`, or its content as a map; a path is not accepted."""
 
     def __post_init__(self) -> None:
-        """Refuse what a calibration cannot hold; its meaning is the server's to check.
+        """Refuse values that a calibration cannot contain; the server checks their meaning.
 
         Raises:
-            ProtocolError: A number that is not finite, a key that is no string, a value of a type that JSON
-                does not have, or more than `CALIBRATION_DEPTH` levels.
+            ProtocolError: A number is not finite, a key is not a string, a value has a type that JSON does not have, or
+                there are more than `CALIBRATION_DEPTH` levels.
         """
         if isinstance(self.calibration, dict):
             _check_plain(self.calibration, "calibration", CALIBRATION_DEPTH)
 
 
 class SetPayload(ClientMessage, frozen=True, kw_only=True, tag="set_payload"):
-    """Declare what hangs on the flange: what the controller believes, not what the simulated arm carries."""
+    """Declare the payload to the controller; this does not change what the simulated arm carries."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
     mass: Mass
     """Mass [kg]."""
     com: Vec3
@@ -202,10 +202,10 @@ class SetPayload(ClientMessage, frozen=True, kw_only=True, tag="set_payload"):
 
 
 class SetSpeed(ClientMessage, frozen=True, kw_only=True, tag="set_speed"):
-    """Scale the speed of what moves."""
+    """Scale the speed of motions."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
     fraction: Fraction
     """Share of the programmed speed [-]."""
 
@@ -214,84 +214,84 @@ class PowerOn(ClientMessage, frozen=True, kw_only=True, tag="power_on"):
     """Power the arm and release its brakes."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
     release_brakes: bool = True
-    """False: an arm without power is only powered, and the brakes go on holding it."""
+    """False: only switch the power on, and leave the brakes closed."""
 
 
 class PowerOff(ClientMessage, frozen=True, kw_only=True, tag="power_off"):
-    """Take the arm's power; what moves is stopped before."""
+    """Switch the arm's power off; a motion is stopped first."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
 
 
 class UnlockProtectiveStop(ClientMessage, frozen=True, kw_only=True, tag="unlock_protective_stop"):
-    """Leave a protective stop, once the arm rests."""
+    """Leave a protective stop; the arm must be at rest."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
 
 
 class RestartSafety(ClientMessage, frozen=True, kw_only=True, tag="restart_safety"):
-    """Restart the safety system after a violation or a fault; the arm is without power then."""
+    """Restart the safety system after a violation or a fault; afterwards the arm has no power."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
 
 
 class SimulationReset(ClientMessage, frozen=True, kw_only=True, tag="simulation.reset"):
-    """Put the simulated arm somewhere at rest; what is null stays. Stops motion, keeps lease and tick."""
+    """Put the simulated arm at rest in a given state; null fields do not change. Stops motion, keeps lease and tick."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
     q: Joints | None = None
-    """Where to put it, one angle a joint [rad]."""
+    """Configuration to put the arm into, one angle per joint [rad]."""
     seed: Seed | None = None
-    """Seed of the sensors' noise, which starts anew."""
+    """New seed of the sensors' noise."""
     payload: Payload | None = None
-    """What the arm carries, whatever the controller believes."""
+    """Payload that the arm carries, independent of the declared one."""
     mode: ResetMode | None = None
-    """Robot mode to put it into; any of them ends protective, safeguard and emergency stops, violations and faults."""
+    """Robot mode to set; this ends protective, safeguard and emergency stops, violations and faults."""
     shaper: Name | None = None
-    """Shaper to choose, as `set_shaper` does."""
+    """Shaper to select, as `set_shaper` does."""
 
 
 class StepSetpoint(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, gc=False):
     """One set-point inside a `simulation.step`."""
 
     sequence: Sequence
-    """Number from 0 with each `servo_start`; gaps allowed."""
+    """Number of the set-point, from 0 after each `servo_start`; gaps are allowed."""
     q: Joints
-    """Where to be, one angle a joint [rad]."""
+    """Set-point, one angle per joint [rad]."""
 
 
 class SimulationStep(ClientMessage, frozen=True, kw_only=True, tag="simulation.step", omit_defaults=True):
-    """Let time pass in a simulation that does not tick by itself; `done` has the last `tick` that passed."""
+    """Step the time of a robot in lockstep; `done` has the last `tick` of the step."""
 
     token: Token
-    """Names the hold of the clock; where nobody holds it, the lease."""
+    """Token of the clock; if no client holds the clock, token of the lease."""
     ticks: Ticks
-    """How many control periods of 0.002 s."""
+    """Number of control periods of 0.002 s."""
     setpoints: Annotated[tuple[StepSetpoint, ...], Meta(max_length=1000)] | None = None
-    """Set-points, one a tick in order."""
+    """Set-points in order, one per tick."""
     motion_token: Token | None = None
-    """Names the lease; `setpoints` need it where `token` names the hold of the clock."""
+    """Token of the lease; `setpoints` need it if `token` is that of the clock."""
 
 
 class SimulationInject(ClientMessage, frozen=True, kw_only=True, tag="simulation.inject"):
     """Cause one of the [faults](#faults) on purpose."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
     fault: Name
-    """Its name."""
+    """Name of the fault."""
     joint: Annotated[int, Meta(ge=0, le=6)] | None = None
-    """Joint that it concerns, from the base on."""
+    """Index of the joint that it affects, 0 for the base."""
     seconds: Annotated[float, Meta(ge=0, le=3600)] | None = None
-    """How long it lasts [s]."""
+    """Duration of the fault [s]."""
     value: Annotated[float, Meta(ge=-1e6, le=1e6)] | None = None
-    """How strong it is, in the fault's own unit."""
+    """Magnitude of the fault, in the fault's own unit."""
 
 
 Command = (
@@ -330,14 +330,14 @@ Command = (
 
 
 class Setpoint(ClientMessage, frozen=True, kw_only=True, tag="setpoint"):
-    """One set-point of a stream: put, never answered."""
+    """One set-point of a stream; it is put and not answered."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
     sequence: Sequence
-    """Number from 0 with each `servo_start`; gaps allowed."""
+    """Number of the set-point, from 0 after each `servo_start`; gaps are allowed."""
     q: Joints
-    """Where to be, one angle a joint [rad]."""
+    """Set-point, one angle per joint [rad]."""
 
 
 def _check_plain(value: object, where: str, depth: int) -> None:
@@ -350,11 +350,13 @@ def _check_plain(value: object, where: str, depth: int) -> None:
     elif isinstance(value, dict):
         for key, entry in value.items():
             if not isinstance(key, str):
-                raise ProtocolError("malformed", where, f"{where} has a key that is no string: {key!r:.40}")
+                raise ProtocolError(
+                    "malformed", where, f"{where} has a key that is not a string: {key!r:.40}"
+                )
             _check_plain(entry, f"{where}.{short(key)}", depth - 1)
     elif isinstance(value, list | tuple):
         for index, entry in enumerate(value):
             _check_plain(entry, f"{where}[{index}]", depth - 1)
     elif value is not None and not isinstance(value, bool | int | str):
-        why = f"{where} is a {type(value).__name__}, which a calibration cannot hold"
+        why = f"{where} is a {type(value).__name__}, which a calibration cannot contain"
         raise ProtocolError("malformed", where, why)

@@ -27,22 +27,22 @@ def parse_json(data: bytes) -> Any:
     """What JSON text holds.
 
     Raises:
-        ProtocolError: It is none; line and column stand in the sentence.
+        ProtocolError: The content is not valid JSON; the message gives line and column.
     """
     try:
         return json.loads(data.decode(), parse_constant=_no_number)
     except UnicodeDecodeError as error:
         raise _no_text(error) from error
     except json.JSONDecodeError as error:
-        why = f"it is no JSON: line {error.lineno}, column {error.colno}: {error.msg}"
+        why = f"it is not valid JSON: line {error.lineno}, column {error.colno}: {error.msg}"
         raise ProtocolError("malformed", "", why) from error
     except RecursionError as error:
         raise ProtocolError("malformed", "", "it is nested too deeply") from error
 
 
 def _no_number(text: str) -> NoReturn:
-    raise ProtocolError("out_of_range", "", f"it holds {text}, which is no number")
+    raise ProtocolError("out_of_range", "", f"it contains {text}, which is not a number")
 
 
 def _no_text(error: UnicodeDecodeError) -> ProtocolError:
-    return ProtocolError("malformed", "", f"it is no text: byte {error.start} is not UTF-8")
+    return ProtocolError("malformed", "", f"it is not text: byte {error.start} is not UTF-8")

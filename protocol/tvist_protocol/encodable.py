@@ -22,9 +22,9 @@ def explain_unencodable(message: msgspec.Struct, error: Exception) -> ProtocolEr
     kind = f"{type(value).__module__}.{type(value).__qualname__}".removeprefix("builtins.")
     match value:
         case int():
-            return ProtocolError("out_of_range", where, f"{where} is beyond 64 bits")
+            return ProtocolError("out_of_range", where, f"{where} does not fit into 64 bits")
         case str():
-            why = f"{where} holds text that is not UTF-8"
+            why = f"{where} contains text that is not UTF-8"
         case msgspec.Struct():
             why = f"{kind} cannot be written: {short(str(error))}"
         case _:

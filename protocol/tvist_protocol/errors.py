@@ -1,30 +1,30 @@
-"""Errors of the protocol, by who is at fault.
+"""Errors of the protocol.
 
 TvistError
-├── ProtocolError   the message is not one: the sender's fault, seen without knowing the robot
-└── RefusedError    the message was understood and declined by the robot
+├── ProtocolError   the message is invalid for any robot
+└── RefusedError    the message is valid, but the robot refused it
 """
 
 from tvist_protocol.replies import Code, Refused
 
 SHOWN = 60
-"""Characters of a sender's text that a sentence repeats."""
+"""Largest number of characters of a sender's text that a message repeats."""
 
 
 class TvistError(Exception):
-    """Root of every error a user of these packages may want to catch."""
+    """Base of the errors that users of these packages may want to catch."""
 
 
 class ProtocolError(TvistError):
-    """Bytes or values that are no valid message.
+    """An invalid message.
 
-    Deliberately no `ValueError`: msgspec would rewrite one that is raised while a message is built.
+    It is not a `ValueError`, since msgspec would replace one that is raised while a message is built.
 
     Attributes:
-        code: What is wrong, one of the protocol's codes.
-        where: The field at fault in plain form, `q[3]`, `payload.mass`; empty where it is the whole message.
-        why: A sentence with field, value and limit.
-        limit: The bound that was passed, in the field's unit; None where there is none.
+        code: Reason, one of the protocol's codes.
+        where: Field at fault, such as `q[3]` or `payload.mass`; empty for the whole message.
+        why: Message with field, value and limit.
+        limit: Limit that was exceeded, in the field's unit; None if there is none.
     """
 
     def __init__(self, code: Code, where: str, why: str, limit: float | None = None) -> None:
@@ -39,10 +39,10 @@ class ProtocolError(TvistError):
 
 
 class RefusedError(TvistError):
-    """A robot refused a command, which therefore changed nothing.
+    """A robot refused a command; the command changed nothing.
 
     Attributes:
-        reply: The refusal as it came.
+        reply: Refusal from the robot.
     """
 
     def __init__(self, reply: Refused) -> None:
@@ -54,11 +54,11 @@ class RefusedError(TvistError):
 
 
 def short(text: str) -> str:
-    """A sender's text as a sentence repeats it: printable, and cut."""
+    """Make a sender's text safe for a message: printable and shortened."""
     shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text[:SHOWN])
     return shown if len(text) <= SHOWN else f"{shown}…"
 
 
 def quoted(value: object) -> str:
-    """A sender's value as a sentence repeats it: as Python writes it, and cut."""
+    """Make a sender's value safe for a message: its repr, shortened."""
     return short(repr(value))

@@ -35,10 +35,10 @@ class _Head(msgspec.Struct):
 
 
 class _Fault:
-    """Where msgspec found a fault, and what is there.
+    """Place of a fault that msgspec found, and the value there.
 
     Args:
-        path: As msgspec writes it.
+        path: Path as msgspec writes it.
         content: What it looked at.
         kind: What it expected.
         whole: What to call the whole.
@@ -89,7 +89,7 @@ def _explain(
         said, at, path = found.groups()
     fault = _Fault(path, content, kind, whole, types)
     if at.endswith("in"):
-        return ProtocolError("malformed", fault.where, f"{fault.whole} has a key that is no string")
+        return ProtocolError("malformed", fault.where, f"{fault.whole} has a key that is not a string")
     for pattern, rule in _RULES:
         if found := pattern.fullmatch(said):
             return rule(fault, *found.groups())
@@ -99,7 +99,9 @@ def _explain(
 def explain_unknown_type(name: object, types: Types) -> ProtocolError:
     """Error of a message whose `type` is none of the expected ones; the nearest of them are named."""
     near = list(types) if len(types) <= 3 else get_close_matches(str(name)[:SHOWN], types, n=3)
-    return ProtocolError("unknown_type", "type", f"type {quoted(name)} is not known here{_suggest(near)}")
+    return ProtocolError(
+        "unknown_type", "type", f"type {quoted(name)} is unknown for this key{_suggest(near)}"
+    )
 
 
 def explain_bytes(error: Exception) -> ProtocolError:
@@ -108,12 +110,12 @@ def explain_bytes(error: Exception) -> ProtocolError:
         case RecursionError():
             why = "the message is nested too deeply"
         case UnicodeDecodeError():
-            why = "the message holds text that is not UTF-8"
+            why = "the message contains text that is not UTF-8"
         case MemoryError():
-            why = "the message declares a length beyond memory"
+            why = "the message declares a length that exceeds memory"
         case _:
             said = str(error).removeprefix("MessagePack data is malformed: ")
-            why = f"the message is no MessagePack: {short(said)}"
+            why = f"the message is not valid MessagePack: {short(said)}"
     return ProtocolError("malformed", "", why)
 
 

@@ -1,4 +1,4 @@
-"""Faults that `simulation.inject` can cause, and what each needs to be told."""
+"""Faults that `simulation.inject` can cause, and the fields that each needs."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -11,9 +11,9 @@ class Fault:
     """One fault.
 
     Attributes:
-        meaning: A sentence, with the unit of `value`.
-        needs: Fields that must be given; the others must not.
-        may: Fields that may be.
+        meaning: Description, with the unit of `value`.
+        needs: Required fields.
+        may: Optional fields; any other field is refused.
     """
 
     meaning: str
@@ -24,19 +24,20 @@ class Fault:
 FAULTS: dict[str, Fault] = {
     "protective_stop": Fault("the robot makes a protective stop"),
     "reduced": Fault(
-        "the safety system reduces the speed, as a guard that was opened does", may=("seconds",)
+        "the safety system reduces the speed, as it does when a guard is opened", may=("seconds",)
     ),
     "safeguard_stop": Fault(
-        "a safeguard asks for a stop of category 2: the robot pauses, and goes on after `normal`",
+        "a safeguard demands a stop of category 2: the robot pauses, and continues after `normal`",
         may=("seconds",),
     ),
     "emergency_stop": Fault(
-        "the robot's emergency stop is pressed, category 1: it stops on its way, then its power is taken, and "
-        "cannot be switched on before `normal`",
+        "the robot's emergency stop is pressed, category 1: the robot stops on its path, then its power is switched "
+        "off and cannot be switched on before `normal`",
         may=("seconds",),
     ),
     "system_emergency_stop": Fault(
-        "the same, by the emergency stop of the machine that the robot belongs to", may=("seconds",)
+        "the emergency stop of the machine that contains the robot is pressed; otherwise as `emergency_stop`",
+        may=("seconds",),
     ),
     "power_loss": Fault("the arm loses its power, category 0: the brakes bring it to rest at once"),
     "violation": Fault(
@@ -47,4 +48,4 @@ FAULTS: dict[str, Fault] = {
     "torque": Fault("something pushes a joint with `value` N m", ("joint", "value", "seconds")),
     "nan": Fault("the simulated arm's state becomes not a number"),
 }
-"""By name. One without `seconds` lasts until another ends it, or is over at once."""
+"""Faults by name. A fault without `seconds` is over at once or lasts until another fault ends it."""

@@ -1,4 +1,4 @@
-"""What a robot says of itself when asked. Whoever reads ignores fields it does not know."""
+"""A robot's description of itself, sent on request. A client must ignore fields that it does not know."""
 
 from typing import Literal
 
@@ -11,7 +11,7 @@ Clock = Literal["realtime", "lockstep", "free"]
 
 
 class Limits(Struct, frozen=True, kw_only=True, gc=False):
-    """What the arm can do, one entry a joint."""
+    """Limits of the arm, one entry per joint."""
 
     position: list[tuple[float, float]]
     """Smallest and largest angle [rad]."""
@@ -28,44 +28,44 @@ class Limits(Struct, frozen=True, kw_only=True, gc=False):
 
 
 class Stopping(Struct, frozen=True, kw_only=True, gc=False):
-    """A stop of the joint that is the slowest to stop, with the arm stretched out, by the rigid arm's reference."""
+    """Stop of the joint that takes longest to stop, with the arm stretched out, for the reference of a rigid arm."""
 
     payload: float
     """Mass at the flange [kg]."""
     speed: float
     """Velocity of the joint when the stop begins, as a share of its limit [-]."""
     joint: str
-    """The joint that is the slowest to stop."""
+    """Joint that takes longest to stop."""
     duration: float
-    """Time until the joint rests [s]."""
+    """Time until the joint is at rest [s]."""
     way: float
-    """Angle the joint turns until it rests [rad]."""
+    """Angle that the joint turns until it is at rest [rad]."""
 
 
 class StopReason(Struct, frozen=True, kw_only=True, gc=False):
-    """Why the robot stands and may not move."""
+    """The stop that keeps the robot from moving."""
 
     tick: int
     """Tick at which it stopped."""
     code: Code | None
-    """The reason, for a program; null where there is none of its own."""
+    """Reason, for programs; null if no code applies."""
     why: str
-    """The reason, for a person."""
+    """Reason, for people."""
 
 
 class CalibrationInfo(Struct, frozen=True, kw_only=True, gc=False):
     """The calibration in use."""
 
     name: str
-    """Its name."""
+    """Name of the calibration."""
     payload_mass: float
-    """Mass the arm carried when it was made [kg]."""
+    """Mass that the arm carried during the identification [kg]."""
     fits_payload: bool
-    """Whether that is the payload now declared."""
+    """Whether the calibration holds for the declared payload."""
     fits_arm: bool | None = None
-    """Whether it was measured on the arm that the robot file describes; null: it does not say on which."""
+    """Whether it was measured on the arm that the robot file describes; null if the calibration names no arm."""
     seed: int | None
-    """Seed of the simulation it was made in; null: a real arm's, or unknown."""
+    """Seed of the simulation it was made in; null for a real arm or if unknown."""
     f_d_range: tuple[float, float]
     """Smallest and largest damped frequency measured over the workspace [Hz]."""
     zeta_range: tuple[float, float]
@@ -73,55 +73,56 @@ class CalibrationInfo(Struct, frozen=True, kw_only=True, gc=False):
 
 
 class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=False):
-    """The robot, its limits and how it is set up now."""
+    """The robot, its limits and its current settings."""
 
     name: str
     """Name of the robot, as in its keys."""
     protocol: int
-    """Version of the protocol the server speaks."""
+    """Version of the protocol that the server speaks."""
     version: str
     """Version of the server's package."""
     model: str
     """Model of the arm."""
     joints: list[str]
-    """Names of its joints, from the base on."""
+    """Names of the joints, from the base on."""
     rate_hz: float
-    """Control periods a second of simulated time [Hz]."""
+    """Control periods per second of simulation time [Hz]."""
     clock: Clock
-    """Who lets time pass: the wall clock, a client's steps, or a program it runs in."""
+    """What advances simulation time: the wall clock, the steps of a client, or the program that contains the robot."""
     limits: Limits
-    """What the arm can do."""
+    """Limits of the arm."""
     payload: Payload
-    """Payload declared: what the controller believes."""
+    """Declared payload."""
     calibration: CalibrationInfo | None
-    """Calibration in use; null where the estimator needs none."""
+    """Calibration in use; null if the estimator needs none."""
     shaper: str
     """Shaper in use."""
     modes: int
-    """How many modes it cancels."""
+    """Number of modes that the shaper suppresses."""
     estimator: str
     """Estimator in use."""
     calibrations: list[str]
-    """Calibrations to choose from."""
+    """Available calibrations."""
     shapers: list[str]
-    """Shapers to choose from."""
+    """Available shapers."""
     control: str | None
-    """Client that has control; null: nobody."""
+    """Client that has control; null if no client has it."""
     tick: int
-    """Tick at which this was said."""
+    """Tick of this description."""
     stopping: list[Stopping] = []
-    """How long stops last and how far they go: at 33, 66 and 100 % speed, without payload and with the rated one."""
+    """Stopping times and angles at 33, 66 and 100 % speed, without payload and with the rated one."""
     robot_mode: int | None = None
-    """As `state` has it, and already before the first tick; null: an older server, which does not say."""
+    """Robot mode as in `state`, also before the first tick; null from older servers."""
     safety_mode: int | None = None
-    """Likewise."""
+    """Safety mode as in `state`, also before the first tick; null from older servers."""
     stop: StopReason | None = None
-    """The stop that keeps the robot from moving now; null: there is none, or nothing has told why."""
+    """Stop that keeps the robot from moving now; null if there is none or its reason is unknown."""
     arm: str | None = None
-    """Fingerprint of what makes the arm vibrate, as a calibration's `provenance` names it; null: not told."""
+    """Fingerprint of the parameters that determine the arm's vibration, as in a calibration's `provenance`; null if
+    unknown."""
     programs: list[str] = []
     """Programs that can be loaded."""
     stepper: str | None = None
-    """Client that holds the clock and alone lets time pass; null: nobody, so that who has control may."""
+    """Client that holds the clock and alone may step time; null: the client that has control may step it."""
     commands: dict[str, list[str]] = {}
-    """Fields of each command that the server knows; empty: an older server, which does not say."""
+    """Fields of each command that the server knows; empty from older servers."""

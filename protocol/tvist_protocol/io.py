@@ -1,6 +1,6 @@
-"""What stands on a robot's terminals and in its registers, and the commands that change it.
+"""State of a robot's terminals and registers, and the commands that change it.
 
-Names, and the order of bits, are RTDE's.
+Names and the order of bits are those of RTDE.
 """
 
 from typing import Annotated, Literal
@@ -12,62 +12,62 @@ from tvist_protocol.programs import ProgramState
 from tvist_protocol.values import Fraction, Payload, Token
 
 BITS, NUMBERS = 128, 48
-"""Registers of a bank: of bits, and of either kind of number."""
+"""Number of registers in a bank of bits, and in a bank of integers or doubles."""
 Bank = Literal["input_bit", "input_int", "input_double", "output_bit", "output_int", "output_double"]
-"""Registers are memory: input registers are written by clients and read by the robot's programs, output registers
-the other way round."""
+"""Banks of registers. Clients write input registers, which the robot's programs read; programs write output registers,
+which clients read."""
 
 
 class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
-    """Inputs, outputs and registers of the tick that follows it, and what the robot is told about its tool."""
+    """Inputs, outputs and registers from the following tick on, and the settings of the tool."""
 
     tick: int
-    """First control period for which this holds."""
+    """First control period for which these values hold."""
     actual_digital_input_bits: int
     """Digital inputs: bits 0–7 standard, 8–15 configurable, 16–17 tool."""
     actual_digital_output_bits: int
-    """Digital outputs, likewise."""
+    """Digital outputs: bits 0–7 standard, 8–15 configurable, 16–17 tool."""
     standard_analog_input: list[float]
-    """Two analogue inputs [A or V, as `analog_io_types`]."""
+    """Two analogue inputs [A or V, by `analog_io_types`]."""
     standard_analog_output: list[float]
-    """Two analogue outputs [A or V, as `analog_io_types`]."""
+    """Two analogue outputs [A or V, by `analog_io_types`]."""
     analog_io_types: int
-    """Bits 0–1 inputs, 2–3 outputs: 0 is current (4–20 mA), 1 voltage (0–10 V)."""
+    """Types of the analogue inputs (bits 0–1) and outputs (bits 2–3): 0 is current (4–20 mA), 1 voltage (0–10 V)."""
     tool_analog_input: list[float]
     """Two analogue inputs of the tool [V]."""
     input_bit_register: list[int]
-    """128 bits as four words of 32, the lowest first."""
+    """128 input bits as four words of 32, the lowest first."""
     input_int_register: list[int]
-    """48 of them."""
+    """48 input integers."""
     input_double_register: list[float]
-    """48 of them."""
+    """48 input doubles."""
     output_bit_register: list[int]
-    """128 bits as four words of 32, the lowest first."""
+    """128 output bits as four words of 32, the lowest first."""
     output_int_register: list[int]
-    """48 of them."""
+    """48 output integers."""
     output_double_register: list[float]
-    """48 of them."""
+    """48 output doubles."""
     tcp_offset: list[float]
     """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
     payload: Payload
-    """Declared: what the controller believes."""
+    """Declared payload."""
     target_speed_fraction: float
-    """The speed slider [-]."""
+    """Position of the speed slider [-]."""
     program: str | None = None
-    """The program that is loaded; null: none."""
+    """Loaded program; null if there is none."""
     program_state: ProgramState = "STOPPED"
-    """What it does."""
+    """State of the loaded program."""
     program_line: int = 0
-    """Its line that is carried out, or comes next when it is played on, counted from 1; 0: none."""
+    """Line that is being carried out, or will be when the program continues, counted from 1; 0 if there is none."""
     actual_TCP_force: list[float] | None = None
-    """Force and torque at the tool centre point that explain the torques measured in the tick before, base frame
-    [N, N m]; zero while the arm is braked. Told once a second; null where `io` is told since something changed."""
+    """Force and torque at the tool centre point that explain the torques measured in the previous tick, in the base
+    frame [N, N m]; zero while the arm is braked. Sent once a second; null in messages sent because of a change."""
 
 
 DigitalBits = Annotated[int, Meta(ge=0, le=2**18 - 1)]
 """Bits 0–7 standard, 8–15 configurable, 16–17 tool"""
 PairBits = Annotated[int, Meta(ge=0, le=3)]
-"""A bit for each of two terminals"""
+"""One bit for each of two terminals"""
 Signal = Annotated[float, Meta(ge=-1, le=30)]
 """[A or V]"""
 Register = (
@@ -81,58 +81,58 @@ Turn = Annotated[float, Meta(ge=-10, le=10)]
 
 
 class SetIo(ClientMessage, frozen=True, kw_only=True, tag="set_io"):
-    """Set outputs: those that a mask names."""
+    """Set the outputs that a mask selects."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
     digital_output_mask: DigitalBits = 0
     """Digital outputs to set: bits 0–7 standard, 8–15 configurable, 16–17 tool."""
     digital_outputs: DigitalBits = 0
-    """What to set them to, likewise."""
+    """Values of the digital outputs, with the same bits."""
     standard_analog_output_mask: PairBits = 0
-    """Analogue outputs to set, bit 0 the first."""
+    """Analogue outputs to set, bit 0 for the first."""
     standard_analog_output_type: PairBits = 0
-    """What each is, bit 0 the first: 0 is current (4–20 mA), 1 voltage (0–10 V)."""
+    """Types of the analogue outputs, bit 0 for the first: 0 is current (4–20 mA), 1 voltage (0–10 V)."""
     standard_analog_output_0: Fraction = 0.0
-    """Share of the first one's range [-]."""
+    """Value of the first analogue output as a share of its range [-]."""
     standard_analog_output_1: Fraction = 0.0
-    """Share of the second one's range [-]."""
+    """Value of the second analogue output as a share of its range [-]."""
 
 
 class SetRegisters(ClientMessage, frozen=True, kw_only=True, tag="set_registers"):
-    """Write registers that stand in a row."""
+    """Write consecutive registers."""
 
     bank: Bank
-    """Which."""
+    """Bank of registers to write."""
     values: Annotated[tuple[Register, ...], Meta(min_length=1, max_length=BITS)]
-    """What to write: booleans, integers of 32 bits or doubles, as the bank has them."""
+    """Values to write: booleans, 32-bit integers or doubles, depending on the bank."""
     first: Annotated[int, Meta(ge=0, le=BITS - 1)] = 0
     """Number of the first register."""
     token: Token | None = None
-    """Names the lease; output registers, which are the robot's own, need it, input registers do not."""
+    """Token of the lease; output registers, which belong to the robot, need it, input registers do not."""
 
 
 class SetTcp(ClientMessage, frozen=True, kw_only=True, tag="set_tcp"):
-    """Say where the tool centre point is."""
+    """Set the tool centre point."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
     offset: tuple[Length, Length, Length, Turn, Turn, Turn]
-    """In the flange frame: x y z [m] and rotation vector [rad]."""
+    """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
 
 
 class SimulationSetInputs(ClientMessage, frozen=True, kw_only=True, tag="simulation.set_inputs"):
-    """Put signals on the inputs, as what is wired to them would."""
+    """Simulate signals at the inputs."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
     digital_input_mask: DigitalBits = 0
     """Digital inputs to set: bits 0–7 standard, 8–15 configurable, 16–17 tool."""
     digital_inputs: DigitalBits = 0
-    """What to set them to, likewise."""
+    """Values of the digital inputs, with the same bits."""
     standard_analog_input: tuple[Signal, Signal] | None = None
-    """Both analogue inputs [A or V, as `analog_input_types`]; null leaves them."""
+    """Values of both analogue inputs [A or V, by `analog_input_types`]; null leaves them unchanged."""
     analog_input_types: PairBits | None = None
-    """What each is, bit 0 the first: 0 is current, 1 voltage; null leaves them."""
+    """Types of the analogue inputs, bit 0 for the first: 0 is current, 1 voltage; null leaves them unchanged."""
     tool_analog_input: tuple[Signal, Signal] | None = None
-    """Both analogue inputs of the tool [V]; null leaves them."""
+    """Values of both analogue inputs of the tool [V]; null leaves them unchanged."""

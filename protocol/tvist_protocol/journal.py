@@ -1,6 +1,6 @@
-"""What reached a controller, tick by tick: with how it started, all that an equal run needs.
+"""Journal of everything that reached a controller, tick by tick. With the initial setup, it determines the run.
 
-A journal never crosses the network; it stands in a recording, beside what the robot put.
+A journal is never sent over the network; recordings contain it, beside the robot's messages.
 """
 
 from typing import Annotated, Any, Literal
@@ -16,43 +16,43 @@ EntryKind = Literal["command", "setpoint", "setpoint_refused", "client_seen", "c
 
 
 class Entry(Struct, frozen=True, kw_only=True, tag_field="type", tag="journal"):
-    """One thing that reached the controller before a tick was computed; entries stand in order."""
+    """One thing that reached the controller before a tick was computed; entries are in order."""
 
     tick: int
     """Number of the first control period computed after it."""
     kind: EntryKind
-    """What it was: a message, a set-point of the lease's holder that could not be read, the end of the session that had
-    control or the clock, or ticks that began too late. Recordings made before sessions were told apart have every
+    """Kind of entry: a message, an unreadable set-point of the lease's holder, the end of the session that had
+    control or the clock, or ticks that began too late. Recordings made before sessions were distinguished contain every
     liveliness token that came or went."""
     client: str | None = None
-    """Client it came from or is about, where that is known."""
+    """Client that it came from or concerns, if known."""
     session: str | None = None
-    """Session of who got control or the clock, or has gone; empty where the client's liveliness token does not say."""
+    """Session that got control or the clock, or has ended; empty if the client's liveliness token does not name it."""
     message: Annotated[dict[str, Any], Meta(extra_json_schema={"properties": {}})] | None = None
-    """The message as it was decoded, for a command or a set-point."""
+    """Decoded message, for a command or a set-point."""
     count: int | None = None
-    """How many ticks began too late."""
+    """Number of ticks that began too late."""
     why: str | None = None
-    """Why a set-point could not be read: it may stand in the event that says that none came."""
+    """Reason why a set-point could not be read; the event of a stream that stops may repeat it."""
 
 
 def entry_of(tick: int, message: Command | Setpoint, client: str | None = None) -> Entry:
-    """Entry of a message.
+    """Make the journal's entry for a message.
 
     Args:
         tick: Number of the first control period computed after it.
-        message: As it was decoded.
-        client: Who sent it, where that is known.
+        message: Decoded message.
+        client: Client that sent it, if known.
     """
     kind: EntryKind = "setpoint" if type(message) is Setpoint else "command"
     return Entry(tick=tick, kind=kind, client=client, message=msgspec.to_builtins(message))
 
 
 def message_of(entry: Entry) -> Command | Setpoint:
-    """The message of an entry, equal to the one it was made of.
+    """Return the message of an entry, equal to the original one.
 
     Raises:
-        ProtocolError: The entry is none of a message, or what it holds is no valid one.
+        ProtocolError: The entry contains no message, or an invalid one.
     """
     where = f"the journal's {entry.kind} before tick {entry.tick}"
     if entry.message is None:
@@ -64,5 +64,5 @@ def message_of(entry: Entry) -> Command | Setpoint:
     except msgspec.ValidationError as error:
         kind = Setpoint if entry.kind == "setpoint" else Command
         fault = explain_content(error, entry.message, kind)
-        raise ProtocolError("malformed", "message", f"{where} is no valid message: {fault.why}") from error
+        raise ProtocolError("malformed", "message", f"{where} is not a valid message: {fault.why}") from error
     return command

@@ -27,7 +27,7 @@ def check_robot_name(name: str) -> str:
     """Give back a robot's name if it may stand in a key.
 
     Raises:
-        ProtocolError: It is not `[a-z0-9][a-z0-9_-]{0,63}`; code `out_of_range`, where `robot`.
+        ProtocolError: The name is not `[a-z0-9][a-z0-9_-]{0,63}`; code `out_of_range`, where `robot`.
     """
     return _checked("robot", name, _ROBOT)
 
@@ -36,7 +36,7 @@ def check_client_name(name: str) -> str:
     """Give back a client's name if it may stand in a key.
 
     Raises:
-        ProtocolError: It is not 1 to 64 printable ASCII characters without `/ * ? # $`, the first not `@`;
+        ProtocolError: The name is not 1 to 64 printable ASCII characters without `/ * ? # $`, the first not `@`;
             code `out_of_range`, where `client`.
     """
     return _checked("client", name, _CLIENT)

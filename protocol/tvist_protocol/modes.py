@@ -1,10 +1,10 @@
-"""Modes as numbered by the RTDE interface of UR controllers."""
+"""Modes with the numbers of the RTDE interface of UR controllers."""
 
 from enum import IntEnum
 
 
 class RobotMode(IntEnum):
-    """What the arm's power and brakes are at."""
+    """State of the arm's power and brakes."""
 
     NO_CONTROLLER = -1
     DISCONNECTED = 0
@@ -19,7 +19,7 @@ class RobotMode(IntEnum):
 
 
 class SafetyMode(IntEnum):
-    """What the safety system allows."""
+    """State of the safety system."""
 
     NORMAL = 1
     REDUCED = 2

@@ -1,4 +1,4 @@
-"""Where in a value of maps and lists a path of msgspec's leads, and what was expected there."""
+"""Follow a path of msgspec through maps and lists, and tell what was expected there."""
 
 import re
 import types
@@ -18,7 +18,7 @@ class Place:
     Args:
         content: Maps, lists and plain values.
         kind: What was expected of the whole; None where nobody knows.
-        path: As msgspec writes it, `.payload.com[2]`; `[...]` stands for an entry of a map, by whatever key.
+        path: Path as msgspec writes it, `.payload.com[2]`; `[...]` stands for any entry of a map.
     """
 
     def __init__(self, content: Any, kind: object, path: str) -> None:

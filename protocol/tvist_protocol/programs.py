@@ -8,35 +8,35 @@ from tvist_protocol.client_message import ClientMessage
 from tvist_protocol.values import Token
 
 ProgramState = Literal["STOPPED", "PLAYING", "PAUSED"]
-"""What the loaded program does."""
+"""State of the loaded program."""
 ProgramName = Annotated[str, Meta(min_length=1, max_length=256)]
 
 
 class ProgramLoad(ClientMessage, frozen=True, kw_only=True, tag="program.load"):
-    """Load a program; the one that runs is stopped, and the arm with it. Anyone may."""
+    """Load a program; a running program and the arm are stopped first. Any client may send this."""
 
     name: ProgramName
-    """One of `programs` in `info`."""
+    """Name of the program, one of `programs` in `info`."""
     token: Token | None = None
-    """Names the lease, where the client has one."""
+    """Token of the lease, if the client has one."""
 
 
 class ProgramPlay(ClientMessage, frozen=True, kw_only=True, tag="program.play"):
-    """Start the loaded program, or go on with a paused one. It ends with the lease."""
+    """Start the loaded program, or continue it if it is paused. It ends with the lease."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
 
 
 class ProgramPause(ClientMessage, frozen=True, kw_only=True, tag="program.pause"):
-    """Hold the program and its motion, to be played again."""
+    """Pause the program and its motion, so that they can be continued."""
 
     token: Token
-    """Names the lease."""
+    """Token of the lease."""
 
 
 class ProgramStop(ClientMessage, frozen=True, kw_only=True, tag="program.stop"):
-    """Stop the program, and the arm whatever moves it; anyone may."""
+    """Stop the program and any motion of the arm; any client may send this."""
 
     token: Token | None = None
-    """Names the lease, where the client has one."""
+    """Token of the lease, if the client has one."""

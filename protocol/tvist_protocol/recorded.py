@@ -1,12 +1,12 @@
-"""Messages as they stand in a recording: JSON, in the form that viewers of recordings open.
+"""Messages in a recording: JSON, in a form that viewers of recordings can open.
 
 A recording is an MCAP file with channels `state`, `event`, `truth` and `journal`, their topics named as the
 robot's keys. Its times are ticks of 2 ms as nanoseconds since tick 0, never the wall clock. Metadata `tvist`
 holds the format, `info`, and `start` (how the server was started); metadata `tvist.end`, written when the
 file is closed, what was dropped on each channel.
 
-Viewers want one plain type a field and know no null. So a field that is null is left out here, and a list or
-a field with null in it holds a number that is not finite, which JSON cannot say.
+Viewers require one plain type per field and do not support null. A field that is null is therefore left out, and null
+in a list or a field stands for a number that is not finite, which JSON cannot express.
 """
 
 import math
@@ -25,9 +25,9 @@ from tvist_protocol.stream import Event, State, Truth
 Recorded = State | Event | Truth | Entry
 
 FORMAT = "1"
-"""Version of what is said above."""
+"""Version of this format."""
 TICK_NS = 2_000_000
-"""Nanoseconds of a tick."""
+"""Duration of a tick [ns]."""
 METADATA = "tvist"
 """Name of the metadata written first: `format`, and `info` and `start` as JSON."""
 END_METADATA = "tvist.end"
@@ -38,10 +38,10 @@ _ENCODER = msgspec.json.Encoder()
 
 
 def topics(robot: str) -> dict[type[msgspec.Struct], str]:
-    """Topic of each kind of message.
+    """Return the topic of each kind of message.
 
     Raises:
-        ProtocolError: The name may not stand in a key.
+        ProtocolError: The name is not allowed in a key.
     """
     return {
         State: keys.state(robot),
@@ -52,10 +52,10 @@ def topics(robot: str) -> dict[type[msgspec.Struct], str]:
 
 
 def to_json(message: Recorded) -> bytes:
-    """One message as it is recorded. Every finite float comes back bit for bit.
+    """Encode a message for a recording. Every finite float can be restored bit for bit.
 
     Raises:
-        TypeError: A field holds what JSON cannot, a numpy number for instance.
+        TypeError: A field has a type that JSON does not have, such as a numpy number.
     """
     content: dict[str, Any] = {"type": tag(type(message))}
     for name in message.__struct_fields__:
@@ -83,10 +83,10 @@ class JsonReader(Generic[_Some]):
         self._before = _ENCODER.encode(self._absent)[:-1] + b"," if self._absent else b""
 
     def read(self, data: bytes) -> _Some:
-        """One message; a number that was not finite is NaN.
+        """Decode a message; a number that was not finite becomes NaN.
 
         Raises:
-            ProtocolError: It is no message of this kind.
+            ProtocolError: The data is not a message of this kind.
         """
         try:
             try:
@@ -94,11 +94,11 @@ class JsonReader(Generic[_Some]):
             except msgspec.ValidationError:
                 return msgspec.convert(self._with_nan(data), self._kind)
         except ValueError as error:
-            why = f"a recorded message is no {tag(self._kind)}: {short(str(error))}"
+            why = f"a recorded message is not a valid {tag(self._kind)}: {short(str(error))}"
             raise ProtocolError("malformed", "", why) from error
 
     def _completed(self, data: bytes) -> bytes:
-        """With null for what was left out: of two equal keys msgspec keeps the later, which was there."""
+        """Add null for fields that were left out: of two equal keys, msgspec keeps the later one, from the data."""
         return self._before + data[1:] if self._before else data
 
     def _with_nan(self, data: bytes) -> Any:
@@ -109,9 +109,9 @@ class JsonReader(Generic[_Some]):
 
 
 def viewer_schema(kind: type[msgspec.Struct]) -> dict[str, Any]:
-    """JSON Schema of a recorded message, in the part of JSON Schema that viewers know.
+    """Return the JSON Schema of a recorded message, limited to what viewers support.
 
-    They want `type` at every field, one and not null, `properties` at every object, and no reference.
+    They require a single `type` other than null for every field, `properties` for every object, and no references.
     """
     schema = json_schema(kind)
     parts: Mapping[str, dict[str, Any]] = schema["properties"]

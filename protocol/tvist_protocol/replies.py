@@ -1,4 +1,4 @@
-"""Answers to a command. Whoever reads one ignores fields it does not know."""
+"""Answers to a command. A client must ignore fields that it does not know."""
 
 from typing import Literal
 
@@ -27,29 +27,30 @@ Code = Literal[
     "payload_mismatch",
     "unsupported_version",
 ]
-"""Why a command was refused, or what an event is about."""
+"""Reason of a refusal or of an event."""
 
 CODE_MEANINGS: dict[Code, str] = {
-    "malformed": "no MessagePack map, truncated, with trailing bytes, too large, or a field of another type",
-    "unknown_type": "`type` is none that belongs on this key",
-    "unknown_field": "a field this message does not have",
-    "missing_field": "a field this message must have is absent",
-    "out_of_range": "a number, a length, a name or a choice outside its bounds; NaN and infinity always are",
-    "no_control": "nobody has control or the clock, or another client: the holder is in `why`",
-    "stale_token": "the token is not the one of the present lease, or of the clock's present holder",
-    "busy": "the arm is moving: not now",
-    "wrong_mode": "the robot's or the safety system's mode does not allow it",
-    "limit_position": "outside a joint's range",
-    "limit_velocity": "faster than a joint may be",
-    "limit_acceleration": "more acceleration than a joint may have",
-    "limit_torque": "more torque than a joint may have",
-    "collision": "arm, payload or surroundings would meet or have met",
-    "unknown_shaper": "there is no shaper of that name: `info` lists them",
-    "unknown_estimator": "there is no estimator of that name",
-    "unknown_calibration": "there is no calibration of that name: `info` lists them",
-    "unknown_fault": "there is no fault of that name, or this robot's plant cannot have it: they are listed below",
-    "plant_failure": "the simulated arm's state was no longer finite",
-    "payload_mismatch": "the calibration was made with another payload than the one declared",
+    "malformed": "the message is not a MessagePack map, is truncated, has trailing bytes or is too large, or a field "
+    "has the wrong type",
+    "unknown_type": "this key does not accept messages of this `type`",
+    "unknown_field": "the message has a field that its type does not have",
+    "missing_field": "the message lacks a required field",
+    "out_of_range": "a number, a length, a name or a choice is out of range; NaN and infinity always are",
+    "no_control": "the sender does not have control, or the clock; `why` names the client that has it",
+    "stale_token": "the token is not that of the current lease, or of the clock's current holder",
+    "busy": "the arm is moving",
+    "wrong_mode": "the robot mode or the safety mode does not allow the command",
+    "limit_position": "a position is outside the range of a joint",
+    "limit_velocity": "a velocity exceeds the limit of a joint",
+    "limit_acceleration": "an acceleration exceeds the limit of a joint",
+    "limit_torque": "a torque exceeds the limit of a joint",
+    "collision": "arm, payload or surroundings would collide or have collided",
+    "unknown_shaper": "there is no shaper of this name; `info` lists them",
+    "unknown_estimator": "there is no estimator of this name",
+    "unknown_calibration": "there is no calibration of this name; `info` lists them",
+    "unknown_fault": "there is no fault of this name, or the plant cannot simulate it; the faults are listed below",
+    "plant_failure": "the state of the simulated arm was no longer finite",
+    "payload_mismatch": "the calibration was made with a payload other than the declared one",
     "unsupported_version": "the server does not speak this version of the protocol",
 }
 
@@ -57,34 +58,34 @@ CODE_MEANINGS: dict[Code, str] = {
 class Accepted(
     Struct, frozen=True, kw_only=True, tag_field="type", tag="accepted", omit_defaults=True, gc=False
 ):
-    """The command has begun something that lasts; absent fields do not apply."""
+    """The command has started something that takes time; absent fields do not apply."""
 
     id: int | None = None
-    """Names the motion; events that concern it carry the same number."""
+    """Id of the motion; its events have the same id."""
     token: str | None = None
-    """Names the lease or the hold of the clock just taken; goes with every command that needs it."""
+    """Token of the lease or of the clock just taken; every command that needs it must contain it."""
     lease_s: float | None = None
-    """Length of the lease as granted [s]; absent for the clock, of which nothing runs out."""
+    """Duration of the granted lease [s]; absent for the clock, which does not expire."""
 
 
 class Done(Struct, frozen=True, kw_only=True, tag_field="type", tag="done", omit_defaults=True, gc=False):
     """The command has been carried out."""
 
     tick: int | None = None
-    """Tick at which it has; only where it matters."""
+    """Tick at which it was carried out; absent if it does not matter."""
 
 
 class Refused(Struct, frozen=True, kw_only=True, tag_field="type", tag="refused", gc=False):
     """The command was not carried out and changed nothing."""
 
     code: Code
-    """What is wrong, for a program."""
+    """Reason, for programs."""
     where: str
-    """The field at fault, `q[3]` or `payload.mass`; empty where it is none."""
+    """Field at fault, such as `q[3]` or `payload.mass`; empty if no field is at fault."""
     why: str
-    """A sentence with field, value and limit, for a person."""
+    """Reason for people, with field, value and limit."""
     limit: float | None = None
-    """The bound that was passed, in the field's unit; null where there is none."""
+    """Limit that was exceeded, in the field's unit; null if there is none."""
 
 
 Reply = Accepted | Done | Refused

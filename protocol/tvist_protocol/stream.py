@@ -1,7 +1,7 @@
-"""What a robot puts without being asked. Whoever reads ignores fields it does not know.
+"""Messages that a robot publishes by itself. A client must ignore fields that it does not know.
 
-Arrays are lists, which cost least to make out of numerical arrays five hundred times a second. They are not
-bounded: they come from the robot. Names are those of RTDE where it has one.
+Arrays are lists, which are the cheapest to create from numerical arrays five hundred times a second. They have no
+bounds, since they come from the robot. Fields have their RTDE names if RTDE has them.
 """
 
 from typing import Literal
@@ -24,14 +24,14 @@ EventKind = Literal[
 
 EVENT_MEANINGS: dict[EventKind, str] = {
     "motion_started": "the motion `id` begins at this tick",
-    "motion_done": "the shaped reference of motion `id` is at rest (to 1e-7 rad); the arm may still ring",
+    "motion_done": "the shaped reference of motion `id` is at rest (to 1e-7 rad); the arm may still vibrate",
     "motion_stopped": "the motion `id` ended before its target",
-    "stream_stopped": "the stream of set-points ended; `why` says how",
-    "lease_lost": "nobody has control any longer",
-    "protective_stop": "the robot stops to protect itself; `code` says from what",
-    "safety_stop": "the safety system stops the robot: `category` says how, `why` for what",
-    "shaper_changed": "another shaper or estimator is in use",
-    "warning": "something a person should know of; nothing stopped",
+    "stream_stopped": "the stream of set-points ended; `why` gives the reason",
+    "lease_lost": "no client has control any longer",
+    "protective_stop": "the robot stops to protect itself; `code` gives the reason",
+    "safety_stop": "the safety system stops the robot; `category` is the category of the stop, `why` the reason",
+    "shaper_changed": "the shaper or the estimator has changed",
+    "warning": "a condition that the user should know about; the robot did not stop",
 }
 
 
@@ -39,9 +39,9 @@ class State(Struct, frozen=True, kw_only=True, tag_field="type", tag="state", gc
     """One tick of controller and arm."""
 
     tick: int
-    """Number of the control period, never turned back."""
+    """Number of the control period; it never decreases."""
     timestamp: float
-    """tick·0.002 s; never the wall clock [s]."""
+    """Simulation time, tick·0.002 s, not the wall clock [s]."""
     robot_mode: int
     """RTDE's number: 3 is POWER_OFF, 5 IDLE, 7 RUNNING."""
     safety_mode: int
@@ -49,85 +49,85 @@ class State(Struct, frozen=True, kw_only=True, tag_field="type", tag="state", gc
     runtime_state: int
     """RTDE's number: 0 is STOPPING, 1 STOPPED, 2 PLAYING, 3 PAUSING, 4 PAUSED."""
     setpoint_sequence: int | None
-    """Newest set-point accepted at this tick; null before the first."""
+    """Sequence number of the newest set-point accepted at this tick; null before the first."""
     reference_q: list[float]
-    """Reference before shaping, one a joint [rad]."""
+    """Reference before shaping, one angle per joint [rad]."""
     target_q: list[float]
     """Shaped reference q* [rad]."""
     target_qd: list[float]
-    """Its velocity [rad/s]."""
+    """Velocity of the shaped reference [rad/s]."""
     target_qdd: list[float]
-    """Its acceleration [rad/s²]."""
+    """Acceleration of the shaped reference [rad/s²]."""
     target_moment: list[float]
-    """Torque the rigid model asks for it [N m]."""
+    """Torque that the rigid model needs for the shaped reference [N m]."""
     actual_q: list[float]
-    """Measured angle, on the link's side of the gear [rad]."""
+    """Measured angle on the link side of the gear [rad]."""
     actual_qd: list[float]
     """Measured velocity [rad/s]."""
     actual_moment: list[float]
     """Measured torque [N m]."""
     actual_TCP_pose: list[float]
-    """Kinematics of `actual_q`: x y z [m] and rotation vector [rad]."""
+    """Pose of the tool centre point computed from `actual_q`: x y z [m] and rotation vector [rad]."""
     actual_TCP_speed: list[float]
-    """Kinematics of `actual_q` and `actual_qd`: velocity [m/s] and angular velocity [rad/s]."""
+    """Velocity [m/s] and angular velocity [rad/s] of the tool centre point computed from `actual_q` and `actual_qd`."""
     actual_tool_accelerometer: list[float]
-    """Specific force in the flange frame [m/s²]; at rest it points up with 9.81."""
+    """Specific force in the flange frame [m/s²]; at rest it is 9.81 and points up."""
     speed_scaling: float
     """Share of the programmed speed [-]."""
     estimated_f_d: list[float]
-    """Damped frequency the shaper works with, one a mode [Hz]."""
+    """Damped frequency that the shaper uses, one per mode [Hz]."""
     estimated_zeta: list[float]
-    """Damping ratio the shaper works with, one a mode [-]."""
+    """Damping ratio that the shaper uses, one per mode [-]."""
     shaper_delay: float
-    """Latest impulse of the shaper [s]."""
+    """Time of the shaper's last impulse [s]."""
     missed_ticks: int
-    """Control periods that began too late, since the start."""
+    """Number of control periods since the start that began too late."""
     shaper_clipped: bool = False
-    """Whether the shaper cannot do here what it should: a delay is beyond what it holds, or more vibration is left."""
+    """Whether the shaper cannot meet its specification: it would need a longer delay line, or leaves more vibration."""
 
 
 class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc=False):
-    """Something happened at a tick. Every motion's `id` ends in exactly one of done and stopped."""
+    """An event at a tick. Every motion's `id` ends with exactly one of `motion_done` and `motion_stopped`."""
 
     tick: int
     """Tick at which it happened."""
     kind: EventKind
-    """What happened."""
+    """Kind of the event."""
     id: int | None = None
-    """The motion it concerns."""
+    """Id of the motion that it concerns."""
     code: Code | None = None
-    """The reason, for a program."""
+    """Reason, for programs."""
     why: str | None = None
-    """The reason, for a person."""
+    """Reason, for people."""
     category: int | None = None
-    """Of a stop, as IEC 60204-1 numbers them: 0 the brakes at once, 1 at rest the power is taken, 2 it is not."""
+    """Category of a stop by IEC 60204-1: 0 closes the brakes at once, 1 removes power at rest, 2 keeps the power."""
     duration: float | None = None
-    """Of a stop: from now until the shaped reference rests; null where that is too far ahead to say [s]."""
+    """Time from now until the shaped reference of a stop is at rest; null if it is too far ahead to tell [s]."""
     way: float | None = None
-    """Of a stop: how far the joint that turns most still turns; null likewise [rad]."""
+    """Largest angle that a joint still turns in a stop; null if its end is too far ahead to tell [rad]."""
     line: int | None = None
-    """Line of the program that has ended by an error, counted from 1."""
+    """Line of the program that ended with an error, counted from 1."""
 
 
 class Truth(Struct, frozen=True, kw_only=True, tag_field="type", tag="truth", gc=False):
-    """What no robot can know of itself, and a simulation can, at one tick."""
+    """Values at one tick that a simulation knows but a real robot cannot measure."""
 
     tick: int
     """Number of the control period."""
     timestamp: float
-    """tick·0.002 s [s]."""
+    """Simulation time, tick·0.002 s [s]."""
     motor_q: list[float]
-    """Motor angle referred to the joint, one a joint [rad]."""
+    """Motor angle referred to the joint, one per joint [rad]."""
     motor_qd: list[float]
     """Motor velocity referred to the joint [rad/s]."""
     gear_deflection: list[float]
-    """Link angle less motor angle, one a joint [rad]."""
+    """Link angle minus motor angle, one per joint [rad]."""
     link_deflection: list[float]
-    """Angle of each virtual joint by which the links bend [rad]."""
+    """Angle of each virtual joint that models the bending of a link [rad]."""
     flange_pose: list[float]
-    """Where the flange of the flexible arm is: x y z [m] and rotation vector [rad]."""
+    """Pose of the flexible arm's flange: x y z [m] and rotation vector [rad]."""
     tool_acceleration: list[float]
-    """Specific force in the flange frame, free of noise [m/s²]."""
+    """Specific force in the flange frame without noise [m/s²]."""
     f_d: list[float]
     """Damped frequency of each true mode, when last computed [Hz]."""
     zeta: list[float]
@@ -137,35 +137,35 @@ class Truth(Struct, frozen=True, kw_only=True, tag_field="type", tag="truth", gc
 
 
 class Telemetry(Struct, frozen=True, kw_only=True, tag_field="type", tag="telemetry", gc=False):
-    """How the server is doing, once a second. Counters run since the start."""
+    """Timing and counters of the server, once a second. Counters count from the start of the server."""
 
     tick: int
     """Number of the control period."""
     ticks_per_second: float
-    """Control periods in the last second, measured [1/s]."""
+    """Measured control periods in the last second [1/s]."""
     late_p50_us: float
-    """Lateness of a tick in the last second, median [µs]."""
+    """Median lateness of a tick in the last second [µs]."""
     late_p99_us: float
-    """Lateness of a tick in the last second, 99th percentile [µs]."""
+    """99th percentile of the lateness of a tick in the last second [µs]."""
     late_max_us: float
-    """Lateness of a tick in the last second, largest [µs]."""
+    """Largest lateness of a tick in the last second [µs]."""
     missed_ticks: int
-    """Control periods that began too late."""
+    """Number of control periods that began too late."""
     dropped_states: int
-    """States the server could not hand to the network in time; what the network drops on its way it does not say."""
+    """Number of states that the server could not pass to the network in time; losses in the network are not counted."""
     recorder_dropped: int
-    """Messages the recorder had no room for."""
+    """Number of messages that the recorder's queue had no room for."""
     setpoints_received: int
-    """Set-points that arrived."""
+    """Number of set-points received."""
     setpoints_refused: int
-    """Set-points that were not for the running stream, or no posture of the arm."""
+    """Number of set-points that were not for the running stream, or not a valid configuration of the arm."""
     setpoints_late: int
-    """Set-points dropped since a newer one had been played."""
+    """Number of set-points dropped because a newer one had been played."""
     setpoints_lost: int
-    """Set-points missing when their turn came."""
+    """Number of set-points that had not arrived when their turn came."""
     setpoints_limited: int
-    """Set-points that passed a limit and were held back."""
+    """Number of set-points that exceeded a limit and were limited."""
     commands: int
-    """Commands that arrived."""
+    """Number of commands received."""
     refused: int
-    """Commands that were refused."""
+    """Number of commands refused."""

@@ -1,7 +1,7 @@
-"""What a robot can be doing, what leads from one to the other, and what is refused: one table.
+"""Activities of a robot and the transitions between them, as one table.
 
-The server goes by it, the protocol's README draws it. A trigger is a command, or something else: those
-are named in `HAPPENINGS`. What a state has no row for is refused, or cannot happen there.
+The server uses the table and the protocol's README shows it as a diagram. A trigger is a command or one of
+`HAPPENINGS`. A trigger without a row for a state is refused, or cannot happen, in that state.
 """
 
 from dataclasses import dataclass
@@ -11,42 +11,42 @@ from tvist_protocol.modes import RobotMode, SafetyMode
 
 
 class Activity(StrEnum):
-    """What the robot is doing."""
+    """Current activity of the robot."""
 
     POWER_OFF = "POWER_OFF"
-    """No power: the brakes hold the arm."""
+    """The arm has no power; the brakes hold it."""
     IDLE = "IDLE"
-    """Power, and the brakes still hold the arm."""
+    """The arm has power; the brakes still hold it."""
     REST = "REST"
-    """The drives hold the arm: ready to move."""
+    """The drives hold the arm, which is ready to move."""
     MOVING = "MOVING"
-    """A point-to-point motion."""
+    """The arm makes a point-to-point motion."""
     PAUSED = "PAUSED"
-    """The same, coming to a standstill on its way or standing there."""
+    """A point-to-point motion is paused: the arm slows down or is at rest on its path."""
     STREAMING = "STREAMING"
-    """A stream of set-points is followed."""
+    """The arm follows a stream of set-points."""
     ENDING = "ENDING"
-    """A stream that has ended comes to rest through the filter."""
+    """A stream has ended, and the arm comes to rest through the filter."""
     STOPPING = "STOPPING"
-    """A stop, past the filter."""
+    """The arm makes a stop that bypasses the filter."""
     POWERING_OFF = "POWERING_OFF"
-    """The same, with the power to be taken once the arm rests."""
+    """The arm makes a stop, after which its power is switched off."""
     BRAKING = "BRAKING"
-    """The power is gone, and the brakes bring the arm to rest."""
+    """The arm has no power, and the brakes bring it to rest."""
     PROTECTIVE_STOPPING = "PROTECTIVE_STOPPING"
-    """The same, as a protective stop."""
+    """The arm makes a protective stop and is still moving."""
     PROTECTIVE_STOP = "PROTECTIVE_STOP"
-    """A protective stop, at rest, until it is unlocked."""
+    """The arm is at rest in a protective stop until it is unlocked."""
 
     robot_mode: RobotMode
-    """As RTDE numbers it."""
+    """Robot mode as numbered by RTDE."""
     moving: bool
-    """Whether something moves, or is about to go on."""
+    """Whether the arm moves or may continue to move."""
     protective: bool
-    """Whether it is a protective stop."""
+    """Whether the activity is a protective stop."""
 
     def safety_mode(self, *, reduced: bool) -> SafetyMode:
-        """As RTDE numbers it, as long as the safety system has nothing graver.
+        """Return the safety mode as numbered by RTDE, unless the safety system has a more serious one.
 
         Args:
             reduced: Whether the speed is reduced.
@@ -58,10 +58,10 @@ class Activity(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """Rows of the table that a trigger has in common."""
+    """Rows of the table with the same trigger and target."""
 
     trigger: str
-    """A command's `type`, or what happens."""
+    """`type` of a command, or one of `HAPPENINGS`."""
     sources: tuple[StrEnum, ...]
     target: StrEnum
 
@@ -70,30 +70,30 @@ class Control(StrEnum):
     """Who may move the robot."""
 
     FREE = "FREE"
-    """Nobody: whoever asks gets it."""
+    """No client has control; the next one that asks gets it."""
     HELD = "HELD"
     """The client that holds the lease."""
 
 
 class Stepping(StrEnum):
-    """Who may let time pass, where it does not pass by itself."""
+    """Client that may step time in lockstep."""
 
     FREE = "FREE"
-    """Who has control."""
+    """The client that has control."""
     HELD = "HELD"
-    """The client that holds the clock, and nobody else."""
+    """Only the client that holds the clock."""
 
 
 HAPPENINGS: dict[str, str] = {
     "power": "`power_on` with `release_brakes` false",
     "at_rest": "the shaped reference has come to rest",
-    "interruption": "motion must end: the lease did, a set-point failed to come for 250 ms, something would meet",
-    "brakes": "the power is gone, by a fault or the safety system: the brakes close at once",
-    "protective_stop": "a drive's torque was beyond its limit for more than 10 ms, a shaper of one's own failed, or "
+    "interruption": "the motion must end: the lease ended, no set-point came for 250 ms, or there would be a collision",
+    "brakes": "a fault or the safety system removed the power: the brakes close at once",
+    "protective_stop": "the torque of a drive exceeded its limit for more than 10 ms, a user's own shaper failed, or "
     "the fault was injected",
-    "plant_failure": "the simulated arm's state was no longer finite: it was put at rest where its reference was",
-    "lease_end": "nobody renewed the lease, or its client's liveliness token went",
-    "clock_end": "the liveliness token of the client that held the clock went",
+    "plant_failure": "the state of the simulated arm was no longer finite; the arm was put at rest at its reference",
+    "lease_end": "the client did not renew the lease, or its liveliness token disappeared",
+    "clock_end": "the liveliness token of the client that held the clock disappeared",
 }
 
 _A = Activity
@@ -115,12 +115,12 @@ _ROBOT_MODES = {
     _A.IDLE: RobotMode.IDLE,
 }
 for _activity in Activity:
-    # Attributes of the members, since looking up another member costs ten times as much: these are asked every tick.
+    # Attributes of the members, since looking up another member takes ten times as long, and this is done every tick.
     _activity.robot_mode = _ROBOT_MODES.get(_activity, RobotMode.RUNNING)
     _activity.moving = _activity in _MOVING
     _activity.protective = _activity in {_A.PROTECTIVE_STOPPING, _A.PROTECTIVE_STOP}
 _FREE_TO_END = (_A.MOVING, _A.PAUSED, _A.STREAMING, _A.ENDING, _A.STOPPING)
-"""Motion that is not yet ending for good."""
+"""Activities in which a motion can still be stopped."""
 _STANDING = (_A.POWER_OFF, _A.IDLE, _A.REST, _A.PROTECTIVE_STOP)
 _LOSING_POWER = (_A.POWERING_OFF, _A.BRAKING)
 _DRIVEN = tuple(a for a in _A if a not in {_A.POWER_OFF, _A.IDLE, *_LOSING_POWER})
@@ -158,16 +158,16 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition("plant_failure", _DRIVEN, _A.PROTECTIVE_STOP),
     Transition("plant_failure", _LOSING_POWER, _A.POWER_OFF),
 )
-"""The table. `simulation.reset` is not in it: it puts the robot at REST, IDLE or POWER_OFF from everywhere."""
+"""The table. It omits `simulation.reset`, which leads from every activity to REST, IDLE or POWER_OFF."""
 
 _AFTER = {(row.trigger, source): row.target for row in TRANSITIONS for source in row.sources}
 
 
 def after(activity: Activity, trigger: str) -> Activity | None:
-    """What a trigger leads to; None where the table has no row.
+    """Return the activity that a trigger leads to; None if the table has no row.
 
     Args:
-        activity: What the robot is doing.
+        activity: Current activity.
         trigger: A command's `type`, or one of `HAPPENINGS`.
     """
     target = _AFTER.get((trigger, activity))
@@ -175,10 +175,9 @@ def after(activity: Activity, trigger: str) -> Activity | None:
 
 
 def diagram(states: type[StrEnum]) -> str:
-    """The part of the table that is about these states, as a Mermaid state diagram.
+    """Return the part of the table for these states as a Mermaid state diagram.
 
-    What leads back to where it came from is left out; what all motion that may still be ended has in common is
-    drawn once.
+    Transitions back to the same state are left out; those common to all motions that can be stopped are drawn once.
 
     Args:
         states: `Activity`, `Control` or `Stepping`.

@@ -1,7 +1,7 @@
-"""The values messages are made of: SI units, radians, every number bounded.
+"""Types of the values in messages: SI units, radians, every number bounded.
 
-A bound on the wire keeps out NaN, infinity and typing errors by orders of magnitude, nothing finer: what this
-arm can do stands in `info`, and the server checks it. An unbounded float would let NaN in.
+The bounds of the wire only exclude NaN, infinity and errors by orders of magnitude. The limits of the arm are in
+`info`, and the server checks them. An unbounded float would allow NaN.
 """
 
 from typing import Annotated, Literal
@@ -9,14 +9,14 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 PROTOCOL_VERSION = 1
-"""Version of the wire: a client says it in `take_control`, the server in `info`."""
+"""Version of the protocol, which a client sends in `take_control` and the server in `info`."""
 
 ROBOT_NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$(?!\n)"
-"""A robot's name is one chunk of a key. `$` alone would let a final line feed through."""
+"""Pattern of a robot's name, which is one chunk of a key. `$` alone would allow a final line feed."""
 
 CLIENT_NAME_PATTERN = r"^(?!@)(?!.*[/*?#$])[ -~]{1,64}$(?!\n)"
-"""A client's name too is one chunk of a key, `client/<client>`: printable ASCII without `/ * ? # $`. No
-wildcard matches a chunk that begins with `@`: the server would not see such a client leave."""
+"""Pattern of a client's name, which is one chunk of a key, `client/<client>`: printable ASCII without `/ * ? # $`. No
+wildcard matches a chunk that begins with `@`, so the server would not notice when such a client leaves."""
 
 SESSION_PATTERN = r"^[0-9a-f]{1,32}$(?!\n)"
 """Zenoh's id of a session."""
@@ -26,12 +26,12 @@ PATTERN_MEANINGS: dict[str, str] = {
     SESSION_PATTERN: "1 to 32 of 0-9 a-f, Zenoh's id of a session",
     CLIENT_NAME_PATTERN: "1 to 64 printable ASCII characters other than / * ? # $, the first not @",
 }
-"""What to say to a person whose string does not match."""
+"""Description of each pattern, for messages about strings that do not match."""
 
 Angle = Annotated[float, Meta(ge=-1e3, le=1e3)]
 """[rad]"""
 Joints = Annotated[tuple[Angle, ...], Meta(min_length=1, max_length=7)]
-"""One angle a joint [rad]; as many as the arm has joints, which only the server knows."""
+"""One angle per joint [rad]; only the server knows how many joints the arm has."""
 
 Velocity = Annotated[float, Meta(gt=0, le=1e3)]
 """[rad/s], one number for every joint"""
@@ -68,7 +68,7 @@ Inertia6 = tuple[Moment, Moment, Moment, Moment, Moment, Moment]
 """xx xy xz yy yz zz about the centre of mass, flange axes [kg m²]"""
 
 Sequence = Annotated[int, Meta(ge=0, extra_json_schema={"maximum": 2**64 - 1})]
-"""A uint64. MessagePack has no larger integer, and a bound above 2^63 cannot be said to msgspec."""
+"""A uint64. MessagePack has no larger integer, and msgspec does not accept a bound above 2^63."""
 Ticks = Annotated[int, Meta(ge=1, le=100_000)]
 """Control periods of 0.002 s"""
 Seed = Annotated[int, Meta(ge=0, le=2**63 - 1)]
@@ -77,16 +77,16 @@ Version = Annotated[int, Meta(ge=0, le=65535)]
 Token = Annotated[str, Meta(max_length=128)]
 """May be empty on the wire: then it is a stale one, which the server says better than a length does."""
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
-"""Of a shaper, an estimator, a calibration, a fault; whether there is one of that name the server says."""
+"""Name of a shaper, an estimator, a calibration or a fault; the server checks that it exists."""
 RobotName = Annotated[str, Meta(pattern=ROBOT_NAME_PATTERN)]
 ClientName = Annotated[str, Meta(pattern=CLIENT_NAME_PATTERN)]
 
 ResetMode = Literal["RUNNING", "IDLE", "POWER_OFF"]
-"""Robot modes a simulation can be put into."""
+"""Robot modes that a simulation can be set to."""
 
 
 class Payload(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, gc=False):
-    """What hangs on the flange."""
+    """Payload on the flange."""
 
     mass: Mass
     """Mass [kg]."""

@@ -8,7 +8,7 @@ from tvist_shaping.steady import SMOOTH, Design, SteadyFilter
 
 
 class AimedFilter(SteadyFilter):
-    """For motions whose end is known: what rings after a motion is the arm at its end, wherever it came from.
+    """Filter for motions with a known end, since the vibration after a motion is that of the arm at its end.
 
     Weights that do not change cannot exceed the limits of what they shape, need no averaging and do not lag behind
     the arm. In motion, where the arm is still elsewhere, they fit less. Where no end is told, for a stream, it is a
@@ -16,7 +16,7 @@ class AimedFilter(SteadyFilter):
     """
 
     def __init__(self, design: Design, estimator: Estimator, *, joints: int, smooth: int = SMOOTH) -> None:
-        """As of `SteadyFilter`."""
+        """Take the arguments of `SteadyFilter`."""
         self._aimed = False
         super().__init__(design, estimator, joints=joints, smooth=smooth)
         self.excess = 0.0

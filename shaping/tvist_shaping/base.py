@@ -14,7 +14,7 @@ from tvist_shaping.errors import FilterError, ShaperFailureError, ShapingError
 from tvist_shaping.estimators.base import Estimator
 
 Posture = Callable[[Floats], Floats]
-"""From a sample, shape (width,), to the joint angles that it stands for, shape (joints,) [rad]."""
+"""Function from a sample, shape (width,), to the joint angles that it represents, shape (joints,) [rad]."""
 
 
 class Filter(ABC):
@@ -31,7 +31,7 @@ class Filter(ABC):
         period: h [s].
         f_d: Damped frequencies it works with [Hz], shape (modes,).
         zeta: Damping ratios it works with [-], shape (modes,).
-        excess: By what share the shaped acceleration may exceed the reference's, as far as it is known and kept
+        excess: Share by which the shaped acceleration may exceed the reference's, as far as it is known and kept
             small: who makes the reference can stay that much below a limit [-].
         clipped: Whether it could not do what it should at the last tick: a delay was beyond what it holds, or a mode
             beyond what its estimator believes.
@@ -84,11 +84,11 @@ class Filter(ABC):
     @property
     @abstractmethod
     def mean_delay(self) -> float:
-        """Of the weights of the last tick [s]: how far the shaped reference trails one of constant velocity."""
+        """Mean delay of the weights of the last tick [s]: the lag behind a reference of constant velocity."""
 
     @property
     def peak(self) -> float:
-        """By what factor the velocity and acceleration may exceed the reference's while the weights stay as they are.
+        """Factor by which the velocity and acceleration may exceed the reference's while the weights stay as they are.
 
         The sum of the weights' magnitudes [-], 1 where none is negative.
         """
@@ -104,7 +104,7 @@ class Filter(ABC):
 
     @abstractmethod
     def with_estimator(self, estimator: Estimator) -> Self:
-        """The same filter with another estimator, that goes on where this one is; this one is left as it is.
+        """Return this filter with another estimator, in the same state; this filter does not change.
 
         Raises:
             FilterError: The two do not fit.
@@ -120,7 +120,7 @@ class Filter(ABC):
 
         Args:
             q: First sample, finite: joint angles [rad], shape (joints,); or a parameter of a path, shape (width,).
-            posture: From a parameter to the joint angles there; None: samples are joint angles.
+            posture: Function from a parameter to the joint angles there; None: samples are joint angles.
 
         Raises:
             ShapingError: q has another shape.
@@ -205,7 +205,7 @@ class Filter(ABC):
         """Refuse a shaper that fails at once: there are no weights yet to go on with.
 
         Raises:
-            ShaperFailureError: It fails.
+            ShaperFailureError: The shaper fails.
         """
         if self.fault is not None:
             raise ShaperFailureError(self.name, self.fault)
@@ -217,7 +217,7 @@ class Filter(ABC):
             other: The filter to go on from; it is left as it is.
 
         Raises:
-            ShapingError: It has other joints.
+            ShapingError: The other filter has a different number of joints.
         """
         if self.joints != other.joints:
             raise ShapingError(f"a filter of {self.joints} joints cannot go on from one of {other.joints}")

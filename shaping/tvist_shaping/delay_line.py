@@ -155,7 +155,7 @@ class DelayLine:
             other: The line to copy from; it is left as it is.
 
         Raises:
-            ShapingError: It holds samples of another shape.
+            ShapingError: The other line contains samples of a different shape.
         """
         kept = min(self.capacity, other.capacity)
         samples = other.newest(kept)
@@ -184,7 +184,7 @@ class DelayLine:
         Args:
             A: Amplitudes [-], shape (N,), sum 1.
             delays: Delays d_j [ticks], shape (N,), each 0 to `max_delay`.
-            out: Where y goes, shape (joints,).
+            out: Array that receives y, shape (joints,).
 
         Raises:
             DelayError: A delay is outside that range or not a number; `out` is left as it was.

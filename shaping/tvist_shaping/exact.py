@@ -26,7 +26,7 @@ from tvist_shaping.newton import solve
 from tvist_shaping.tabulated import Tabulated
 
 HIGHEST_ZERO = 1.8
-"""Where the highest zero may be, in design frequencies [-]."""
+"""Largest frequency of the highest zero, in design frequencies [-]."""
 
 
 class HumpShaper:

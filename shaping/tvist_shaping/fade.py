@@ -1,4 +1,4 @@
-"""From one filter to another while the reference moves.
+"""Transition from one filter to another while the reference moves.
 
 The two are fed the same reference, and the output is y = o + s (n - o): o the old one's, n the new one's, s the
 share of the new one, from 0 to 1. While s stands still, y is a mean of o and n and keeps every limit that both

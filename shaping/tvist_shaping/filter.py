@@ -113,7 +113,7 @@ class TvistFilter(Filter):
 
     @property
     def mean_delay(self) -> float:
-        """Of the impulses of the last tick [s]."""
+        """Mean delay of the impulses of the last tick [s]."""
         return self.impulses.mean_delay
 
     @property
@@ -147,7 +147,7 @@ class TvistFilter(Filter):
         return changed
 
     def with_estimator(self, estimator: Estimator) -> "TvistFilter":
-        """As `replace`."""
+        """Return this filter with another estimator, see `replace`."""
         return self.replace(estimator=estimator)
 
     def _start(self) -> None:

@@ -32,11 +32,11 @@ STEPS = 60
 SOLVED = 1e-9
 """Residual of the dual's gradient that is none [-]."""
 SCALE = 0.03
-"""Of the mean delay's row, so that all rows are alike [s]."""
+"""Scale of the mean delay's row, so that all rows have the same magnitude [s]."""
 QUICKEST = 0.15
 """Largest change of the length in its own seconds a second [-]."""
 GAIN = 0.3
-"""Of the length's servo [-]."""
+"""Gain of the servo for the length [-]."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,9 @@ class FirDesign:
         for name, least in (("spread", 0.0), ("residual", 1e-6), ("weight", 1e-6)):
             values = getattr(self, name)
             if not len(values) == len(self.spread) >= 1:
-                raise FilterError(name, len(values), f"one number a mode, {max(len(self.spread), 1)} in all")
+                raise FilterError(
+                    name, len(values), f"one number per mode, {max(len(self.spread), 1)} in all"
+                )
             for value in values:
                 if not least <= value < math.inf:
                     raise FilterError(name, value, f"finite and at least {least:g}")
@@ -79,7 +81,7 @@ class FirDesign:
 
     @property
     def rows(self) -> int:
-        """Of the programme."""
+        """Number of rows of the programme."""
         return 2 + 2 * sum(2 if spread > 0.0 else 1 for spread in self.spread)
 
 
@@ -106,8 +108,8 @@ def solve(  # noqa: C901, PLR0912 - one kernel: its branches are loops over rows
         length: T [s].
         mean: Mean delay D [s].
         period: h₀ [s].
-        spread: Of `FirDesign`, shape (modes,).
-        weight: Of `FirDesign`, shape (modes,).
+        spread: `spread` of `FirDesign`, shape (modes,).
+        weight: `weight` of `FirDesign`, shape (modes,).
         dual: Unknowns of the dual, shape (rows,): where to begin; the solution afterwards.
         rows: Scratch, shape (rows, N).
         hessian: Scratch, shape (rows, rows + 2).

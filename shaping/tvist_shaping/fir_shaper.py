@@ -29,7 +29,7 @@ class FirShaper:
         description: What it does, in one line.
         function: (f_d [Hz], ζ [-]), each of shape (modes,), the lowest mode first -> weights h_n of the samples of n
             ticks ago [-], shape (N,) with N at most `taps`, sum 1.
-        taps: How many there are at most, 1 to 500.
+        taps: Largest number of taps, 1 to 500.
         modes: How many modes the function is told, 1 to 8.
         peak: Σ|h_n| at the most, by which it may exceed its reference's velocity and acceleration; 1 where no tap is
             negative [-].
@@ -66,22 +66,23 @@ class FirShaper:
 
         Raises:
             Exception: Whatever the function raises.
-            ShaperFailureError: It gives no taps of sum 1, or others than are declared.
+            ShaperFailureError: The function's taps do not sum to 1, or do not match the declaration.
         """
         given = np.array(self.function(f_d.copy(), zeta.copy()), dtype=float)
         if given.ndim != 1 or not 1 <= given.size <= self.taps:
             raise ShaperFailureError(
-                self.name, f"gives taps of shape {given.shape}, but must give 1 to {self.taps}"
+                self.name, f"returns taps of shape {given.shape}, but must return 1 to {self.taps}"
             )
         if not np.isfinite(given).all():
-            raise ShaperFailureError(self.name, "gives taps that are not finite")
+            raise ShaperFailureError(self.name, "returns taps that are not finite")
         if abs(given.sum() - 1.0) >= 1e-9:
             raise ShaperFailureError(
-                self.name, f"gives taps that sum to {float(given.sum())!r}, but must sum to 1 within 1e-9"
+                self.name, f"returns taps that sum to {float(given.sum())!r}, but must sum to 1 within 1e-9"
             )
         if (most := float(np.abs(given).sum())) > self.peak * (1.0 + ROUNDING):
             raise ShaperFailureError(
-                self.name, f"gives taps whose magnitudes sum to {most:g}, beyond its peak of {self.peak:g}"
+                self.name,
+                f"returns taps whose magnitudes sum to {most:g}, more than its peak of {self.peak:g}",
             )
         return np.pad(given, (0, self.taps - given.size))
 
@@ -93,14 +94,14 @@ class FirShaper:
             zeta: Damping ratio of the mode [-].
 
         Raises:
-            Exception: As `weights`.
+            Exception: See `weights`.
         """
         weights = self.weights(np.full(self.modes, f_d), np.full(self.modes, zeta))
         last = int(np.flatnonzero(weights)[-1]) + 1
         return Impulses(weights[:last], self.period * np.arange(last, dtype=np.float64))
 
     def design(self) -> Design:
-        """It as a `SteadyFilter` takes it."""
+        """This shaper as a design for `SteadyFilter`."""
         return _Weights(self)
 
 

@@ -88,7 +88,7 @@ def check_mode(f_d: float, zeta: float, zeta_max: float = 1.0, instead: str = ""
     Args:
         f_d: Damped frequency [Hz].
         zeta: Damping ratio [-].
-        zeta_max: It must be below this [-].
+        zeta_max: Limit that ζ must be below [-].
         instead: What to take for a higher one, in words.
 
     Raises:

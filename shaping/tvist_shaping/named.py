@@ -64,14 +64,14 @@ class Registry:
                 limit = "1 to 64 of a-z 0-9 _ - . , ( ), the first a letter or a digit"
                 raise DesignError("name", shaper.name, limit)
             if shaper.name in SHAPERS or shaper.name in DESIGNS or shaper.name in found:
-                raise DesignError("name", shaper.name, "another: there is a shaper of that name already")
+                raise DesignError("name", shaper.name, "a name that no other shaper has")
             if isinstance(shaper, FirShaper) and shaper.period != PERIOD:
                 raise DesignError("period", shaper.period, f"{PERIOD:g} s, as that of all filters by name")
             found[shaper.name] = shaper
         self.own = MappingProxyType(found)
 
     def names(self) -> tuple[str, ...]:
-        """Of every filter there is."""
+        """Names of all available filters."""
         return (*SHAPERS, *DESIGNS, *self.own)
 
     def check(self, name: str) -> None:
@@ -88,7 +88,7 @@ class Registry:
         """How many modes the filter of a name wants to know.
 
         Args:
-            name: Of the filter.
+            name: Name of the filter.
             modes: How many a shaper of impulses is to suppress; a design or a FIR filter has its own number.
 
         Raises:

@@ -8,7 +8,7 @@ from tvist_shaping._types import Floats
 from tvist_shaping.errors import ConvergenceError
 
 STEP = 1e-7
-"""Of the difference quotients [-]: all unknowns here are of the order of one."""
+"""Step of the difference quotients [-]; all unknowns here are of the order of one."""
 FARTHEST = 0.2
 """No unknown changes by more in one step [-]."""
 SOLVED = 1e-12
@@ -20,13 +20,13 @@ def solve(equations: Callable[[Floats], Floats], start: Floats) -> Floats:
 
     Args:
         equations: (M, m) -> (M, m): what is left of the m equations at each of M points.
-        start: Where to begin, shape (m,); close enough for Newton's method.
+        start: Initial guess, shape (m,); close enough for Newton's method.
 
     Returns:
         A solution, shape (m,), every equation true to 1e-12.
 
     Raises:
-        ConvergenceError: It was not found.
+        ConvergenceError: No solution was found.
     """
     x, m = np.array(start, dtype=float), len(start)
     with np.errstate(all="ignore"):  # where it diverges, it says so below

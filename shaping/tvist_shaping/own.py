@@ -14,7 +14,7 @@ TRIED_F_D = (0.1, 200.0)
 """Damped frequencies for which a shaper is tried out [Hz]: all that a client may tell a robot."""
 _F_D = np.geomspace(*TRIED_F_D, 23)
 _SHARES = np.array([*np.linspace(0.0, 1.0, 24, endpoint=False), 0.99])
-"""Of the highest damping ratio that a shaper is made for [-]."""
+"""Damping ratios to check, as shares of the highest one that a shaper supports [-]."""
 _DECLARED = (
     ("duration_periods", 0.0, 1e6, "a number from 0 to 1e6"),
     ("zeta_max", 1e-6, 1.0, "a number from 1e-6 to 1"),
@@ -102,6 +102,6 @@ def _tried(shaper: Shaper) -> tuple[float, float]:
     ):
         if found > declared * (1.0 + ROUNDING):
             raise ShaperFailureError(
-                shaper.name, f"has a {what} of {found:g}, beyond the {declared:g} it declares"
+                shaper.name, f"has a {what} of {found:g}, more than the declared {declared:g}"
             )
     return longest, most

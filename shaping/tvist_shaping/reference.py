@@ -7,13 +7,13 @@ from typing import Any
 import tvist_shaping
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "shaping-library.md"
-"""In a checkout."""
+"""Path of the page in a checkout."""
 HEAD = """# The shaping library
 
 What `tvist_shaping` exports, made of its docstrings by `python -m tvist_shaping.reference`; a test compares. The
-[README](../../shaping/README.md) says what it is for, with examples, and
-[how to make a shaper of your own](../how-to/change-a-shaper.md) is a page of its own. Everything that is not listed
-here may change without a word.
+[README](../../shaping/README.md) says what it is for, with examples, and another page
+[how to make a shaper of your own](../how-to/change-a-shaper.md). Everything that is not listed here may change without
+notice.
 
 """
 PARTS: dict[str, tuple[str, ...]] = {

@@ -42,7 +42,7 @@ class Shaper:
         """
         impulses = self.function(f_d, zeta)
         if not isinstance(impulses, Impulses):
-            raise ShaperFailureError(self.name, f"gives {type(impulses).__name__} where Impulses are wanted")
+            raise ShaperFailureError(self.name, f"returns {type(impulses).__name__} instead of Impulses")
         return impulses
 
     def band(self, V: float = 0.05, zeta: float = 0.0) -> tuple[float, float]:

@@ -65,7 +65,7 @@ def specified(low: float, high: float, V: float) -> tuple[Floats, Floats]:
 
 
 def _humps(N: int, V: float) -> Floats:
-    """Where the residual of `ripple` has extremes within its band, in design frequencies, shape (N - 2,)."""
+    """Return the extremes of the residual of `ripple` within its band, in design frequencies, shape (N - 2,)."""
     extremes = np.cos(np.arange(1, N - 1) * math.pi / (N - 1))
     return np.asarray(2.0 / math.pi * np.arccos(extremes / widening(N - 2, V)))
 

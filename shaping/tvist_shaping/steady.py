@@ -29,11 +29,11 @@ EVERY = 4
 SMOOTH = 64
 """Ticks of each running mean: fewer let the spread of the delays change too fast, more let it lag behind the arm."""
 EXCESS = 0.005
-"""By what share the acceleration may exceed the reference's [-]: the most on random motions at their limits."""
+"""Share by which the acceleration may exceed the reference's [-]: the most on random motions at their limits."""
 
 
 class Design(ABC):
-    """From modes to taps."""
+    """Design that computes taps from modes."""
 
     name: str
     """What the filter is called."""
@@ -48,11 +48,11 @@ class Design(ABC):
 
     @abstractmethod
     def copy(self) -> "Design":
-        """The same for another filter: a design may remember what it gave last."""
+        """Return a copy for another filter, since a design may remember its last result."""
 
     @abstractmethod
     def fork(self) -> Self:
-        """The same for another filter, with all that this one remembers: it goes on from here."""
+        """Return a copy for another filter with the state of this one, so that it continues from here."""
 
     @abstractmethod
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
@@ -101,7 +101,7 @@ class ProductDesign(Design):
         return f"ProductDesign(mean_delay={self.mean_delay:g}, modes={self.modes})"
 
     def copy(self) -> "ProductDesign":
-        """The same."""
+        """Return a copy for another filter."""
         return ProductDesign(self.mean_delay, modes=self.modes, longest=self._longest, period=self.period)
 
     def fork(self) -> Self:
@@ -109,7 +109,7 @@ class ProductDesign(Design):
         return self
 
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
-        """As `go_on`: nothing is carried over."""
+        """Compute the taps as `go_on` does, since this design has no state."""
         return product_taps(f_d, zeta, self.mean_delay, self.period, taps)
 
     def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:  # noqa: ARG002
@@ -131,7 +131,7 @@ class ShortDesign(Design):
         """A design.
 
         Args:
-            mean_delay: Of the taps at every configuration [s], > 0 and within the shortest length less its edge.
+            mean_delay: Mean delay of the taps everywhere [s], > 0 and within the shortest length less its edge.
             wanted: What it is to reach.
             period: Tick [s], > 0.
             name: What it is called.
@@ -157,7 +157,7 @@ class ShortDesign(Design):
         return f"ShortDesign(mean_delay={self.mean_delay:g}, wanted={self.wanted!r})"
 
     def copy(self) -> "ShortDesign":
-        """The same, from cold."""
+        """Return a copy without state for another filter."""
         return ShortDesign(self.mean_delay, wanted=self.wanted, period=self.period, name=self.name)
 
     def fork(self) -> Self:
@@ -262,7 +262,7 @@ class SteadyFilter(Filter):
 
     @property
     def mean_delay(self) -> float:
-        """Of the taps of the last tick [s]."""
+        """Mean delay of the taps of the last tick [s]."""
         return float(self._taps @ self._delays) * self.period
 
     @property
@@ -271,7 +271,7 @@ class SteadyFilter(Filter):
         return self.design.peak
 
     def with_estimator(self, estimator: Estimator) -> Self:
-        """The same design for other modes; see `Filter.with_estimator`."""
+        """Return a filter with the same design for other modes; see `Filter.with_estimator`."""
         other = type(self)(self.design.copy(), estimator, joints=self.joints, smooth=self._smooth)
         other.take_over(self)
         return other

@@ -40,7 +40,7 @@ def _missing(key: str, _: Any, name: str) -> str:
 
 
 def _unknown(key: str, _: Any, name: str) -> str:
-    return f"{_joined(key, name)} is no key of a robot file"
+    return f"{_joined(key, name)} is not a key of a robot file"
 
 
 def _bound(key: str, value: Any, relation: str, limit: str) -> str:

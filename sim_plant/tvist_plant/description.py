@@ -28,7 +28,7 @@ DISTURBANCES = ("friction", "gear", "noise")
 
 
 QUIET_STEP = 2.0 * math.pi / 2**23
-"""Of an encoder with 23 bits a turn [rad]: more than an arm at rest moves while its drives settle."""
+"""Step of an encoder with 23 bits per turn [rad]; an arm at rest moves less while its drives settle."""
 
 
 class DescriptionError(ValueError):
@@ -45,7 +45,7 @@ class Robot(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     name: str
     model: str
     joints: tuple[str, ...]
-    """From the base to the flange; their number is the number of joints everywhere."""
+    """Names of the joints, from the base to the flange; their number is the number of joints everywhere."""
 
 
 class Kinematics(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -173,11 +173,11 @@ class Collision(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     floor: Number = 0.0
     """Height [m]; the first two bodies stand on it and cannot reach it."""
     payload_radius: Positive = 0.05
-    """Of a capsule around the line from the flange through the payload's centre to twice its distance [m]."""
+    """Radius of the capsule from the flange through the payload's centre to twice its distance [m]."""
     apart: tuple[tuple[str, str], ...] = ()
     """Further pairs that cannot meet; "payload" is one of the names."""
     bodies: tuple[Body, ...] = ()
-    """From the base to the flange."""
+    """Bodies of the arm, from the base to the flange."""
 
 
 class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -201,20 +201,20 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
         return len(self.robot.joints)
 
     def quiet(self) -> "RobotDescription":
-        """The same arm with sensors that say the same from tick to tick once it rests."""
+        """Return the same arm with sensors whose values are constant once the arm is at rest."""
         return msgspec.structs.replace(
             self, sensors=Sensors(accelerometer_noise=0.0, encoder_step=QUIET_STEP)
         )
 
     def clean(self) -> "RobotDescription":
-        """The same arm without noise, gear error and Coulomb friction (its linear equivalent stays)."""
+        """Return the same arm without noise, gear error and Coulomb friction (its linear equivalent stays)."""
         return self.disturbed_by(())
 
     def disturbed_by(self, kept: Collection[str]) -> "RobotDescription":
-        """The same arm with some of its disturbances alone; for Coulomb friction its linear equivalent stays.
+        """Return the same arm with only some of its disturbances; the linear equivalent of Coulomb friction stays.
 
         Args:
-            kept: Of `DISTURBANCES`.
+            kept: Disturbances to keep, of `DISTURBANCES`.
 
         Raises:
             DescriptionError: There is no such disturbance.
@@ -248,7 +248,7 @@ def load(robot: str | Path) -> RobotDescription:
 
     Raises:
         DescriptionError: There is no such robot, or the file is wrong; the message names the key.
-        UserFileError: It is no file with a text of that size, is nested too deeply, or has its limits in degrees.
+        UserFileError: The file is not text, too large, nested too deeply, or has its limits in degrees.
     """
     shipped = resources.files("tvist_plant") / "robots" / f"{robot}.toml"
     try:
@@ -260,10 +260,10 @@ def load(robot: str | Path) -> RobotDescription:
     except OSError as error:
         known = ", ".join(robots())
         raise DescriptionError(
-            f"robot {str(robot)!r}: neither one of {known} nor a readable file ({error.strerror})"
+            f"robot {str(robot)!r}: must be one of {known} or a readable file ({error.strerror})"
         ) from error
     except tomllib.TOMLDecodeError as error:
-        raise DescriptionError(f"robot file {robot}: it is no TOML: {error}") from error
+        raise DescriptionError(f"robot file {robot}: it is not valid TOML: {error}") from error
     except msgspec.ValidationError as error:
         raise DescriptionError(f"robot file {robot}: {in_words(error, content)}") from error
     _check(description, robot)
@@ -304,7 +304,7 @@ def _check(description: RobotDescription, source: str | Path) -> None:
     if len(set(flexible.links)) < len(flexible.links) or not set(flexible.links).issubset(possible):
         raise DescriptionError(
             f"robot file {source}: link_flexibility.links is {list(flexible.links)}; "
-            f"each may stand there once and must be one of {possible}, whose length kinematics.a is not 0"
+            f"each may occur only once and must be one of {possible}, whose length kinematics.a is not 0"
         )
     _check_collision(description, source)
     for name, pose in description.poses.items():
@@ -321,7 +321,7 @@ def _check_collision(description: RobotDescription, source: str | Path) -> None:
     if len(known) <= len(names):
         raise DescriptionError(
             f"robot file {source}: collision.bodies has the names {names}; "
-            "each may stand there once, and payload and floor are taken"
+            "each may occur only once, and the names payload and floor are reserved"
         )
     for body in description.collision.bodies:
         if body.link >= description.joints:
@@ -342,6 +342,6 @@ def _check_bodies(description: RobotDescription, source: str | Path) -> None:
     for key, inertia in {**links, "payload.inertia": description.payload.inertia}.items():
         if not is_real_body(inertia):
             raise DescriptionError(
-                f"robot file {source}: {key} is {list(inertia)}; no body has it: "
+                f"robot file {source}: {key} is {list(inertia)}; no body can have this: "
                 "a principal moment is negative or larger than the other two together"
             )

@@ -16,7 +16,7 @@ _DRIVES = (
     "coulomb_friction",
     "friction_width",
 )
-"""Of the drives: what makes frequency and damping. Feed-forward and gear error only excite."""
+"""Parameters of the drives that determine frequency and damping; feed-forward and gear error only excite vibration."""
 
 
 def fingerprint(description: RobotDescription) -> str:

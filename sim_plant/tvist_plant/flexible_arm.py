@@ -37,7 +37,7 @@ class FlexibleArm:
         imperfections: What the arm has that its description does not say. They are explicit in the integrator: with 8
             substeps they are followed as well as the rest is with 4.
         period: Control period [s].
-        substeps: Of the integrator in a period.
+        substeps: Number of the integrator's steps per period.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class FlexibleArm:
         Args:
             command: Position to hold and torque fed forward; its velocity must be zero.
             payload: What the arm carries from now on; None leaves it.
-            seed: Of sensor noise and gear errors.
+            seed: Seed of sensor noise and gear errors.
         """
         if payload is not None:
             self._load(payload)
@@ -151,7 +151,7 @@ class FlexibleArm:
             torque: On the link side, shape (n,); zeros end it [N m].
 
         Raises:
-            ValueError: It is not n finite numbers.
+            ValueError: The torque is not n finite numbers.
         """
         self._outside.push(torque)
 
@@ -171,7 +171,7 @@ class FlexibleArm:
             body: One of `bodies`.
             force: [N].
             moment: About the point [N m].
-            point: Where the force acts, in the frame of the body, which is that of its joint or of the flange [m].
+            point: Point of application in the frame of the body, which is that of its joint or of the flange [m].
 
         Raises:
             ValueError: There is no such body, or an argument is not three finite numbers.

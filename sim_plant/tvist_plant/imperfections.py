@@ -36,9 +36,9 @@ class YieldingBase:
     damping_time: float = 1e-3
     """Damping over stiffness [s]."""
     mass: float = 20.0
-    """Of the ring under the arm [kg]."""
+    """Mass of the ring under the arm [kg]."""
     radius: float = 0.25
-    """Of the ring's inertia [m]."""
+    """Radius of the ring, for its inertia [m]."""
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -118,7 +118,7 @@ class GearLaw:
         """Angle by which each gear is twisted under a steady torque, without hysteresis, shape (n,) [rad].
 
         Args:
-            torque: That the gears transmit, shape (n,) [N m].
+            torque: Torque that the gears transmit, shape (n,) [N m].
         """
         if not self.softness.any():
             return torque / self.stiffness
@@ -129,7 +129,7 @@ class GearLaw:
 
 
 def on_base(arm: FlexibleModel, base: YieldingBase) -> FlexibleModel:
-    """The same arm on a base that yields about the world's x and y axes; both count as virtual joints."""
+    """Return the same arm on a base that yields about the world's x and y axes; both count as virtual joints."""
     ground = pin.Model()
     inertia = pin.Inertia(base.mass, np.zeros(3), base.mass * base.radius**2 * np.eye(3) / 2.0)
     light = pin.Inertia(0.05 * base.mass, np.zeros(3), 0.05 * base.mass * base.radius**2 * np.eye(3) / 2.0)

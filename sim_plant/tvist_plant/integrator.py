@@ -20,7 +20,7 @@ from tvist_plant.joint_parameters import JointParameters, of_joint
 from tvist_plant.model import Floats, Integers
 
 LAST, NOW = 0, 1
-"""Where commands and dynamics of the last and the present tick are."""
+"""Indices of the commands and dynamics of the last and the current tick."""
 
 
 @compiled

@@ -31,9 +31,9 @@ class FlexibleModel:
     model: pin.Model
     """N = n + 2 x (links that bend) degrees of freedom, in the order of the chain."""
     joints: Integers
-    """Which of them are the n joints."""
+    """Indices of the n joints."""
     flexes: Integers
-    """Which of them are the virtual joints of bending links."""
+    """Indices of the virtual joints of bending links."""
     flex_stiffness: Floats
     """One a virtual joint [N m/rad]."""
     flex_damping: Floats

@@ -19,7 +19,7 @@ class _Wrench:
     joint: int
     """Number of the model's joint that the body hangs on."""
     point: Floats
-    """Where the wrench acts, in that joint's frame, shape (3,) [m]."""
+    """Point of application in that joint's frame, shape (3,) [m]."""
     force: Floats
     """World axes, shape (3,) [N]."""
     moment: Floats
@@ -58,7 +58,7 @@ class Outside:
         """Push the joints on the link side; see `FlexibleArm.push`."""
         given, shape = np.array(torque, dtype=float), self._flexible.joints.shape
         if given.shape != shape or not np.isfinite(given).all():
-            raise ValueError(f"torque is {given.tolist()}: must be {shape[0]} finite numbers, one a joint")
+            raise ValueError(f"torque is {given.tolist()}: must be {shape[0]} finite numbers, one per joint")
         self._torque = given if given.any() else None
 
     def push_body(

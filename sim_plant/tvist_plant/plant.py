@@ -50,11 +50,11 @@ class Truth:
     link_deflection: Floats
     """Angles of the virtual joints by which links bend, one each; empty where links are rigid [rad]."""
     flange_position: Floats
-    """Where the flange is, deflections included, shape (3,) [m]."""
+    """Position of the flange, including deflections, shape (3,) [m]."""
     flange_rotation: Floats
     """Orientation of the flange, deflections included, shape (3, 3)."""
     specific_force: Floats
-    """In the flange frame, without noise, shape (3,) [m/s^2]."""
+    """Specific force in the flange frame without noise, shape (3,) [m/s^2]."""
 
 
 class Plant(Protocol):
@@ -83,7 +83,7 @@ class Plant(Protocol):
         Args:
             command: Position to hold, shape (n,) [rad], torque fed forward [N m], and a velocity of zero.
             payload: What the arm carries from now on; None leaves it.
-            seed: Of all that is left to chance, such as sensor noise.
+            seed: Seed of everything random, such as sensor noise.
 
         Raises:
             ValueError: The arm cannot be there, or cannot carry that, and no controller starts with it. A plant whose
@@ -153,7 +153,7 @@ def check_measurement(measured: Measurement, joints: int, plant: Plant) -> None:
     for name, shape in (("q", (joints,)), ("qd", (joints,)), ("moment", (joints,)), ("accelerometer", (3,))):
         found = getattr(getattr(measured, name, None), "shape", None)
         if found != shape:
-            what = "is no array" if found is None else f"has shape {found}"
+            what = "is not an array" if found is None else f"has shape {found}"
             raise ValueError(
                 f"plant {type(plant).__name__}: measured {name} {what}: its shape must be {shape}"
             )

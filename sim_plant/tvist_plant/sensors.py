@@ -12,7 +12,7 @@ class Accelerometer:
 
     Args:
         noise: rms per axis [m/s^2].
-        seed: Of the noise; equal seeds give equal noise.
+        seed: Seed of the noise; equal seeds give equal noise.
     """
 
     def __init__(self, noise: float, seed: int) -> None:

@@ -18,10 +18,10 @@ def check_limits(position: Sequence[float], velocity: Sequence[float], source: s
     Args:
         position: One a joint, either way from zero [rad].
         velocity: One a joint [rad/s].
-        source: Where they stand, for the sentence.
+        source: File that contains them, for the message.
 
     Raises:
-        UserFileError: One is beyond `MAX_POSITION` or `MAX_VELOCITY`; the sentence names it in both units.
+        UserFileError: One exceeds `MAX_POSITION` or `MAX_VELOCITY`; the message gives it in both units.
     """
     for key, values, most, per in (
         ("position", position, MAX_POSITION, ""),

@@ -22,18 +22,18 @@ Content = TypeVar("Content")
 
 
 class UserFileError(ValueError):
-    """A file is there and is not what is asked for: one sentence that names it and says what was expected."""
+    """A file exists but has the wrong content; the message names it and says what was expected."""
 
 
 def read_bytes(path: str | os.PathLike[str], what: str) -> bytes:
     """Read a file that a user has named.
 
     Args:
-        path: Where it is.
-        what: What it should hold, for the sentence: "robot file".
+        path: Path of the file.
+        what: Kind of file, for the message: "robot file".
 
     Raises:
-        UserFileError: It is no regular file, or larger than `LARGEST`.
+        UserFileError: The file is not a regular file, or larger than `LARGEST`.
         OSError: There is none, or it cannot be read.
     """
     # Looked at before it is opened, since opening alone may do something to a device, and afterwards again, since
@@ -45,7 +45,7 @@ def read_bytes(path: str | os.PathLike[str], what: str) -> bytes:
         content = stream.read(LARGEST + 1)
     if len(content) > LARGEST:
         raise UserFileError(
-            f"{what} {path} has more than {LARGEST >> 20} MiB, the most that is read: is it the right file?"
+            f"{what} {path} has more than {LARGEST >> 20} MiB, the largest size that is read: is it the right file?"
         )
     return content
 
@@ -54,8 +54,8 @@ def read_text(path: str | os.PathLike[str], what: str) -> str:
     """Read a text that a user has named.
 
     Raises:
-        UserFileError: As `read_bytes`, or it is not UTF-8.
-        OSError: As `read_bytes`.
+        UserFileError: See `read_bytes`; or the file is not UTF-8.
+        OSError: See `read_bytes`.
     """
     try:
         return read_bytes(path, what).decode()
@@ -69,9 +69,9 @@ def read_toml(path: str | os.PathLike[str], what: str) -> dict[str, Any]:
     """Read a TOML file that a user has named.
 
     Raises:
-        UserFileError: As `read_text`, or it has more than `DEEPEST` levels.
-        TOMLDecodeError: It is no TOML.
-        OSError: As `read_bytes`.
+        UserFileError: See `read_text`; or the content has more than `DEEPEST` levels.
+        TOMLDecodeError: The content is not valid TOML.
+        OSError: See `read_bytes`.
     """
     text = read_text(path, what)
     if _is_deeper(text, DEEPEST):
@@ -83,7 +83,7 @@ def toml(text: str) -> dict[str, Any]:
     """Parse TOML.
 
     Raises:
-        TOMLDecodeError: It is none, or has an integer of thousands of digits, which the parser leaves to Python.
+        TOMLDecodeError: The text is not valid TOML, or has an integer of thousands of digits, which Python refuses.
     """
     try:
         return tomllib.loads(text)
@@ -97,12 +97,12 @@ def parsed(path: str | os.PathLike[str], what: str, parse: Callable[[], Content]
     """What a parser that minds its own depth makes of a file.
 
     Args:
-        path: Where it is.
-        what: What it should hold, for the sentence.
+        path: Path of the file.
+        what: Kind of file, for the message.
         parse: Parses it.
 
     Raises:
-        UserFileError: It is nested more deeply than the parser follows.
+        UserFileError: The content is nested more deeply than the parser supports.
     """
     try:
         return parse()

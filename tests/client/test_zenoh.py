@@ -48,17 +48,17 @@ async def test_states_come_in_order_and_the_present_one_is_new(realtime, robot):
 
 
 async def test_nobody_listening_is_said_at_once(endpoint):
-    with pytest.raises(NotConnectedError, match=f"nobody answers at {endpoint}: check that the server runs"):
+    with pytest.raises(NotConnectedError, match=f"no server answers at {endpoint}: check that it is running"):
         await Robot.connect(endpoint)
 
 
 async def test_another_robots_endpoint_is_said_to_be_that(realtime, endpoint):
-    with pytest.raises(NotConnectedError, match=r"no robot 'ur3' .*; those there are ur5e: check name"):
+    with pytest.raises(NotConnectedError, match=r"no robot 'ur3' .*; the robots there are ur5e: check name"):
         await Robot.connect(endpoint, "ur3")
 
 
 async def test_what_is_no_endpoint_or_no_name_is_said_to_be_none():
-    with pytest.raises(NotConnectedError, match="is no endpoint: it has the form"):
+    with pytest.raises(NotConnectedError, match="is not an endpoint: it must have the form"):
         await Robot.connect("localhost")
     with pytest.raises(ProtocolError, match="robot is 'Ur 5'"):
         await Robot.connect(name="Ur 5")

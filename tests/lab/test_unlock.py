@@ -42,7 +42,10 @@ async def test_an_arm_that_carries_too_much_stops_again_and_that_is_said(robot):
     async with robot.control("me") as arm:
         await arm.reset(payload=free_setup(payload=20.0, overload=True).payload)
         await stopped(robot, arm)
-        assert await make_ready(robot, arm) == ["unlocked the protective stop", "saw it stop again at once"]
+        assert await make_ready(robot, arm) == [
+            "unlocked the protective stop",
+            "the robot stopped again at once",
+        ]
         found = await look(robot)
         assert found.stop.code == "limit_torque"
         assert "torque of joint" in found.why

@@ -43,7 +43,7 @@ def test_where_the_arm_is_the_one_measured_nothing_is_said(description):
 def test_a_softer_arm_with_the_calibration_of_the_package_is_a_warning_at_the_start():
     robot = Robot(SOFT, calibration=load("ur5e_5kg"))
     (why,) = warnings(robot)
-    assert "'ur5e_5kg' was measured on another arm" in why
+    assert "'ur5e_5kg' was measured on a different arm" in why
     assert "tvist identify" in why
     assert info_of(robot.controller).calibration.fits_arm is False
 

@@ -51,20 +51,20 @@ def raises(f_d, zeta): raise RuntimeError("not today")
 def somewhere(f_d, zeta): return zv(f_d, zeta) if f_d < 100 else None
 '''
 WRONG_NAMES = {
-    "nobody": "mine.py has no nobody; it has mine, thirds, MEAN",
+    "nobody": "mine.py does not contain nobody; it contains mine, thirds, MEAN",
     "NUMBER": "NUMBER is of type int; it must be a function (f_d, zeta) -> Impulses",
     "Step": "Step is a class",
-    "raises": "mine.py:raises raises RuntimeError: not today for f_d = 0.1 Hz and ζ = 0; it must serve 0.1 to 200 Hz",
-    "somewhere": "gives NoneType where Impulses are wanted for f_d = 100.2",
-    "zvd": "name is 'zvd', but must be another: there is a shaper of that name already",
-    "": "the name of a shaper in the file is missing",
+    "raises": "mine.py:raises raises RuntimeError: not today for f_d = 0.1 Hz and ζ = 0; it must support 0.1 to 200 Hz",
+    "somewhere": "returns NoneType instead of Impulses for f_d = 100.2",
+    "zvd": "name is 'zvd', but must be a name that no other shaper has",
+    "": "the name of the shaper is missing",
 }
 WRONG_FILES = {
     "1 / 0\n": "raises ZeroDivisionError: division by zero in line 1",
     "\n\ndef f(:\n": "raises SyntaxError: invalid syntax in line 3",
     "import nothing_of_that_name\n": "raises ModuleNotFoundError: No module named 'nothing_of_that_name' in line 1",
     "raise SystemExit(2)\n": "raises SystemExit: 2",
-    "": "has no mine; nothing in it is a shaper",
+    "": "does not contain mine; it contains no shaper",
 }
 
 
@@ -160,7 +160,7 @@ class TestStart:
         (tmp_path / "other.py").write_text(MINE + "# other\n")
         path = tmp_path / "state.toml"
         path.write_text(f'shaper = "{tmp_path}/other.py:mine"\n')
-        with pytest.raises(ConfigError, match="there is a shaper of that name already"):
+        with pytest.raises(ConfigError, match="must be a name that no other shaper has"):
             from_mapping({"shaper": f"{file}:mine", "state": str(path)}, "configuration").setup()
 
     def test_one_that_cannot_be_loaded_is_a_wrong_configuration(self, file):

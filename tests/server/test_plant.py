@@ -103,7 +103,7 @@ def test_a_plant_that_fails_makes_a_protective_stop_and_is_reset():
 
 
 def test_truth_that_nobody_knows_is_refused_at_the_start():
-    with pytest.raises(ValueError, match="NoArm does not know the truth"):
+    with pytest.raises(ValueError, match="NoArm cannot report it"):
         Controller(setup(truth=True), NoArm())
 
 

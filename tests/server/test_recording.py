@@ -173,7 +173,7 @@ def test_a_file_that_exists_is_replaced_only_when_asked(path):
 @pytest.mark.parametrize("start", [{"x": float("nan")}, {"x": object()}])
 def test_a_start_that_cannot_be_written_costs_no_file(path, start):
     path.write_bytes(b"precious")
-    with pytest.raises(RecordingError, match="cannot be begun"):
+    with pytest.raises(RecordingError, match="cannot be started"):
         Recorder(path, INFO, start, overwrite=True)
     assert path.read_bytes() == b"precious"
 
@@ -301,7 +301,7 @@ def test_one_that_is_moved_goes_on_where_it_is_and_says_so_once(path, tmp_path, 
         path.rename(new)
     if how == "replaced":
         path.write_bytes(b"somebody else's")
-    assert told.get(timeout=60) == f"the recording {path} was moved away: it goes on in {new}"
+    assert told.get(timeout=60) == f"the recording {path} was moved away: it continues in {new}"
     recorder.state(state(1))
     recorder.close()
     assert recorder.error is None

@@ -56,7 +56,7 @@ WRONG = {
     "sum": (bare([0.5, 0.4], [0.0, 0.1]), "must sum to 1"),
     "shapes": (bare([1.0], [0.0, 0.1]), "must be (N,)"),
     "times": (bare([0.5, 0.5], [0.1, 0.2]), "must ascend from 0"),
-    "list": (lambda _f_d, _zeta: [0.5, 0.5], "gives list where Impulses are wanted"),
+    "list": (lambda _f_d, _zeta: [0.5, 0.5], "returns list instead of Impulses"),
     "nothing": (lambda _f_d, _zeta: None, "gives NoneType"),
 }
 WRONG_TAPS = {
@@ -66,7 +66,7 @@ WRONG_TAPS = {
     "shape": (lambda _f_d, _zeta: [[1.0]], "shape (1, 1)"),
     "many": (lambda _f_d, _zeta: np.full(21, 1 / 21), "must give 1 to 20"),
     "none": (lambda _f_d, _zeta: [], "shape (0,)"),
-    "peak": (lambda _f_d, _zeta: [2.0, -1.0], "sum to 3, beyond its peak of 1"),
+    "peak": (lambda _f_d, _zeta: [2.0, -1.0], "sum to 3, more than its peak of 1"),
     "words": (lambda _f_d, _zeta: "taps", "raises ValueError"),
 }
 
@@ -261,7 +261,7 @@ class TestRegistry:
             Registry([FirShaper("mine", "", lambda _f_d, _zeta: [1.0], taps=1, period=0.004)])
 
     def test_two_of_one_name_are_refused(self):
-        with pytest.raises(DesignError, match="there is a shaper of that name already"):
+        with pytest.raises(DesignError, match="must be a name that no other shaper has"):
             Registry([mean(), custom("mean", [1.0], [0.0])])
 
     def test_an_unknown_name_lists_the_own_ones_too(self):

@@ -158,7 +158,7 @@ class TestARobotThatStands:
     def test_an_unlock_that_does_not_hold_says_why_again(self, overloaded):
         ended = tvist("unlock", overloaded.endpoint)
         ended.assert_failed(1, "not ready", "torque of joint")
-        assert ended.out.splitlines() == ["unlocked the protective stop", "saw it stop again at once"]
+        assert ended.out.splitlines() == ["unlocked the protective stop", "the robot stopped again at once"]
         (tick,) = re.findall(r"since tick (\d+)", ended.err)
         assert int(tick) > 6
         overloaded.wait_until_said(f"protective stop at tick {tick}: ")
@@ -352,7 +352,7 @@ class TestMoveAndWatch:
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=PATIENCE)
         assert err.startswith("tvist: interrupted: ")
-        assert err.endswith(" s watched; the robot goes on\n")
+        assert err.endswith(" s; the robot keeps running\n")
         assert process.returncode == 130
 
 

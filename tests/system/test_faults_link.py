@@ -77,7 +77,7 @@ def test_the_python_client_says_that_the_link_is_gone_and_is_back_by_itself(prox
             arm.move_j(FAR, wait=False)
             bystander.next("state", lambda state: state["target_qd"][0] > 0.2)
             proxy.cut()
-            with pytest.raises(NotConnectedError, match="this client finds it again when it is back"):
+            with pytest.raises(NotConnectedError, match="this client reconnects when it is back"):
                 for _ in states:
                     pass
             with pytest.raises(NotConnectedError):

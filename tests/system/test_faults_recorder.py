@@ -79,7 +79,7 @@ def test_a_recording_that_is_moved_goes_on_there_and_is_told_to_all(tmp_path):
         with Bystander(served.endpoint) as bystander:
             path.rename(new)
             served.wait_until_said("was moved away")
-            why = f"the recording {path} was moved away: it goes on in {new}"
+            why = f"the recording {path} was moved away: it continues in {new}"
             assert bystander.event("warning")["why"] == why
             bystander.until_later(500)
             last = bystander.received["state"][-1]["tick"]

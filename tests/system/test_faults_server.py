@@ -72,7 +72,7 @@ class TestKilled:
                 token = arm.token
                 motion = arm.move_j(FAR, wait=False)
                 first.process.kill()
-                with pytest.raises(NotConnectedError, match="this client finds it again when it is back"):
+                with pytest.raises(NotConnectedError, match="this client reconnects when it is back"):
                     motion.wait()
                 with pytest.raises(NotConnectedError):
                     arm.stop()

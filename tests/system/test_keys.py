@@ -87,20 +87,20 @@ class TestMaking:
     @pytest.mark.parametrize(
         ("options", "code", "words"),
         [
-            (("--operator", "wall"), 1, ["wall is viewer already"]),
+            (("--operator", "wall"), 1, ["wall already has the role viewer"]),
             (
                 ("--robot", "other", "--host", "localhost"),
                 1,
-                ["robot.pem is that of ur5e", "not overwritten"],
+                ["robot.pem belongs to ur5e", "not overwritten"],
             ),
             (
                 ("--robot", "ur5e", "--host", "elsewhere"),
                 1,
-                ["robot.pem is that of ur5e at 127.0.0.1, localhost"],
+                ["robot.pem belongs to ur5e at 127.0.0.1, localhost"],
             ),
             (("--viewer", "../etc"), 2, ["client is '../etc'"]),
             (("--viewer", "authority.pem"), 2, ["client is 'authority.pem'"]),
-            (("--viewer", "a", "--operator", "a"), 2, ["cannot be operator and viewer"]),
+            (("--viewer", "a", "--operator", "a"), 2, ["cannot be both operator and viewer"]),
             (("--host", "no host"), 2, ["host is 'no host'"]),
             (("--host", "999.1.1.1"), 2, ["host is '999.1.1.1'"]),
             (("--robot", "UR 5"), 2, ["robot is 'UR 5'"]),
@@ -119,7 +119,7 @@ class TestMaking:
     def test_without_the_authority_s_key_there_is_no_new_authority(self, ring):
         (ring / "authority.key").unlink()
         before = content(ring)
-        failed(tvist("keys", ring, "--viewer", "otto"), 1, "authority.key", "bring it back")
+        failed(tvist("keys", ring, "--viewer", "otto"), 1, "authority.key", "put it back")
         assert content(ring) == before
 
     def test_a_folder_moved_away_is_made_anew(self, ring):
@@ -133,7 +133,7 @@ class TestMaking:
     def test_a_name_that_was_left_out_is_not_let_in_again(self, ring):
         (ring / "clients.toml").write_text('"anna" = "operator"\n')
         before = content(ring)
-        failed(tvist("keys", ring, "--operator", "wall"), 1, "wall", "take another name")
+        failed(tvist("keys", ring, "--operator", "wall"), 1, "wall", "use another name")
         assert content(ring) == before
 
 
@@ -155,7 +155,7 @@ class TestServing:
         path = tmp_path / "robot.toml"
         path.write_text("insecure = true\n")
         with Served(*(("--config", str(path)) if file else ("--insecure",)), endpoint=endpoint) as served:
-            assert f"anybody who reaches {endpoint} can move this robot" in served.said
+            assert f"anyone who can reach {endpoint} can move this robot" in served.said
             with socket.create_connection(("127.0.0.1", int(endpoint.rpartition(":")[2]))):
                 pass
 

@@ -28,8 +28,8 @@ LONG = custom("long", [0.5, 0.5], [0.0, 9.0])
 MEAN = FirShaper("mean", "the mean of 40 ms", lambda f_d, zeta: np.full(20, 0.05), taps=20)
 '''
 WRONG = {
-    "mine.py": "the name of a shaper in the file is missing",
-    "mine.py:nobody": "mine.py has no nobody; it has mine, unequal, LONG, MEAN",
+    "mine.py": "the name of the shaper is missing",
+    "mine.py:nobody": "mine.py does not contain nobody; it contains mine, unequal, LONG, MEAN",
     "mine.py:unequal": "mine.py:unequal raises ImpulseError: A sums to 0.9, but must sum to 1 within 1e-9",
     "mine.py:np": "np is of type module",
     "other.py:mine": "other.py cannot be read: No such file or directory",
@@ -95,7 +95,7 @@ def later(f_d, zeta):
 """
     (folder / "mine.py").write_text(MINE + later, encoding="utf-8")
     ended = tvist("evaluate", "--random", 1, "--no-baselines", "--shaper", "mine.py:later", cwd=folder)
-    ended.assert_failed(1, "shaper later gives NoneType where Impulses are wanted for f_d = ")
+    ended.assert_failed(1, "shaper later returns NoneType instead of Impulses for f_d = ")
 
 
 class TestServed:

@@ -246,7 +246,7 @@ class TestStranger:
         assert keys_in(heard) == set()
 
     def test_s_client_says_what_is_the_matter(self, served, ring):
-        with pytest.raises(NotConnectedError, match="that the robot knows this certificate's name"):
+        with pytest.raises(NotConnectedError, match="that the robot lists the name of this certificate"):
             BlockingRobot.connect(served.endpoint, security=ring / "gone")
 
 

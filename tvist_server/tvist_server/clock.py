@@ -26,9 +26,9 @@ HAND_ON_EVERY = 0.0009
 of threads, as much as a tick: of a single robot each tick is handed on at once, of several those of a
 millisecond together."""
 SET_TIMER_SLACK = 29
-"""Of prctl: how much later than asked for a thread may be woken, in nanoseconds."""
+"""Option of prctl for the timer slack: the largest delay with which a thread may be woken, in nanoseconds."""
 PRIORITY = 50
-"""Of the tick thread among those of the system that have real-time priority: in the middle of 1 to 99."""
+"""Real-time priority of the tick thread: the middle of the range 1 to 99."""
 
 
 class Driven:
@@ -134,7 +134,7 @@ class Realtime(Clock):
         robots: Whose.
         hand_on: Called after ticks, to hand on what the robots said.
         period: Tick [s].
-        speed: Of their time against the clock's [-].
+        speed: Simulation speed relative to real time [-].
         priority: Whether to ask the system for real-time priority.
     """
 
@@ -197,8 +197,8 @@ def _ask_for_priority() -> None:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     except OSError as error:
         log.warning(
-            "real-time priority is not permitted (%s), ticks keep the ordinary one: "
-            "it takes CAP_SYS_NICE, or a limit (ulimit -r) of %d",
+            "real-time priority is not permitted (%s), so the control loop runs at normal priority: "
+            "it needs CAP_SYS_NICE, or a limit (ulimit -r) of %d",
             error.strerror,
             PRIORITY,
         )

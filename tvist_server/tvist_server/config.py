@@ -1,4 +1,4 @@
-"""How a robot is served: from the command line, or from a TOML file."""
+"""Configuration of `tvist serve`, from the command line or a TOML file."""
 
 import dataclasses
 import ipaddress
@@ -24,72 +24,72 @@ from tvist_server.ur_ports import Door, UrPorts
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 DEFAULT_NAME = "ur5e"
 _INSTEAD = {
-    "name": "several robots are named after their files, leave name out",
-    "robot": "put it into the list of robots",
+    "name": "leave name out, since several robots are named after their files",
+    "robot": "add it to the list of robots",
 }
-"""What to do about a key that `robots` excludes."""
+"""What to do with a key that excludes `robots`."""
 
 
 class ConfigError(ValueError):
-    """A configuration is wrong: one sentence that names the key, the value and what is allowed."""
+    """A configuration is invalid; the message names the key, the value and what is allowed."""
 
 
 class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What `tvist serve` can be told; every key is optional."""
+    """Options of `tvist serve`; every key is optional."""
 
     name: RobotName = DEFAULT_NAME
-    """Name on the network."""
+    """Name of the robot on the network."""
     robot: str = "ur5e"
-    """Robot that comes with the package, or path of a robot file."""
+    """Name of a robot that comes with the package, or path of a robot file."""
     robots: str | None = None
-    """Several of them, ROBOT[*COUNT] with commas, named after their files; instead of `name` and `robot`."""
+    """Several robots, ROBOT[*COUNT] separated by commas and named after their files; replaces `name` and `robot`."""
     listen: tuple[str, ...] = (DEFAULT_ENDPOINT,)
     """Zenoh endpoints to listen on."""
     security: str | None = None
-    """Folder with certificates and roles, as `tvist keys` makes it; endpoints are then tls/…"""
+    """Folder with certificates and roles, made by `tvist keys`; endpoints are then tls/…"""
     insecure: bool = False
-    """Let anybody who reaches an endpoint move the robot, on whatever network that is."""
+    """Accept remote connections without TLS and do not authenticate clients; anyone can move the robot."""
     payload: Annotated[float, Meta(ge=0, le=100)] | None = None
-    """Mass of the paper's disc, declared and carried [kg]; default: the robot file's payload."""
+    """Mass of the disc on the flange, both declared and carried [kg]; default: the robot file's payload."""
     overload: bool = False
-    """Start even where the payload declared is above the robot's rating."""
+    """Start even if the declared payload exceeds the robot's rating."""
     shaper: str = "zv"
-    """Shaper to start with: its name, or FILE.py:NAME for one of your own."""
+    """Initial shaper: its name, or FILE.py:NAME for your own."""
     calibration: str | None = calibrations.DEFAULT
-    """Calibration that comes with the package, or path of one; "none": a robot still to be identified."""
+    """Name of a calibration that comes with the package, or path of one; "none" for a robot yet to be identified."""
     clock: Clock = "realtime"
-    """Who lets time pass."""
+    """What advances simulation time."""
     speed: Annotated[float, Meta(gt=0, le=100)] = 1.0
-    """Of the robot's time against the clock's; real time only [-]."""
+    """Simulation speed relative to real time [-]; only with the clock realtime."""
     realtime_priority: bool = False
-    """Ask the system to put the ticks before all else; real time only."""
+    """Run the control loop with real-time priority, if the system permits it; only with the clock realtime."""
     start: str | tuple[float, ...] = "Q1"
-    """A pose of the robot file, or joint angles [rad]."""
+    """Initial pose: a name from the robot file, or joint angles [rad]."""
     state: str | None = None
-    """TOML or JSON file with the state to start in: any of q, payload (carried), mode, shaper, seed."""
+    """TOML or JSON file with the initial state: any of q, payload (the carried one), mode, shaper, seed."""
     seed: Seed = 0
-    """Of sensor noise and gear errors; of several robots each has one of its own, counted on from here."""
+    """Seed of sensor noise and gear errors; with several robots, each further one adds 1."""
     record: str | None = None
-    """MCAP file to record into; of several robots each has its own, with its name at the end."""
+    """MCAP file to record into; with several robots, each has a file of its own that ends with its name."""
     dump: str = tempfile.gettempdir()
-    """Folder for the last second before the simulated arm failed."""
+    """Folder to save the last second before a failure of the simulated arm to."""
     truth: bool = False
-    """Tell what no robot can know, too."""
+    """Publish what a real robot cannot measure, too."""
     quiet: bool = False
-    """Sensors without noise, and angles in the steps of an encoder: at rest nothing changes from tick to tick."""
+    """Simulate sensors without noise and angles with an encoder's resolution: at rest, no value changes."""
     ur: bool = False
     """Open UR's own interfaces, too."""
     ur_address: str = "127.0.0.1"
-    """IP address they listen at; of several robots each has the next one."""
+    """IP address on which UR's interfaces listen; each further robot uses the next address."""
     ur_ports: UrPorts = UrPorts()
-    """Ports of those that are not where UR has them; 0 keeps one shut."""
+    """Ports of UR's interfaces that differ from UR's defaults; 0 closes an interface."""
 
     def setups(self) -> list[Setup]:
-        """The start of every robot's controller.
+        """Return the initial setup of every robot's controller.
 
         Raises:
-            ConfigError: As `setup`.
-            UserFileError: As `setup`.
+            ConfigError: See `setup`.
+            UserFileError: See `setup`.
         """
         if self.robots is None:
             return [self.setup()]
@@ -97,7 +97,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             found = members(self.robots)
         except ValueError as error:
             raise ConfigError(str(error)) from error
-        # By its own start each is what it would be alone, apart from the noise.
+        # Each robot starts as it would alone, apart from the noise.
         starts: dict[str, Setup] = {}
         for member in found:
             if member.robot not in starts:
@@ -108,13 +108,13 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         ]
 
     def doors(self, number: int) -> tuple[str, dict[Door, int]]:
-        """Where UR's interfaces of a robot are: address, and port by door.
+        """Return the address of a robot's UR interfaces, and the port of each.
 
         Args:
-            number: Of the robot, 0 the first.
+            number: Index of the robot, 0 for the first.
 
         Raises:
-            ConfigError: `ur_address` is none, or leaves no room for so many.
+            ConfigError: `ur_address` is not an IP address, or too few addresses follow it.
         """
         try:
             first = ipaddress.ip_address(self.ur_address)
@@ -124,17 +124,15 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 f"ur_address is {self.ur_address!r}: must be an IP address ({error})"
             ) from error
         if number and first.is_unspecified:
-            raise ConfigError(
-                f"ur_address is {self.ur_address}: several robots need an address of their own each"
-            )
+            raise ConfigError(f"ur_address is {self.ur_address}: several robots need one address each")
         return str(address), self.ur_ports.open()
 
     def command_line(self, command: str, name: str) -> str:
-        """What to type on this machine for a command to reach a robot.
+        """Return the command line that reaches a robot from this machine.
 
         Args:
-            command: Such as `unlock`.
-            name: The robot's.
+            command: Name of the command, such as `unlock`.
+            name: Name of the robot.
         """
         words = ["tvist", command]
         if self.listen and self.listen[0] != DEFAULT_ENDPOINT:
@@ -144,11 +142,11 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         return " ".join([*words, "--security", "FOLDER"] if self.security is not None else words)
 
     def setup(self) -> Setup:
-        """The controller's start, of one robot.
+        """Return the initial setup of one robot's controller.
 
         Raises:
-            ConfigError: A value does not fit the others, or names something that is not there.
-            UserFileError: It names a file that is not what is asked for.
+            ConfigError: A value contradicts another one, or names something that does not exist.
+            UserFileError: A file that is named has the wrong kind of content.
         """
         try:
             description = load(self.robot)
@@ -181,8 +179,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 raise ConfigError(f"{error}: give --overload to insist") from error
         if calibration is not None and calibration.robot != description.robot.model:
             raise ConfigError(
-                f"calibration {calibration.name!r} is of a {calibration.robot}; the robot is a "
-                f"{description.robot.model}: name another one, or none"
+                f"calibration {calibration.name!r} is for a {calibration.robot}, but the robot is a "
+                f"{description.robot.model}: give another calibration, or none"
             )
         return setup
 
@@ -196,15 +194,15 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             return tuple(float(angle) for angle in self.start.split(","))
         except ValueError:
             known = ", ".join(description.poses)
-            why = f"start is {self.start.strip()!r}: must be one of {known}, or angles with commas"
+            why = f"start is {self.start.strip()!r}: must be one of {known}, or angles separated by commas"
             raise ConfigError(why) from None
 
 
 def from_mapping(content: object, source: str) -> ServeConfig:
-    """Check values by name.
+    """Check a mapping of values and convert it.
 
     Raises:
-        ConfigError: A key is unknown, a value out of range, or one key excludes another.
+        ConfigError: A key is unknown, a value is out of range, or one key excludes another.
     """
     if isinstance(content, dict) and content.get("robots") is not None:
         for key in ("name", "robot"):
@@ -217,15 +215,15 @@ def from_mapping(content: object, source: str) -> ServeConfig:
 
 
 def read_toml(path: str) -> dict[str, object]:
-    """Content of a configuration file, not yet checked.
+    """Return the unchecked content of a configuration file.
 
     Raises:
-        ConfigError: It cannot be read, or is no TOML.
-        UserFileError: It is no file with a text of that size, or is nested too deeply.
+        ConfigError: The file cannot be read, or is not TOML.
+        UserFileError: The file is not text, too large or nested too deeply.
     """
     try:
         return user_file.read_toml(path, "configuration")
     except OSError as error:
         raise ConfigError(f"configuration {path}: {error.strerror}") from error
     except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"configuration {path}: it is no TOML: {error}") from error
+        raise ConfigError(f"configuration {path}: it is not valid TOML: {error}") from error

@@ -1,4 +1,4 @@
-"""Signals that end a process in order: SIGINT, SIGTERM, SIGHUP and SIGQUIT."""
+"""Orderly shutdown on the signals SIGINT, SIGTERM, SIGHUP and SIGQUIT."""
 
 import contextlib
 import signal
@@ -7,10 +7,9 @@ from types import FrameType
 
 
 def ending_signals() -> list[signal.Signals]:
-    """Signals that shall end this process in order.
+    """Return the signals that shut this process down.
 
-    SIGHUP is not among them where it is ignored already: whoever starts a process with `nohup` wants it to outlive
-    the terminal.
+    SIGHUP is left out if it is already ignored: a process started with `nohup` must outlive the terminal.
     """
     ends = [signal.SIGINT, signal.SIGTERM, signal.SIGQUIT]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
@@ -19,10 +18,11 @@ def ending_signals() -> list[signal.Signals]:
 
 
 class Ending:
-    """The wish of a signal that this process end.
+    """A shutdown requested by a signal.
 
-    From its construction on, in the main thread, signals end nothing by themselves. The first one is a wish, which
-    `at_once` or `hear` grants; further ones do nothing, so that none of them spoils the end.
+    Once this is constructed, in the main thread, signals no longer end the process by themselves. The first signal
+    requests a shutdown, which `at_once` or `hear` carries out; further signals are ignored, so that they cannot
+    interrupt it.
     """
 
     def __init__(self) -> None:
@@ -35,11 +35,11 @@ class Ending:
 
     @contextlib.contextmanager
     def at_once(self) -> Iterator[None]:
-        """Raise what ends the process, wherever it is, while the body runs: something to clean up, nothing to finish.
+        """While the body runs, let a signal raise an exception there, so that the body can clean up.
 
         Raises:
-            SystemExit: A signal has come; exit code 0.
-            KeyboardInterrupt: It was SIGINT.
+            SystemExit: A signal other than SIGINT has come; exit code 0.
+            KeyboardInterrupt: SIGINT has come.
         """
         self._raises = True
         try:
@@ -50,10 +50,10 @@ class Ending:
             self._raises = False
 
     def hear(self, heard: Callable[[], object]) -> None:
-        """Have something called, in the main thread, once a signal has come; at once where one has come already.
+        """Set a function to call in the main thread when a signal comes, or now if one has come already.
 
         Args:
-            heard: May raise RuntimeError where the wish comes too late.
+            heard: The function; it may raise RuntimeError if the shutdown is already over.
         """
         self._heard = heard
         if self._wish is not None:
@@ -61,11 +61,11 @@ class Ending:
 
     @property
     def interrupted(self) -> bool:
-        """Whether Control+C was the wish."""
+        """Whether Control+C requested the shutdown."""
         return self._wish == signal.SIGINT
 
     def close(self) -> None:
-        """Ignore the signals to the end of the process, when the interpreter takes its handlers away."""
+        """Ignore the signals until the process ends, since the interpreter removes its handlers before that."""
         for number in self._numbers:
             signal.signal(number, signal.SIG_IGN)
 

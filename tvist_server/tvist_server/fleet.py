@@ -1,4 +1,4 @@
-"""Which robots one process serves: `ur5e*16`, or `ur5e*2,other.toml`."""
+"""The robots that one process serves, from a list such as `ur5e*16` or `ur5e*2,other.toml`."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from tvist_protocol.errors import ProtocolError
 from tvist_protocol.keys import check_robot_name
 
 MOST = 64
-"""Robots in one process. More than a core can tick in real time, and enough for a test in lockstep."""
+"""Largest number of robots in one process: more than a core can run in real time, and enough for lockstep tests."""
 
 
 @dataclass(frozen=True)
@@ -16,27 +16,29 @@ class Member:
     """One robot of several."""
 
     robot: str
-    """Robot that comes with the package, or path of a robot file."""
+    """Name of a robot that comes with the package, or path of a robot file."""
     name: str
-    """Its name on the network."""
+    """Name of the robot on the network."""
 
 
 def members(text: str) -> list[Member]:
-    """Robots of a list like `ur5e*2,other.toml`: ROBOT[*COUNT], with commas.
+    """Parse a list of robots such as `ur5e*2,other.toml`: ROBOT[*COUNT], separated by commas.
 
-    A robot is named after its file. One that is there several times has a number behind: `ur5e-1`, `ur5e-2`.
+    A robot is named after its file. A robot that is listed several times gets a number: `ur5e-1`, `ur5e-2`.
 
     Raises:
-        ValueError: A count is none, a name cannot be one or stands for two, or there are more than `MOST`.
+        ValueError: A count or a name is invalid, two robots would have the same name, or there are more than `MOST`.
     """
     robots: list[str] = []
     for entry in text.split(","):
         robot, star, count = entry.strip().partition("*")
         if not robot:
-            raise ValueError(f"robots is {text!r}: it is a list like ur5e*2,other.toml; a robot is missing")
+            raise ValueError(
+                f"robots is {text!r}: must be a list such as ur5e*2,other.toml; a robot is missing"
+            )
         robots += [robot] * (_count(entry, count) if star else 1)
         if len(robots) > MOST:
-            raise ValueError(f"robots is {text!r}: at most {MOST} robots are served by one process")
+            raise ValueError(f"robots is {text!r}: one process serves at most {MOST} robots")
     stems = [Path(robot).stem for robot in robots]
     total, so_far = Counter(stems), Counter[str]()
     found: list[Member] = []
@@ -46,15 +48,17 @@ def members(text: str) -> list[Member]:
         try:
             found.append(Member(robot, check_robot_name(name)))
         except ProtocolError as error:
-            raise ValueError(f"robots has {robot!r}, whose file does not make a name: {error.why}") from error
+            raise ValueError(
+                f"robots has {robot!r}, whose file name is not a robot's name: {error.why}"
+            ) from error
     twice = [name for name, times in Counter(member.name for member in found).items() if times > 1]
     if twice:
-        raise ValueError(f"robots is {text!r}: two of them would be named {twice[0]}; rename a file")
+        raise ValueError(f"robots is {text!r}: two robots would be named {twice[0]}; rename a file")
     return found
 
 
 def recording_of(record: str, name: str) -> Path:
-    """File that one robot of several is recorded into: `out-ur5e-3.mcap` where `out.mcap` was asked for."""
+    """Return the file that one of several robots records into: `out-ur5e-3.mcap` for `out.mcap`."""
     path = Path(record)
     return path.with_name(f"{path.stem}-{name}{path.suffix}")
 
@@ -63,6 +67,6 @@ def _count(entry: str, count: str) -> int:
     number = int(count) if count.isascii() and count.isdigit() and len(count) < 10 else 0
     if not 1 <= number <= MOST:
         raise ValueError(
-            f"robots has {entry.strip()!r}: behind * stands how many, a whole number from 1 to {MOST}"
+            f"robots has {entry.strip()!r}: the count after * must be a whole number from 1 to {MOST}"
         )
     return number

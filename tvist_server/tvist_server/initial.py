@@ -1,4 +1,4 @@
-"""The state a robot starts in, from a file: the fields of `simulation.reset`."""
+"""The initial state of a robot, read from a file with the fields of `simulation.reset`."""
 
 import tomllib
 from dataclasses import replace
@@ -18,25 +18,25 @@ ShaperChoice = Annotated[str, Meta(min_length=1, max_length=4096)]
 
 
 class InitialState(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What is None is as without the file."""
+    """Initial state of a robot; a field that is None keeps the value of the `Setup`."""
 
     q: Joints | None = None
-    """Where the arm rests, one angle a joint [rad]."""
+    """Joint angles at which the arm rests [rad]."""
     seed: Seed | None = None
-    """Of sensor noise and gear errors."""
+    """Seed of sensor noise and gear errors."""
     payload: Payload | None = None
-    """What the arm carries, whatever is declared."""
+    """Payload that the arm carries, independent of the declared one."""
     mode: ResetMode | None = None
     """Robot mode."""
     shaper: ShaperChoice | None = None
-    """Shaper: its name, or FILE.py:NAME."""
+    """Name of the shaper, or FILE.py:NAME."""
 
     def on(self, setup: Setup) -> Setup:
-        """A start with this state instead of its own, where there is something.
+        """Return a setup with the fields of this state that are not None.
 
         Raises:
-            OwnShaperError: There is no such shaper in the file it names.
-            UserFileError: It names something that is no file of that size.
+            OwnShaperError: The file that `shaper` names contains no such shaper.
+            UserFileError: `shaper` names something that is not a text file, or too large.
         """
         if self.shaper is not None:
             setup = shaped_by(setup, self.shaper)
@@ -50,15 +50,15 @@ class InitialState(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 def shaped_by(setup: Setup, shaper: str) -> Setup:
-    """A start with another shaper.
+    """Return a setup with another shaper.
 
     Args:
-        setup: The start.
+        setup: Setup to change.
         shaper: Name of a shaper, or FILE.py:NAME, which is then loaded.
 
     Raises:
-        OwnShaperError: There is no such shaper in the file.
-        UserFileError: It is no file of that size.
+        OwnShaperError: The file contains no such shaper.
+        UserFileError: FILE.py is not a text file, or too large.
     """
     if not is_file(shaper):
         return replace(setup, shaper=shaper)
@@ -68,15 +68,15 @@ def shaped_by(setup: Setup, shaper: str) -> Setup:
 
 
 class InitialStateError(ValueError):
-    """A file holds no state to start in; the sentence says why."""
+    """A file contains no valid initial state; the message says why."""
 
 
 def read_state(path: str) -> InitialState:
-    """Read a TOML file, or a JSON file where its name ends so.
+    """Read a state from a TOML file, or from a JSON file if its name ends in .json.
 
     Raises:
-        InitialStateError: It cannot be read, or a field is unknown or out of range.
-        UserFileError: It is no file with a text of that size, or is nested too deeply.
+        InitialStateError: The file cannot be read, or a field is unknown or out of range.
+        UserFileError: The file is not text, too large or nested too deeply.
     """
     try:
         is_json = Path(path).suffix == ".json"
@@ -85,6 +85,6 @@ def read_state(path: str) -> InitialState:
     except OSError as error:
         raise InitialStateError(f"state {path}: {error.strerror}") from error
     except tomllib.TOMLDecodeError as error:
-        raise InitialStateError(f"state {path}: it is no TOML: {error}") from error
+        raise InitialStateError(f"state {path}: it is not valid TOML: {error}") from error
     except ProtocolError as error:
         raise InitialStateError(f"state {path}: {error.why}") from error

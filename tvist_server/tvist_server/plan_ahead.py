@@ -29,13 +29,14 @@ STOPPING = (Stop, PowerOff, ProgramStop)
 _BUSY = Refused(
     code="busy",
     where="",
-    why=f"{MOST_WAITING} commands wait to be planned, or the server ends: send the next when one is answered",
+    why=f"{MOST_WAITING} commands are waiting to be planned, or the server is shutting down: "
+    "send the next one after an answer",
     limit=MOST_WAITING,
 )
 _FAILED = Refused(
     code="wrong_mode",
     where="",
-    why="this command could not be planned, by an error of the server's: see its log",
+    why="this command could not be planned because of an error in the server: see its log",
 )
 
 

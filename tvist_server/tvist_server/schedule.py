@@ -5,8 +5,8 @@ from heapq import heapreplace
 CATCH_UP = 50
 """Periods that are made up for after a delay; what is more is left out, so that no burst lasts longer than that."""
 MOMENTS = 4
-"""Of a period at which robots are due. Waking up costs half as much as a tick, since caches are cold then: more
-moments would mean fewer robots."""
+"""Number of moments of a period at which robots are due. Waking up costs half as much as a tick, since caches are cold
+then: more moments would mean fewer robots."""
 
 
 class Schedule:
@@ -19,7 +19,7 @@ class Schedule:
 
     Args:
         robots: How many.
-        period: Of each robot's ticks [s].
+        period: Period of each robot's ticks [s].
         start: Now; the first tick is due a period later [s].
     """
 

@@ -1,4 +1,4 @@
-"""Served robots: each with its recording, one clock and one network for all, until somebody ends them."""
+"""The server: several robots, each with its recording, that share one clock and one network."""
 
 import asyncio
 import contextlib
@@ -25,19 +25,19 @@ from tvist_server.robot import ServedRobot
 from tvist_server.ur_ports import Door
 
 LEAVE = 0.6
-"""How long clients may take at the end to read what waits for them [s]."""
+"""Longest time that clients have at shutdown to read pending messages [s]."""
 
 
 class Server:
-    """Robots on the network.
+    """One or more robots on the network.
 
     Args:
-        config: How they are served.
+        config: Configuration of the robots.
 
     Raises:
-        ConfigError: The configuration is wrong.
+        ConfigError: The configuration is invalid.
         RecordingError: A recording cannot be written.
-        GatewayError: An endpoint cannot be listened on.
+        GatewayError: The server cannot listen on an endpoint.
     """
 
     def __init__(self, config: ServeConfig) -> None:
@@ -53,8 +53,8 @@ class Server:
             raise ConfigError(str(error)) from error
         self.robots: list[ServedRobot] = []
         self.left = True
-        """After `close`: whether the network is left. Zenoh, or who hands on, may still wait for a client that has
-        stopped reading."""
+        """Whether the network is closed after `close`. Zenoh or a courier may still wait for a client that has stopped
+        reading."""
         try:
             for setup in setups:
                 self.robots.append(_robot(setup, config, several=len(setups) > 1))
@@ -63,9 +63,9 @@ class Server:
             self._network = Network(listen, guard, lockstep=lockstep)
             self._console = Console()
             self.ur: list[tuple[str, dict[Door, int]]] = []
-            """Address and ports of each robot's UR interfaces; none where they are not open."""
+            """Address and ports of each robot's UR interfaces; empty if they are not open."""
             for number, robot in enumerate(self.robots):
-                # In real time the clock sees to it that messages are handed on; in lockstep each message does.
+                # In real time the clock wakes the courier; in lockstep each message does.
                 robot.open(
                     self._gateways(robot, config, number), self._couriers[number].wake if lockstep else None
                 )
@@ -90,8 +90,8 @@ class Server:
     # ------------------------------------------------------------------ life
 
     def start(self) -> None:
-        """Begin to tick and to answer."""
-        # What lives now lives to the end: the collector need not look at it again.
+        """Start the clocks and begin to answer clients."""
+        # The objects created so far live until the end: the garbage collector need not look at them again.
         gc.collect()
         gc.freeze()
         sys.setswitchinterval(1e-4)
@@ -104,7 +104,7 @@ class Server:
             clock.start()
 
     def close(self) -> None:
-        """End in order: no more ticks, recordings closed, what waits handed on, as far as clients take it."""
+        """Shut down in order: stop the clocks, close the recordings, deliver pending messages to clients that read."""
         for robot in self.robots:
             robot.hurry()
         for robot in self.robots:
@@ -120,7 +120,7 @@ class Server:
         gc.unfreeze()
 
     def _leave(self) -> None:
-        """Leave the network. A client that has stopped reading can hold this up for ten seconds."""
+        """Close the network. A client that has stopped reading can delay this for ten seconds."""
         try:
             for courier in self._couriers:
                 courier.close()
@@ -132,11 +132,11 @@ class Server:
                 self._network.close()
 
     async def run(self, ready: Callable[[], None], ending: Ending) -> None:
-        """Serve until a signal comes, or until a controller fails; then `failure` says why.
+        """Serve until a signal comes or a controller fails; `failure` then says why.
 
         Args:
-            ready: Called once the robots tick and answer.
-            ending: The signals.
+            ready: Function to call once the robots tick and answer.
+            ending: The shutdown requested by signals.
         """
         ended, loop = asyncio.Event(), asyncio.get_running_loop()
         ending.hear(lambda: loop.call_soon_threadsafe(ended.set))
@@ -156,7 +156,7 @@ class Server:
 
     @property
     def failure(self) -> str | None:
-        """Why a robot ticks no more, where one does not."""
+        """Why a robot has stopped ticking; None if all of them tick."""
         return next((robot.failure for robot in self.robots if robot.failure is not None), None)
 
     def _tell_telemetry(self) -> None:
@@ -188,9 +188,9 @@ def _doors(robot: ServedRobot, config: ServeConfig, number: int) -> UrDoors:
 
 
 def _drivers(config: ServeConfig, robots: Sequence[ServedRobot]) -> tuple[list[Courier], list[Clock]]:
-    """What lets time pass and what hands on: one of each for all robots in real time, in lockstep for each robot.
+    """Create couriers and clocks: one of each for all robots in real time, one of each per robot in lockstep.
 
-    In lockstep nothing may be lost, so that whoever hands on waits for a slow client, and for one robot alone.
+    In lockstep no message may be lost, so a courier waits for a slow client, and must not delay other robots.
     """
     if config.clock == "realtime":
         courier, driven = Courier([robot.hand_on for robot in robots]), [robot.driven for robot in robots]

@@ -1,4 +1,4 @@
-"""Where UR's own interfaces are."""
+"""TCP ports of UR's own interfaces."""
 
 from typing import Annotated, Literal
 
@@ -9,12 +9,12 @@ Door = Literal[
     "dashboard", "primary", "secondary", "realtime", "rtde",
     "primary_read_only", "secondary_read_only", "realtime_read_only",
 ]  # fmt: skip
-"""One of them."""
+"""Name of one of UR's interfaces."""
 Port = Annotated[int, Meta(ge=0, le=65535)]
 
 
 class UrPorts(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """TCP port of each; 0 keeps one shut."""
+    """TCP port of each interface; 0 closes it."""
 
     dashboard: Port = 29999
     primary: Port = 30001
@@ -26,5 +26,5 @@ class UrPorts(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     realtime_read_only: Port = 30013
 
     def open(self) -> dict[Door, int]:
-        """Port by door, of those that are not kept shut."""
+        """Return the port of each interface that is open."""
         return {door: port for door, port in msgspec.structs.asdict(self).items() if port}  # type: ignore[misc]

@@ -1,1 +1,1 @@
-"""One command a module."""
+"""The commands of `tvist`, one per module."""

@@ -16,7 +16,7 @@ COLUMNS = (
 
 
 def analyze(file: Path, *, figures: Path | None = None, json: bool = False) -> None:
-    """Print Table 2's columns for each motion in a recording.
+    """Measure each motion of a recording and print the columns of the paper's Table 2.
 
     Args:
         file: MCAP file that `tvist serve --record` or `tvist record` wrote.

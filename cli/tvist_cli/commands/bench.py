@@ -1,4 +1,4 @@
-"""`tvist bench`: how fast it is on this machine."""
+"""`tvist bench`: measure how fast tvist runs on this machine."""
 
 import asyncio
 
@@ -9,13 +9,13 @@ from tvist_cli.output import err, out, print_json, say, table
 def bench(
     *, seconds: float = 10.0, soak: float | None = None, hostile: int | None = None, json: bool = False
 ) -> None:
-    """Measure plant, filter, control cycle and whole line, a served robot, and how many of them a core takes.
+    """Measure the plant, the filter, the whole control cycle, a served robot, and how many robots one core can run.
 
     Args:
-        seconds: How long to watch a served robot tick in real time, with one client and a recorder; 0: not at all.
-        soak: Instead, serve a robot for so many minutes under load, and see whether it stays as it is.
-        hostile: Instead, compare how late a served robot ticks with and without 100 messages a second of every type and
-            size, sound and unsound, in so many pairs of runs of --seconds.
+        seconds: Seconds to observe a served robot in real time, with one client and a recorder; 0 skips this part.
+        soak: Serve a robot under load for this many minutes instead, and report whether memory and timing stay stable.
+        hostile: Instead, compare how late a served robot's ticks are with and without 100 messages a second of every
+            type and size, valid and invalid, in this many pairs of runs of --seconds each.
         json: Print one JSON object.
     """
     if seconds < 0.0:
@@ -37,7 +37,7 @@ def bench(
 
         result = run(seconds, tell=lambda what: err.print(f"measuring {what} ..."))
     except KeyboardInterrupt:
-        raise interrupted("what was measured so far is lost; what was served has ended") from None
+        raise interrupted("the measurements so far are lost; the served robots have stopped") from None
     if json:
         print_json(result)
         return
@@ -46,7 +46,7 @@ def bench(
     for key, values in result.items():
         if isinstance(values, dict):
             table(key, ("what", "figure"), [(name, f"{value:.4g}") for name, value in values.items()])
-    out.print("Figures are of this machine under what else it was doing; ratios travel, microseconds do not.")
+    out.print("These figures hold for this machine under its current load; compare ratios, not microseconds.")
 
 
 def _hostile(pairs: int, seconds: float, json: bool) -> None:
@@ -67,7 +67,9 @@ def _hostile(pairs: int, seconds: float, json: bool) -> None:
 def _soak(minutes: float, json: bool) -> None:
     from tvist_lab.benchmark.soak import soak
 
-    say(f"a robot in real time for {minutes:g} minutes: a recorder, a stream of set-points, five observers")
+    say(
+        f"serving a robot in real time for {minutes:g} minutes with a recorder, a set-point stream and five observers"
+    )
     result = asyncio.run(soak(minutes, tell=say))
     if json:
         print_json(result)

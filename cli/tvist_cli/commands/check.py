@@ -1,4 +1,4 @@
-"""`tvist check`: is a robot there, and ready to be moved?"""
+"""`tvist check`: check that a robot answers and is ready to be moved."""
 
 from pathlib import Path
 
@@ -14,16 +14,16 @@ def check(
     security: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Shake hands with a served robot, and say whether it is ready to be moved.
+    """Check that a served robot answers and is ready to be moved, without changing anything.
 
-    Exit code 0: it answers, ticks, guards control, has its power, and its safety system allows motion. Exit code 1:
-    one of these is missing; the sentence says why, and what to do next. It changes nothing.
+    Exit code 0: it answers, ticks, refuses commands without control, has power, and its safety system allows motion.
+    Exit code 1: one of these does not hold; the message says why and what to do next.
 
     Args:
         endpoint: Zenoh endpoint of the robot.
-        name: Its name [ur5e, or where there is none the first of those that are there, all of which are named].
-        alive: Ask only whether the server answers and, in real time, ticks. That holds for a robot that has stopped,
-            too, so an orchestrator does not kill one that somebody is about to unlock.
+        name: Name of the robot [ur5e; if there is none, the first robot at the endpoint, and all of them are listed].
+        alive: Check only that the server answers and, in real time, ticks. A robot that has stopped passes, too, so
+            that an orchestrator does not kill one that somebody is about to unlock.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         json: Print one JSON object.
     """

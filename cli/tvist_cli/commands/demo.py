@@ -1,4 +1,4 @@
-"""`tvist demo`: see it work, over the network and in real time."""
+"""`tvist demo`: the paper's motions over the network and in real time."""
 
 from pathlib import Path
 
@@ -8,11 +8,11 @@ from tvist_cli.tables import print_paper
 
 
 def demo(*, output: Path = Path("tvist-demo"), seed: int = 0, json: bool = False) -> None:
-    """Serve a robot, move it over Zenoh in real time as the paper did, unshaped and shaped, and show what it did.
+    """Serve a robot, run the paper's motions on it over Zenoh in real time, unshaped and shaped, and show the results.
 
     Args:
         output: Folder for the recording and the figures.
-        seed: Of noise and gear errors.
+        seed: Seed of sensor noise and gear errors.
         json: Print one JSON object.
     """
     from tvist_lab.demo import DemoError, run_demo
@@ -38,4 +38,4 @@ def demo(*, output: Path = Path("tvist-demo"), seed: int = 0, json: bool = False
             "next: tvist serve, then tvist move Q2 in another terminal; or clients/examples/01_bare_client.py"
         )
     if not result.equal:
-        raise Failure("the recording does not agree with its replay, or with what was received")
+        raise Failure("the recording differs from its replay or from what the client received")

@@ -1,4 +1,4 @@
-"""`tvist evaluate`: any moves, each unshaped and shaped."""
+"""`tvist evaluate`: run any moves unshaped and shaped, and compare."""
 
 import math
 from pathlib import Path
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from tvist_protocol.calibration import Calibration
 
 UNIFORM = "uniform"
-"""A payload of its own for each move, up to what the arm is rated for."""
+"""Value of --payload that draws a payload for each move, up to the arm's rating."""
 LISTED = 12
-"""More moves than this are not printed one by one."""
+"""Largest number of moves that are printed one by one."""
 
 
 def evaluate(
@@ -42,31 +42,31 @@ def evaluate(
     figures: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Make moves unshaped and shaped, as fast as they compute, and say what shaping does to the vibration after them.
+    """Simulate moves unshaped and shaped, as fast as possible, and report the vibration after each.
 
-    The moves come from a file or are drawn at random. The controller knows the payload. Beside the shaper stands what
-    it has to be compared with: waiting, a slower motion of the same duration, ZV frozen at the target, and fixed MZV,
-    EI2 and EI3 for the whole workspace.
+    The moves come from a file or are drawn at random. The controller knows the payload. The shaper is compared with
+    these baselines: waiting, a slower motion of the same duration, ZV frozen at the target, and fixed MZV, EI2 and EI3
+    designed for the whole workspace.
 
     Args:
-        moves: JSON file: a list of maps with start and target, an angle a joint, and payload in kg if one has its own.
-        random: Instead, how many to draw: over the workspace, 30 to 100 % of the way between two configurations, free
-            of collision.
-        payload: Mass of the paper's disc in kg, carried and declared; uniform: another one for each move, 0 to what the
-            arm is rated for [5].
-        shaper: Name of a shaper; or of a filter for several modes: auto, short, or auto-target, which is told the
-            target of each move; or FILE.py:NAME, which runs that file, for one of your own.
-        modes: That a shaper of the catalogue acts on; more than one takes a modal calibration.
-        calibration: Calibration that comes with the package, or path of one.
-        robot: Robot that comes with the package, or path of a robot file.
-        seed: Of random moves, payloads and gear errors.
-        wrists: Let random moves turn the two outer joints of the wrist.
-        clean: Without nonlinear friction, gear errors and noise.
-        disturbances: Which of these there are, with commas between: friction, gear, noise, or none [all].
-        frequency_error: Percent by which every frequency is taken too high.
-        baselines: Run what the shaper has to be compared with, too: three and a half times the work.
-        save_moves: File for the moves with their payloads.
-        figures: Folder for figures.
+        moves: JSON file with a list of maps with start and target, one angle per joint, and optionally payload in kg.
+        random: Number of moves to draw instead: over the workspace, 30 to 100 % of the way between two
+            configurations, and free of collisions.
+        payload: Mass of the disc on the flange in kg, both carried and declared; uniform draws one for each move, from
+            0 to the arm's rating [5].
+        shaper: Name of a shaper; or of a filter for several modes: auto, short, or auto-target, which is given the
+            target of each move; or FILE.py:NAME, which runs that file, for your own shaper.
+        modes: Number of modes that the shaper suppresses; more than one needs a modal calibration.
+        calibration: Name of a calibration that comes with the package, or path of a calibration file.
+        robot: Name of a robot that comes with the package, or path of a robot file.
+        seed: Seed of random moves, payloads and gear errors.
+        wrists: Let random moves turn the two outer wrist joints as well.
+        clean: Simulate without nonlinear friction, gear errors and noise.
+        disturbances: Disturbances to simulate, separated by commas: friction, gear, noise, or none [all].
+        frequency_error: Percentage by which the controller overestimates every frequency.
+        baselines: Run the baselines as well; this takes three and a half times as long.
+        save_moves: File to write the moves and their payloads to.
+        figures: Folder to write figures to.
         json: Print one JSON object.
     """
     from tvist_lab.evaluation.evaluate import Job, report
@@ -115,7 +115,7 @@ def evaluate(
     }
     result["notes"] = _notes(result, met, known, chosen, share)
     if baselines and not others:
-        result["notes"].append("no baselines: they take a calibration of this arm")
+        result["notes"].append("there are no baselines: they need a calibration of this arm")
     if json:
         print_json(result)
     else:
@@ -128,7 +128,7 @@ def _check(
     if (moves is None) == (random is None):
         raise Failure("give either --moves FILE or --random N", code=2)
     if wrists and moves is not None:
-        raise Failure("wrists goes with --random: moves of a file turn what they turn", code=2)
+        raise Failure("--wrists needs --random: it does not change the moves of a file", code=2)
     if random is not None and not 1 <= random <= 100_000:
         raise Failure(f"random is {random}: must be 1 to 100000", code=2)
     if not 0 <= seed < 2**63:
@@ -142,7 +142,7 @@ def _check(
 def _disturbed(
     description: "RobotDescription", wanted: str | None, *, clean: bool
 ) -> tuple["RobotDescription", tuple[str, ...]]:
-    """The arm with the disturbances that are wanted, and their names."""
+    """Return the arm with the requested disturbances, and their names."""
     from tvist_plant.description import DISTURBANCES, DescriptionError
 
     if clean and wanted is not None:
@@ -155,7 +155,7 @@ def _disturbed(
 
 
 def _named(kept: tuple[str, ...]) -> str:
-    """What the arm is called that has these disturbances."""
+    """Describe an arm with these disturbances."""
     from tvist_plant.description import DISTURBANCES
 
     if kept == DISTURBANCES:
@@ -185,7 +185,7 @@ def _calibration(
     modes: int,
     description: "RobotDescription",
 ) -> "Calibration | None":
-    """The one that was named; else the paper's, or for several modes one that comes with the package."""
+    """Return the calibration that was named; by default the paper's, or a modal one for several modes."""
     from tvist_controller.calibrations import DEFAULT, load
     from tvist_controller.choices import wanted_modes
     from tvist_controller.mode_source import modal_source
@@ -248,7 +248,7 @@ def _recipe(
     recipe = Recipe(shaper, known, 0.01 * frequency_error, modes, own)
     with told(RecipeError, RefusalError, ShapingError, code=2):
         recipe.make(description, masses[1])
-        # Where nothing is known of an arm, there is nothing to design a baseline for.
+        # Without a calibration of the arm, no baseline can be designed for it.
         return recipe, every(recipe, description, masses) if baselines and known is not None else ()
 
 
@@ -280,15 +280,15 @@ def _notes(
     notes = []
     if share is not None:
         notes.append(
-            f"{100.0 * share:.0f} % of the draws were free of collision from start to target; the others were replaced"
+            f"{100.0 * share:.0f} % of the drawn moves were free of collisions; the others were replaced"
         )
     if result["left_out"]:
         notes.append(
-            f"{len(result['left_out'])} of {len(chosen)} moves have an unshaped peak below {WORTH:g} m/s²: they are "
-            "listed in absolute terms and left out of the percentages"
+            f"{len(result['left_out'])} of {len(chosen)} moves have an unshaped peak below {WORTH:g} m/s²: the "
+            "percentages leave them out"
         )
     notes += [
-        f"move {place}: a robot would refuse it, {words}; evaluated all the same"
+        f"move {place}: a robot would refuse it because {words}; it was evaluated anyway"
         for place, words in enumerate(met, 1)
         if words is not None
     ]
@@ -301,7 +301,9 @@ def _notes(
                 f"calibration {known.name} was made with {known.payload.mass:g} kg; {off} moves carry something else"
             )
     if result["never_still"]:
-        notes.append(f"{result['never_still']} shaped moves were not below 0.1 m/s² when the rest ended")
+        notes.append(
+            f"{result['never_still']} shaped moves were still above 0.1 m/s² at the end of the simulation"
+        )
     return notes
 
 

@@ -1,4 +1,4 @@
-"""`tvist identify`: learn from a robot's own sensors what shaping has to know of it."""
+"""`tvist identify`: identify a robot's vibration, or its payload, from the robot's own sensors."""
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tvist_plant.description import RobotDescription
 
 MASSES = "0,5"
-"""Payloads that a modal model is made with, unless told otherwise [kg]."""
+"""Default payloads for the identification of a modal model [kg]."""
 
 Doing = Callable[["Robot", "Arm"], Awaitable[Any]]
 
@@ -47,40 +47,42 @@ def identify(
     figures: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Jog the arm, fit what rings, and write a calibration; or find what the arm carries.
+    """Excite the arm, fit its vibration and write a calibration; or identify the payload.
 
-    The model polynomial says the lowest mode with one payload, from many configurations: about a minute in process,
-    half an hour over a network. The model modal says any mode with any payload, from a dozen ring-downs: seconds in
-    process, a minute over a network. With --payload and no mass nothing is calibrated: mass and centre of mass of
-    what the arm carries are found by its torques.
+    The polynomial model describes the lowest mode with one payload, from many configurations: about a minute in this
+    process, half an hour over a network. The modal model describes every mode with any payload, from a dozen
+    ring-downs: seconds in this process, a minute over a network. --payload without a mass makes no calibration, but
+    identifies mass and centre of mass of the payload from the joint torques.
 
-    Without an endpoint a robot is made in this process and runs as fast as it computes.
+    Without an endpoint, a robot is simulated in this process as fast as possible.
 
     Args:
         endpoint: Zenoh endpoint of a served robot.
-        output: File to write.
-        name: Of the calibration; default: the file's.
-        robot: Name of the served robot; in process, the robot file.
-        description: Robot file with the masses of a served robot; default: the UR5e's.
+        output: Calibration file to write.
+        name: Name of the calibration; default: the name of the file.
+        robot: Name of the served robot; in this process, the robot file.
+        description: Robot file with the link masses of a served robot; default: the UR5e's.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
-        model: What to fit.
-        payload: Mass of the paper's disc in kg, in process. Without a mass: find what the arm carries.
-        configurations: How many, spread over the workspace, for polynomial.
-        repeats: Jogs averaged at each, for polynomial.
-        ring_downs: How many in all, for modal.
-        payloads: Masses in kg with commas that a simulated arm carries in turn, for modal; default: 0,5 in process,
-            what is declared over a network.
-        poses: In how many the arm rests, for --payload.
-        declare: Declare the payload that was found.
-        seed: Of the choice of configurations, and of noise and gear errors in process.
-        at: Poses to measure with more weight, for polynomial: names of the robot file or angles with commas [Q1 Q2 Q3].
-        figures: Folder for a figure of the fit, for polynomial.
+        model: Model to fit.
+        payload: Mass of the disc that the robot simulated in this process carries in kg. Without a mass: identify the
+            payload.
+        configurations: Number of configurations, spread over the workspace (polynomial).
+        repeats: Number of jogs averaged in each configuration (polynomial).
+        ring_downs: Total number of ring-downs (modal).
+        payloads: Masses in kg, separated by commas, that a simulated arm carries in turn (modal); default: 0,5 in this
+            process, the declared payload over a network.
+        poses: Number of poses in which the arm rests to identify the payload.
+        declare: Declare the identified payload to the robot.
+        seed: Seed of the choice of configurations and, in this process, of noise and gear errors.
+        at: Poses to measure with more weight (polynomial): names from the robot file, or angles separated by commas
+            [Q1 Q2 Q3].
+        figures: Folder to write a figure of the fit to (polynomial).
         json: Print one JSON object.
     """
     if min(configurations, repeats, ring_downs, poses) < 1:
         raise Failure("configurations, repeats, ring-downs and poses must be at least 1", code=2)
     if not output.absolute().parent.is_dir():  # said before half an hour of jogs
-        raise Failure(f"output is {output}: there is no such folder", code=2)
+        raise Failure(f"output is {output}: its folder does not exist", code=2)
     endpoint, mass = _endpoint_and_mass(endpoint, payload)
     from tvist_plant.description import DescriptionError, load
 
@@ -99,7 +101,7 @@ def identify(
 
 
 class _Place:
-    """Which robot."""
+    """The robot to identify: a served one, or one in this process."""
 
     def __init__(
         self, endpoint: str | None, robot: str, security: Path | None, mass: float | None, seed: int
@@ -126,7 +128,7 @@ class _Place:
                 check_rating(self._setup.payload, self._setup.description)
 
     def run(self, doing: Doing) -> Any:
-        """Do something as a client with control."""
+        """Run a coroutine as a client with control."""
 
         async def whole() -> Any:
             async with self._controlled() as (client, arm):
@@ -241,7 +243,7 @@ def _payload(place: _Place, arm: "RobotDescription", poses: int, *, declare: boo
 
 
 def _endpoint_and_mass(endpoint: str | None, payload: list[str] | None) -> tuple[str | None, float | None]:
-    """Tell a mass from an endpoint: an option that may stand without a value takes what follows it."""
+    """Separate mass and endpoint: --payload may have no value and then takes the endpoint that follows it."""
     mass = None
     for word in payload or []:
         try:
@@ -261,7 +263,9 @@ def _masses(text: str) -> tuple[float, ...]:
     except ValueError:
         masses = ()
     if not masses or not all(0.0 <= mass <= 100.0 for mass in masses) or len(set(masses)) < len(masses):
-        raise Failure(f"payloads is {text!r}: must be different masses in kg with commas", code=2)
+        raise Failure(
+            f"payloads is {text!r}: must be different masses from 0 to 100 kg, separated by commas", code=2
+        )
     return masses
 
 

@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from tvist_server.gateways.access import Role
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
-"""Of a client: a folder of that name is none of the files beside it, which all have a dot."""
+"""Allowed client names. They have no dot, so that a client's folder cannot collide with the files beside it."""
 AUTHORITY_KEY = "authority.key"
 HEAD = """\
-# Who may do what, by the common name of a certificate: "operator" moves the robot, "viewer" sees what it does.
-# Who is left out is nobody: delete a line and start the robot again to take a name's rights away.
+# Role of each client, by the common name of its certificate: an "operator" may move the robot, a "viewer" may watch it.
+# A client that is not listed has no access: delete its line and restart the robot to revoke its rights.
 """
 
 
@@ -32,17 +32,17 @@ def keys(
     days: int = 365,
     json: bool = False,
 ) -> None:
-    """Make an authority, a certificate for a robot, and one for each client; what is there is kept.
+    """Create a certificate authority, a certificate for a robot and one for each client; existing files are kept.
 
-    FOLDER is then what tvist serve --security wants, and FOLDER/NAME what the client of that name does.
+    Give FOLDER to tvist serve --security, and FOLDER/NAME to --security of the client called NAME.
 
     Args:
-        folder: Where to make them.
-        robot: The robot's name; needed the first time.
-        host: Name or IP address under which clients reach the robot, repeatable; needed the first time.
+        folder: Folder to create the files in.
+        robot: Name of the robot; required the first time.
+        host: Host name or IP address under which clients reach the robot, repeatable; required the first time.
         operator: Name of a client that may move the robot, repeatable.
-        viewer: Name of a client that may see what it does, repeatable.
-        days: How long the new certificates last.
+        viewer: Name of a client that may only watch the robot, repeatable.
+        days: Number of days that the new certificates are valid.
         json: Print one JSON object.
     """
     try:
@@ -76,17 +76,17 @@ def keys(
 
 
 def _next(folder: Path, asked: "dict[str, Role]") -> list[str]:
-    """What to do with what was made."""
+    """Return the next steps: how to use the new files."""
     return [
         f"robot:  tvist serve --security {folder} --listen tls/ADDRESS:7447",
         *(f"{name}:  tvist check tls/HOST:7447 --security {folder / name}" for name in asked),
-        f"{folder / AUTHORITY_KEY} makes an operator of anybody: the robot does not need it, keep it elsewhere",
+        f"whoever has {folder / AUTHORITY_KEY} can create operators; the robot does not need it, so store it elsewhere",
     ]
 
 
 @dataclass
 class _KeyRing:
-    """A folder of keys. `look` changes nothing and raises where `make` would stop half way."""
+    """A folder of keys. `look` changes nothing and raises if `make` would stop half way."""
 
     folder: Path
     days: int
@@ -95,13 +95,13 @@ class _KeyRing:
     roles: "dict[str, Role]" = field(default_factory=dict)
 
     def look(self, robot: str | None, hosts: "tuple[Host, ...]", asked: "dict[str, Role]") -> None:
-        """Raise where something is missing, or is there and is not what was asked for."""
+        """Check that nothing is missing and that no existing file differs from what was asked for."""
         from tvist_cli.certificates import common_name, hosts_of, read_certificate
         from tvist_server.gateways.exposure import AUTHORITY, CERTIFICATE, CLIENTS, roles_in
 
         there = [(self.folder / name).exists() for name in (AUTHORITY, AUTHORITY_KEY)]
         if there == [True, False]:
-            why = f"{self.folder / AUTHORITY_KEY} is not there: bring it back to make more certificates"
+            why = f"{self.folder / AUTHORITY_KEY} is missing: put it back to create more certificates"
             raise Failure(why)
         if (self.folder / CERTIFICATE).exists():
             certificate = read_certificate(self.folder / CERTIFICATE)
@@ -109,12 +109,12 @@ class _KeyRing:
             if robot not in {None, name} or (hosts and set(hosts) != hosts_of(certificate)):
                 good = ", ".join(sorted(str(host.value) for host in hosts_of(certificate)))
                 raise Failure(
-                    f"{self.folder / CERTIFICATE} is that of {name} at {good}, and is not overwritten: "
-                    "take another folder, or move it and robot.key away"
+                    f"{self.folder / CERTIFICATE} belongs to {name} at {good} and is not overwritten: "
+                    "use another folder, or move it and robot.key away"
                 )
         elif robot is None or not hosts:
             raise Failure(
-                f"{self.folder} has no {CERTIFICATE} yet: --robot NAME and --host ADDRESS make it", code=2
+                f"{self.folder} has no {CERTIFICATE} yet: give --robot NAME and --host ADDRESS", code=2
             )
         if (self.folder / CLIENTS).exists():
             self.roles = roles_in(self.folder)
@@ -122,16 +122,16 @@ class _KeyRing:
             given = self.roles.get(name)
             if given not in {None, role}:
                 raise Failure(
-                    f"{name} is {given} already: take another name, or change {self.folder / CLIENTS}"
+                    f"{name} already has the role {given}: use another name, or edit {self.folder / CLIENTS}"
                 )
             if given is None and (self.folder / name).exists():
-                # Whoever was left out still has the old certificate: a line for the name would let it in again.
+                # A client whose line was deleted still has its certificate: a new line would let it in again.
                 raise Failure(
-                    f"{self.folder / name} is there and {CLIENTS} leaves {name} out: take another name"
+                    f"{self.folder / name} exists but {CLIENTS} does not list {name}: use another name"
                 )
 
     def make(self, robot: str | None, hosts: "tuple[Host, ...]", asked: "dict[str, Role]") -> None:
-        """Make what is not there."""
+        """Create the files that are missing."""
         from tvist_server.gateways.exposure import CERTIFICATE, KEY
 
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -173,7 +173,7 @@ class _KeyRing:
         self.made.append(f"{own}: {role}, until {pair.until:%Y-%m-%d}")
 
     def _note(self, name: str, role: "Role") -> None:
-        """Add a line to the roles, which a person may have edited."""
+        """Append a line to the file of roles, which may have been edited by hand."""
         from tvist_server.gateways.exposure import CLIENTS
 
         path = self.folder / CLIENTS
@@ -186,9 +186,11 @@ class _KeyRing:
 def _roles(operators: Sequence[str], viewers: Sequence[str]) -> "dict[str, Role]":
     for name in (*operators, *viewers):
         if not NAME.fullmatch(name):
-            raise ValueError(f"client is {name!r:.80}: must be 1 to 64 of A-Z a-z 0-9 _ -, the first no sign")
+            raise ValueError(
+                f"client is {name!r:.80}: must be 1 to 64 of A-Z a-z 0-9 _ -, beginning with a letter or digit"
+            )
         if name in operators and name in viewers:
-            raise ValueError(f"{name} cannot be operator and viewer: an operator sees everything anyway")
+            raise ValueError(f"{name} cannot be both operator and viewer: an operator may watch, too")
     return {**dict.fromkeys(operators, "operator"), **dict.fromkeys(viewers, "viewer")}
 
 

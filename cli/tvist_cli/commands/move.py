@@ -1,4 +1,4 @@
-"""`tvist move`: one motion by hand."""
+"""`tvist move`: move a served robot to one pose."""
 
 import asyncio
 from pathlib import Path
@@ -25,18 +25,18 @@ def move(
     shaper: str | None = None,
     json: bool = False,
 ) -> None:
-    """Move a served robot to a pose and say how long it took; Control+C stops the motion.
+    """Move a served robot to a pose and print how long it took; Control+C stops the motion.
 
     Args:
-        target: Q1, Q2, Q3, or joint angles with commas, in rad: -0.5,-3.1,0,-1.57,0,0.
+        target: Q1, Q2, Q3, or joint angles in rad separated by commas: -0.5,-3.1,0,-1.57,0,0.
         endpoint: Zenoh endpoint of the robot.
-        name: Its name [ur5e, or where there is none the only robot that is there].
+        name: Name of the robot [ur5e; if there is none, the only robot at the endpoint].
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
-        degrees: The angles of the target are in degrees; limits stay in rad.
-        velocity: Limit for every joint in rad/s.
-        acceleration: Limit for every joint in rad/s².
-        jerk: Limit for every joint in rad/s³.
-        shaper: Shaper to choose first.
+        degrees: Read the target's angles in degrees; the limits stay in rad.
+        velocity: Velocity limit of every joint in rad/s.
+        acceleration: Acceleration limit of every joint in rad/s².
+        jerk: Jerk limit of every joint in rad/s³.
+        shaper: Shaper to select before the motion.
         json: Print one JSON object.
     """
     from tvist_client.readiness import look, unlock_command
@@ -79,6 +79,6 @@ def move(
 
 
 async def _stop(arm: "Arm") -> None:
-    """Bring the robot to rest, whether or not the answer to the motion has come."""
+    """Bring the robot to rest, whether or not the motion has been answered."""
     await arm.stop()
     await arm.robot.rest()

@@ -24,15 +24,15 @@ def paper(
     markdown: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Run the paper's three motions, unshaped and shaped, as fast as they compute; print its tables beside ours.
+    """Simulate the paper's three motions, unshaped and shaped, as fast as possible; print its tables beside ours.
 
     Args:
-        runs: Repetitions, each with noise and gear errors of its own.
-        seed: Of the first repetition's.
-        figures: Folder for figures 4, 7, 12, 13, 14 and 16.
-        calibration: Calibration that comes with the package, or path of one.
-        baselines: Run what the method has to be compared with, too.
-        markdown: File for a page with all tables and where each figure comes from.
+        runs: Number of repetitions, each with different noise and gear errors.
+        seed: Seed of the first repetition.
+        figures: Folder to write figures 4, 7, 12, 13, 14 and 16 to.
+        calibration: Name of a calibration that comes with the package, or path of a calibration file.
+        baselines: Run the baselines for comparison as well.
+        markdown: File to write a page to, with all tables and the source of each figure.
         json: Print one JSON object.
     """
     if runs < 1:

@@ -1,4 +1,4 @@
-"""`tvist record`: record a served robot from outside."""
+"""`tvist record`: record a served robot over the network."""
 
 import asyncio
 from pathlib import Path
@@ -16,16 +16,16 @@ def record(
     seconds: float | None = None,
     json: bool = False,
 ) -> None:
-    """Record states, events and, where it is told, truth of a served robot as MCAP, until Control+C.
+    """Record the states, events and, if published, the truth of a served robot as MCAP until Control+C.
 
-    What only the server knows, the commands, is not in it: `tvist replay` needs a recording of `tvist serve --record`.
+    Commands are known only to the server and are not recorded: `tvist replay` needs a file from `tvist serve --record`.
 
     Args:
         file: MCAP file to write.
         endpoint: Zenoh endpoint of the robot.
-        name: Its name.
+        name: Name of the robot.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
-        seconds: End by itself this time after the first state.
+        seconds: Stop this many seconds after the first state.
         json: Print one JSON object at the end.
     """
     if seconds is not None and seconds <= 0.0:
@@ -46,9 +46,9 @@ def record(
                 robot.on_state(lambda state: ticks.append(state.tick))
                 robot.on_event(recorder.event)
                 robot.on_truth(recorder.truth)
-                say(f"recording {name} into {file}; Control+C ends it")
+                say(f"recording {name} into {file}; press Control+C to stop")
                 end = asyncio.ensure_future(ended.wait())
-                # The time that was asked for begins with the first state; in lockstep it may be a second away.
+                # The requested time begins with the first state, which may come a second later in lockstep.
                 first = asyncio.ensure_future(robot.state())
                 await asyncio.wait((end, first), return_when=asyncio.FIRST_COMPLETED)
                 if first.done():

@@ -10,13 +10,13 @@ from tvist_cli.shapers_of import load_given
 def replay(
     file: Path, output: Path | None = None, *, shaper: list[str] | None = None, json: bool = False
 ) -> None:
-    """Give a new robot the recorded messages at their ticks, free of any clock, and compare bit by bit.
+    """Run a recording's messages again on a new robot, without a clock, and compare every state bit by bit.
 
     Args:
         file: MCAP file that `tvist serve --record` wrote.
         output: MCAP file to write the second run to.
-        shaper: FILE.py:NAME, repeatable: the shaper of your own that the robot was served with. A recording names it
-            but does not make anybody run it.
+        shaper: FILE.py:NAME, repeatable: your own shaper that the robot was served with. A recording names the file,
+            but replay runs it only if it is given here.
         json: Print one JSON object.
     """
     from tvist_lab.mcap_file import read

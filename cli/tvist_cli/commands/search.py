@@ -1,4 +1,4 @@
-"""`tvist search`: look for ways to make a robot break what it promises."""
+"""`tvist search`: search for cases in which a robot breaks its promises."""
 
 from pathlib import Path
 from typing import Any
@@ -19,21 +19,21 @@ def search(
     markdown: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Try random stops, streams, changes in motion and whole sequences of commands, and check what must hold.
+    """Try random stops, streams, changes during motion and sequences of commands, and check the robot's promises.
 
-    A stop stays on the way of the motion, never gets ahead of it, rests no later and keeps the torque; the reference
-    stays clear of floor and arm; every motion ends once; from everywhere there is a way back to motion. Whatever is
-    found is printed with the number of its case, and the exit code is 1.
+    A stop stays on the path of the motion, never gets ahead of it, comes to rest no later and keeps the torque limits;
+    the reference stays clear of the floor and of the arm itself; every motion ends exactly once; and the robot can
+    always be brought back to motion. Each violation is printed with its case number, and the exit code is then 1.
 
     Args:
-        stops: How many stops of every kind to try, at random moments of accepted moves.
-        streams: How many streams of set-points towards the floor, the arm itself and limits.
-        changes: How many changes of payload, shaper, estimator and speed in mid-motion.
-        sequences: How many sequences of 40 random commands.
-        seed: Of the cases: another seed tries others.
-        robot: Robot file, or the name of one that comes with the package.
-        flexible: Simulate the flexible arm in stops and streams, too, and say how far it goes beyond the reference.
-        markdown: File for a page with the figures.
+        stops: Number of stops to try, of every kind, at random moments of accepted moves.
+        streams: Number of set-point streams towards the floor, the arm itself and the limits.
+        changes: Number of changes of payload, shaper, estimator and speed during a motion.
+        sequences: Number of sequences of 40 random commands.
+        seed: Seed of the cases; another seed tries other cases.
+        robot: Name of a robot that comes with the package, or path of a robot file.
+        flexible: Simulate the flexible arm in stops and streams, too, and report how far it overshoots the reference.
+        markdown: File to write a page with the figures to.
         json: Print one JSON object.
     """
     for name, count in (
@@ -57,7 +57,7 @@ def search(
         )
     with told(DescriptionError, code=2):
         if load(robot).joints != 6:
-            raise Failure(f"robot {robot} has other than six joints: the postures to try are for six", code=2)
+            raise Failure(f"robot {robot} does not have six joints: the search needs six", code=2)
     with progress(counts.all, "cases") as advance:
         result = run(counts, seed, robot=robot, flexible=flexible, progress=lambda what: advance(1, what))
     found = broken(result)
@@ -115,4 +115,6 @@ def _print(result: dict[str, Any]) -> None:
                 for kind, part in kinds.items()
             ],
         )
-    out.print("Below clearance: negative is clear; the flexible arm swings beyond its reference.")
+    out.print(
+        "Below clearance: a negative value means no contact; the flexible arm overshoots its reference."
+    )

@@ -41,36 +41,41 @@ def serve(
     ur_port: list[str] | None = None,
     config: str | None = None,
 ) -> None:
-    """Run a robot on the network, or several, until Control+C, SIGTERM, SIGQUIT or the end of the terminal.
+    """Run one or more robots on the network until Control+C, SIGTERM, SIGQUIT or the terminal closes.
 
     Args:
-        name: Name on the network [ur5e].
-        robot: Robot that comes with the package, or path of a robot file [ur5e].
-        robots: Several instead, ROBOT[*COUNT] with commas: ur5e*2,other.toml serves ur5e-1, ur5e-2 and other.
-        listen: Zenoh endpoint, repeatable [tcp/127.0.0.1:7447].
-        security: Folder made by tvist keys; the endpoint is then tls/ADDRESS:PORT, and who has no role sees nothing.
-        insecure: Listen beyond this machine without: anybody there may move the robot.
-        payload: Mass of the paper's disc on the flange in kg, declared and carried [5].
-        overload: Start even where that is above the robot's rating: the drives may give out, and the robot then makes
+        name: Name of the robot on the network [ur5e].
+        robot: Name of a robot that comes with the package, or path of a robot file [ur5e].
+        robots: Serve several robots, given as ROBOT[*COUNT] separated by commas: ur5e*2,other.toml serves ur5e-1,
+            ur5e-2 and other. Replaces --name and --robot.
+        listen: Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447].
+        security: Folder made by tvist keys. The endpoint is then tls/ADDRESS:PORT, and clients without a role are
+            refused.
+        insecure: Accept remote connections without TLS and do not authenticate clients; anyone can move the robot.
+        payload: Mass of the disc on the flange in kg, both carried and declared to the controller [5].
+        overload: Start even if the payload exceeds the robot's rating. The drives may not hold it; the robot then makes
             a protective stop.
-        shaper: Any that tvist shapers lists, such as none, zv or ei3; or auto, short or auto-target; or FILE.py:NAME,
-            which runs that file and adds the shaper of your own to those that clients can choose [zv].
-        calibration: Calibration that comes with the package, or path of one; none for a robot to be identified.
-        clock: realtime, or lockstep: a client lets time pass [realtime].
-        speed: Of the robot's time against the clock's [1].
-        realtime_priority: Put the ticks before all else on this machine (SCHED_FIFO), where the system permits it.
-        start: Q1, Q2, Q3, or joint angles in rad with commas [Q1].
-        state: TOML or JSON file with the state to start in: any of q, payload (what is carried), mode, shaper, seed.
-        seed: Of sensor noise and gear errors [0]; of several robots the first one's, the next has the next.
-        record: MCAP file to record into; of several robots each has its own, FILE-NAME.mcap.
-        dump: Folder for the last second before the simulated arm failed [the system's for temporary files].
-        truth: Tell what no robot can know, on tvist/NAME/truth and in the recording.
-        quiet: Sensors without noise and angles in an encoder's steps, for clients that wait until nothing changes.
-        ur: Open UR's own interfaces, too: RTDE, real-time client, dashboard, primary and secondary.
-        ur_address: IP address they listen at; of several robots each has the next one [127.0.0.1].
-        ur_port: Move one, repeatable: rtde=31004; dashboard=off keeps it shut. Others: primary, secondary, realtime,
-            and primary_read_only, secondary_read_only, realtime_read_only.
-        config: TOML file with any of these; the command line goes before it.
+        shaper: Any name that tvist shapers lists, such as none, zv or ei3; or auto, short or auto-target; or
+            FILE.py:NAME, which runs that file and adds your own shaper to those that clients can choose [zv].
+        calibration: Name of a calibration that comes with the package, or path of a calibration file; none for a robot
+            that is yet to be identified.
+        clock: realtime, or lockstep, in which a client steps the simulation [realtime].
+        speed: Simulation speed relative to real time [1].
+        realtime_priority: Run the control loop with real-time priority (SCHED_FIFO), if the system permits it.
+        start: Pose to start in: Q1, Q2, Q3, or joint angles in rad separated by commas [Q1].
+        state: TOML or JSON file with the state to start in: any of q, payload (the carried one), mode, shaper, seed.
+        seed: Seed of sensor noise and gear errors [0]. With several robots, the second uses seed + 1, and so on.
+        record: MCAP file to record into. With several robots, each records into a file of its own, FILE-NAME.mcap.
+        dump: Folder to save the last second before a failure of the simulated arm to [the system's temporary folder].
+        truth: Publish what a real robot cannot measure, such as the arm's deflection, on tvist/NAME/truth and in the
+            recording.
+        quiet: Simulate sensors without noise and angles with an encoder's resolution, for clients that wait until
+            values stop changing.
+        ur: Open UR's own interfaces as well: RTDE, real-time client, dashboard, primary and secondary.
+        ur_address: IP address on which UR's interfaces listen; each further robot uses the next address [127.0.0.1].
+        ur_port: Change the port of one UR interface, repeatable: rtde=31004, or dashboard=off to close it. The others
+            are primary, secondary, realtime, primary_read_only, secondary_read_only and realtime_read_only.
+        config: TOML file with any of these options; options on the command line take precedence.
     """
     given: dict[str, Any] = {
         "name": name, "robot": robot, "robots": robots, "listen": listen, "security": security,
@@ -85,7 +90,7 @@ def serve(
     from tvist_plant.flexible_arm import is_compiled
 
     if not is_compiled():
-        say("compiling the arm's equations, once: this takes some seconds")
+        say("compiling the arm's equations; this happens once and takes a few seconds")
     from tvist_server.config import ConfigError, from_mapping, read_toml
     from tvist_server.ending import Ending
     from tvist_server.gateways.base import GatewayError
@@ -105,7 +110,7 @@ def serve(
         took = time.monotonic() - began
         say(
             f"{_introduction([robot.setup for robot in server.robots])} on {', '.join(checked.listen)}, "
-            f"clock {checked.clock}; ready after {took:.1f} s. Control+C ends it."
+            f"clock {checked.clock}; ready after {took:.1f} s. Press Control+C to stop."
         )
 
     for address, ports in server.ur:
@@ -113,7 +118,7 @@ def serve(
         say(f"UR's interfaces are open on {address}: {listed}")
     whom = "this robot" if len(server.robots) == 1 else "these robots"
     for endpoint in checked.listen if checked.insecure else ():
-        say(f"anybody who reaches {endpoint} can move {whom}")
+        say(f"anyone who can reach {endpoint} can move {whom}")
     asyncio.run(server.run(ready, ending))
     ending.close()
     if server.failure is not None:
@@ -132,7 +137,7 @@ def serve(
 
 
 def _ur_port(text: str) -> tuple[str, int]:
-    """Door and port of DOOR=PORT; whether there is such a door the configuration says."""
+    """Split DOOR=PORT; the configuration checks whether there is such a door."""
     door, equals, port = text.partition("=")
     if not equals or not (port == "off" or (port.isascii() and port.isdigit() and len(port) < 9)):
         raise Failure(f"ur-port is {text!r}: must be DOOR=PORT such as rtde=31004, or DOOR=off", code=2)
@@ -140,7 +145,7 @@ def _ur_port(text: str) -> tuple[str, int]:
 
 
 def _introduction(setups: Sequence["Setup"]) -> str:
-    """Who listens: the robot with how it is set up, or the names of several."""
+    """Describe what listens: one robot with its settings, or the names of several."""
     first = setups[0]
     if len(setups) == 1:
         model = first.description.robot.model

@@ -1,4 +1,4 @@
-"""`tvist shaperbench`: shapers on eight arms, a person's own among them."""
+"""`tvist shaperbench`: rank shapers, your own included, on eight simulated arms."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 MOVES = 100
 QUICK = 3
-"""Moves with --quick."""
+"""Number of moves with --quick."""
 
 
 def shaperbench(
@@ -32,23 +32,24 @@ def shaperbench(
     markdown: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Judge shapers by how soon eight different arms are still, and what rings until then.
+    """Rank shapers by how soon eight different arms come to rest, and by the vibration until then.
 
-    Every shaper gets the same random moves with payloads of 0 to 5 kg of which the controller knows 100, 110 and 90 %,
-    and its reference is followed by eight arms; all but one differ from what the controller believes. A shaper that
-    peeks at the future or hides a tail is named and not ranked.
+    Every shaper gets the same random moves with payloads of 0 to 5 kg, of which the controller assumes 100, 110 and
+    90 %. Eight arms follow its reference; all but one differ from the controller's model. A shaper that uses future
+    samples or does not report its full delay is listed but not ranked.
 
     Args:
-        shaper: Python file with a class that has step(q_ref, info) -> q_star, and may have reset(q) and delay in s; or
-            with a function step. Or FILE.py:NAME, as tvist serve takes it.
-        quick: A few moves, with one payload error each.
-        moves: How many; 100, or 3 with --quick.
-        against: Names of the shapers and baselines to run, beside waiting; default: all.
-        seed: Of moves, payloads, gear errors and scatter.
-        calibration: Calibration with a modal model that comes with the package, or path of one.
-        output: JSON file for the leaderboard.
-        figures: Folder for a figure: settling against residual.
-        markdown: File for a page with the tables.
+        shaper: Python file with a class that has step(q_ref, info) -> q_star, and optionally reset(q) and delay in s;
+            or with a function step. Or FILE.py:NAME, as for tvist serve.
+        quick: Run only a few moves, with one payload error each.
+        moves: Number of moves [100, or 3 with --quick].
+        against: Names of the shapers and baselines to run, in addition to waiting; default: all.
+        seed: Seed of moves, payloads, gear errors and parameter scatter.
+        calibration: Name of a calibration that comes with the package, or path of a calibration file; it needs a modal
+            model.
+        output: JSON file to write the leaderboard to.
+        figures: Folder to write a figure of settling time against residual vibration to.
+        markdown: File to write a page with the tables to.
         json: Print one JSON object.
     """
     from tvist_lab.evaluation import curves, leaderboard
@@ -120,7 +121,7 @@ def _calibration(name: str | None) -> "Calibration":
 
 
 def _mine(shaper: str) -> "str | OwnShaper":
-    """A person's own shaper: path of a file with a class that has a method step, or what FILE.py:NAME names."""
+    """Check the user's own shaper: the path of a file with a method or function step, or FILE.py:NAME."""
     if ".py:" in shaper:
         return load_given(shaper)
     from tvist_lab.evaluation.foreign import CandidateError, load_shaper
@@ -182,7 +183,7 @@ def _print(result: dict[str, Any]) -> None:
     errors = len(result["payload_errors"])
     table(
         f"{result['moves']} moves on {len(result['arms'])} arms with {errors} payload errors; "
-        "* keeps the limits, and none that does is better in both still and ring",
+        "* keeps the limits, and no other shaper that keeps them is better in both still and ring",
         (
             "shaper", "still ms", "p90", "ring m/s²", "less %", "p5", "delay ms", "moving", "q̈/limit", "q̇/limit",
             "bend mrad", "µs",
@@ -190,14 +191,15 @@ def _print(result: dict[str, Any]) -> None:
         [_row(row) for row in result["shapers"] if row["ranked"]],
     )  # fmt: skip
     out.print(
-        "still: last time |α| exceeds 0.1 m/s², from the unshaped reference's stop, median and p90; ring: envelope\n"
-        "within 3 to 60 Hz after the shaper's own stop; less: than waiting; moving: vibration in motion over its;\n"
-        "peaks are the largest; bend: distance from a path round a corner; µs: of a tick with its estimates, here.",
+        "still: last time |α| exceeds 0.1 m/s², from the stop of the unshaped reference, median and p90;\n"
+        "ring: envelope within 3 to 60 Hz after the shaper's own stop; less: reduction compared with waiting;\n"
+        "moving: vibration during the motion relative to waiting; q̈ and q̇: largest peaks;\n"
+        "bend: deviation from a path round a corner; µs: time per tick on this machine, including its estimates.",
         markup=False,
     )
     told = [row["name"] for row in result["shapers"] if row["ranked"] and row["told_target"]]
     if told:
-        say(f"told before each move where it will end: {', '.join(told)}")
+        say(f"these shapers are given the target before each move: {', '.join(told)}")
     for row in result["shapers"]:
         if not row["ranked"]:
             say(f"{row['name']} ({row['label']}) is not ranked: it {row['fault']}")

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from tvist_shaping.named import AnyShaper
 
 BANDS = {"5": 0.05, "10": 0.1}
-"""Percent to residual vibration."""
+"""Residual vibration that bounds each band [-], by its percentage."""
 TOUCHING = 1.0 + 1e-4
-"""A hump as high as the bound is within it, however it is rounded."""
+"""Factor on the bound, so that rounding does not exclude a hump that just reaches it."""
 
 
 def shapers(
@@ -26,13 +26,14 @@ def shapers(
     figures: Path | None = None,
     json: bool = False,
 ) -> None:
-    """List the input shapers that a robot can use, for one mode.
+    """List the input shapers that a robot can use, with their properties for one mode.
 
     Args:
         f_d: Damped frequency of the mode in Hz.
-        zeta: Its damping ratio.
-        shaper: FILE.py:NAME, repeatable: list a shaper of your own, too, which runs that file.
-        figures: Folder for figures: what each leaves when the frequency is wrong; why the mean delay must not change.
+        zeta: Damping ratio of the mode.
+        shaper: FILE.py:NAME, repeatable: run that file and list the shaper in it, too.
+        figures: Folder to write figures to: residual vibration for a wrong frequency, and the effect of a varying mean
+            delay.
         json: Print one JSON object.
     """
     from tvist_shaping import SHAPERS, Registry, Shaper, ShapingError
@@ -62,15 +63,15 @@ def shapers(
     for one in listed:
         out.print(f"{one.name:{width}}  {one.description}", markup=False)
     out.print(
-        "\nms: how much later a motion ends; mean ms: how far it trails a motion of constant velocity;\n"
-        "band: true over assumed frequency where at most that much of the vibration is left;\n"
-        "ζ below: damping it is made for; peak: how many times its acceleration a reference may get",
+        "\nms: how much later a motion ends; mean ms: delay during motion at constant velocity;\n"
+        "band: ratios of true to assumed frequency for which at most that much vibration remains;\n"
+        "ζ below: largest damping ratio it supports; peak: largest factor on the reference's acceleration",
         markup=False,
     )
 
 
 def _about(shaper: "AnyShaper", f_d: float, zeta: float) -> dict[str, Any]:
-    """What there is to say of a shaper; where it is not for this mode, that."""
+    """Return the properties of a shaper, or why it does not support this mode."""
     from tvist_shaping import ShapingError
     from tvist_shaping.failures import FAILURES, words
     from tvist_shaping.impulses import check_mode
@@ -99,7 +100,7 @@ def _about(shaper: "AnyShaper", f_d: float, zeta: float) -> dict[str, Any]:
 
 
 def _band(impulses: "Impulses", f_d: float, V: float, zeta: float) -> list[float | None] | None:
-    """Lowest and highest ratio; None where even the assumed frequency is not in it, or where there is no end."""
+    """Lowest and highest ratio; None if the assumed frequency is not in the band, or for a band without an end."""
     from tvist_shaping import band
 
     low, high = (f / f_d for f in band(impulses, f_d, zeta, V * TOUCHING))

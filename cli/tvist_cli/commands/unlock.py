@@ -1,4 +1,4 @@
-"""`tvist unlock`: make a robot that has stopped ready again."""
+"""`tvist unlock`: make a stopped robot ready to be moved again."""
 
 from pathlib import Path
 
@@ -14,16 +14,16 @@ def unlock(
     security: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Take control of a served robot and release what keeps it from moving.
+    """Take control of a served robot and clear what keeps it from moving.
 
-    It restarts a safety system that found a violation or failed, unlocks a protective stop, and watches for 0.3 s of
-    the robot's time whether it holds. Safeguard and emergency stops are not a client's to release. Exit code 0 if the
-    robot is ready to be moved afterwards; otherwise 1, and a sentence says what remains and what to do about it.
+    The command restarts a safety system that found a violation or failed, unlocks a protective stop, and checks for
+    0.3 s of simulation time that the robot stays ready. A client cannot release a safeguard or emergency stop. The exit
+    code is 0 if the robot is then ready to be moved; otherwise it is 1, and a message says why and what to do.
 
     Args:
         endpoint: Zenoh endpoint of the robot.
-        name: Its name [the only robot there, or ur5e].
-        power_on: Switch the power on and release the brakes, too, where the arm is without power.
+        name: Name of the robot [the only robot at the endpoint, or ur5e].
+        power_on: If the arm has no power, switch it on and release the brakes.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         json: Print one JSON object.
     """
@@ -40,5 +40,5 @@ def unlock(
         next_step = f". Next: {report.next}" if report.next else ""
         raise Failure(f"{report.robot} is not ready: {report.why}{next_step}")
     if not json:
-        already = "" if report.done else ", and was before: nothing was done"
+        already = "" if report.done else "; it was ready before, so nothing was done"
         out.print(f"{report.robot} is ready to be moved{already}", soft_wrap=True, markup=False)

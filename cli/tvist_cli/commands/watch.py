@@ -1,4 +1,4 @@
-"""`tvist watch`: what a robot is doing, live in the terminal."""
+"""`tvist watch`: show live in the terminal what a robot is doing."""
 
 import asyncio
 import contextlib
@@ -29,14 +29,14 @@ def watch(
 ) -> None:
     """Show modes, joints, tool accelerometer, estimates and events of a served robot until Control+C.
 
-    Where the robot stands, the second line says why, even if it stopped before.
+    If the robot is not ready to move, the second line says why, even if it stopped before the command started.
 
     Args:
         endpoint: Zenoh endpoint of the robot.
-        name: Its name.
+        name: Name of the robot.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
-        seconds: End by itself after this time.
-        json: Print each event, and the state ten times a second, as a JSON object a line.
+        seconds: Stop after this many seconds.
+        json: Print each event, and the state ten times a second, as one JSON object per line.
     """
     if seconds is not None and seconds <= 0.0:
         raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
@@ -65,11 +65,13 @@ def watch(
         try:
             asyncio.run(asyncio.wait_for(run(), seconds))
         except KeyboardInterrupt:
-            raise interrupted(f"{time.monotonic() - began:.1f} s watched; the robot goes on") from None
+            raise interrupted(
+                f"watched for {time.monotonic() - began:.1f} s; the robot keeps running"
+            ) from None
 
 
 class _Standing:
-    """Whether the robot may be moved, and why not: asked again where its modes or its events have changed."""
+    """Whether the robot may be moved, and why not; asked again whenever its modes change or it stops."""
 
     def __init__(self, robot: "Robot", unlock: str) -> None:
         self._robot, self._unlock = robot, unlock
@@ -78,10 +80,10 @@ class _Standing:
         robot.on_event(self._on_event)
 
     async def line(self, state: "State") -> Text:
-        """A line for the screen.
+        """Return the line for the screen.
 
         Args:
-            state: The newest.
+            state: The newest state.
         """
         modes = (state.robot_mode, state.safety_mode)
         if modes != self._modes:

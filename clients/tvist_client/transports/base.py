@@ -23,7 +23,7 @@ class Transport(ABC):
 
         Raises:
             NotConnectedError: Nobody answers, or the robot went away while it was waited for.
-            AnswerTimeoutError: It took longer than `timeout_s`.
+            AnswerTimeoutError: The answer took longer than `timeout_s`.
         """
 
     @abstractmethod

@@ -26,32 +26,30 @@ Folder = str | os.PathLike[str]
 
 
 def settings(endpoint: str, security: Folder | None) -> dict[str, Any]:
-    """Settings of a Zenoh session that shows this certificate: path to value.
+    """Return the settings of a Zenoh session with this certificate, by path.
 
     Args:
-        endpoint: Where the server listens.
+        endpoint: Endpoint of the server.
         security: The client's folder; none for a server without security.
 
     Raises:
-        NotConnectedError: A file is not there, or folder and endpoint do not go together.
+        NotConnectedError: A file is missing, or folder and endpoint do not match.
     """
     encrypted = endpoint.startswith("tls/")
     if security is None:
         if encrypted:
-            raise NotConnectedError(
-                f"{endpoint} asks for a certificate: name the folder that holds it as security"
-            )
+            raise NotConnectedError(f"{endpoint} requires a certificate: give its folder as security")
         return {}
     if not encrypted:
         raise NotConnectedError(
-            f"{endpoint} takes no certificate: with security the endpoint is tls/<host>:<port>"
+            f"{endpoint} does not use certificates: with security, the endpoint must be tls/<host>:<port>"
         )
     folder = Path(security).absolute()
     for name in (AUTHORITY, CERTIFICATE, KEY):
         try:
             (folder / name).read_bytes()
         except OSError as error:
-            why = f"{folder / name}: {error.strerror}; `tvist keys` makes a folder for each client"
+            why = f"{folder / name}: {error.strerror}; `tvist keys` creates a folder for each client"
             raise NotConnectedError(why) from error
     return {
         "transport/unicast/open_timeout": OPEN_MS,
@@ -76,7 +74,7 @@ def why_refused(endpoint: str, security: Folder) -> str | None:
         context = ssl.create_default_context(cafile=folder / AUTHORITY)
         context.load_cert_chain(folder / CERTIFICATE, folder / KEY)
     except ssl.SSLError as error:
-        return f"{folder} holds no certificate and key that belong together ({error.reason or error})"
+        return f"{folder} does not contain a certificate and its key ({error.reason or error})"
     try:
         with (
             socket.create_connection((where.hostname or "", where.port or 0), PROBE_S) as plain,
@@ -88,7 +86,7 @@ def why_refused(endpoint: str, security: Folder) -> str | None:
     except ssl.SSLCertVerificationError as error:
         return f"the robot's certificate is not trusted: {error.verify_message.rstrip('.')}"
     except ssl.SSLError as error:
-        return f"the robot does not take this certificate: {(error.reason or str(error)).replace('_', ' ').lower()}"
+        return f"the robot rejects this certificate: {(error.reason or str(error)).replace('_', ' ').lower()}"
     except (OSError, ValueError):
         return None
     return None

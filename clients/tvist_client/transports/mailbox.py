@@ -1,4 +1,4 @@
-"""From the network's threads to the event loop."""
+"""Mailbox that passes messages from the network's threads to the event loop."""
 
 import asyncio
 import logging
@@ -40,7 +40,7 @@ class Mailbox:
         """
         if droppable and len(self._waiting) >= MAX_WAITING:
             if not self.dropped:
-                log.warning("the event loop has been busy for so long that messages are dropped")
+                log.warning("the event loop has been busy for too long: messages are being dropped")
             self.dropped += 1
             return
         self._waiting.append((callback, data))

@@ -22,14 +22,14 @@ CONFIG: Mapping[str, Any] = {
     "scouting/multicast/enabled": False,
     "transport/shared_memory/enabled": False,
 }
-"""Of a session: path to value."""
+"""Zenoh settings of a session, by path."""
 
 
 def open_session(endpoint: str, security: Folder | None = None) -> zenoh.Session:
     """Open a session. Blocks while it connects.
 
     Args:
-        endpoint: Where the server listens.
+        endpoint: Endpoint of the server.
         security: Folder with the client's certificate, where the server asks for one.
 
     Raises:
@@ -50,15 +50,15 @@ def open_session(endpoint: str, security: Folder | None = None) -> zenoh.Session
         refused = why_refused(endpoint, security) if security is not None else None
         if refused is not None:
             raise NotConnectedError(f"no connection to {endpoint}: {refused}") from error
-        why = f"nobody answers at {endpoint}: check that the server runs and listens there (`tvist serve`)"
+        why = f"no server answers at {endpoint}: check that it is running and listens there (`tvist serve`)"
         raise NotConnectedError(why) from error
     _OPEN.add(session)
     return session
 
 
 def _no_endpoint(endpoint: object) -> str:
-    form = "it has the form tcp/<host>:<port>, for instance tcp/127.0.0.1:7447, with a port from 1 to 65535"
-    return f"{quoted(endpoint)} is no endpoint: {form}"
+    form = "it must have the form tcp/<host>:<port>, such as tcp/127.0.0.1:7447, with a port from 1 to 65535"
+    return f"{quoted(endpoint)} is not an endpoint: {form}"
 
 
 def close_session(session: zenoh.Session) -> None:

@@ -39,8 +39,8 @@ class ZenohTransport(Transport):
 
     Args:
         session: An open session, which `close` closes.
-        endpoint: Where it is connected to, for sentences.
-        robot: The robot's name.
+        endpoint: Endpoint that it is connected to, for messages.
+        robot: Name of the robot.
     """
 
     def __init__(self, session: zenoh.Session, endpoint: str, robot: str) -> None:
@@ -67,7 +67,7 @@ class ZenohTransport(Transport):
         """Connect to an endpoint and find the robot there.
 
         Args:
-            endpoint: Where the server listens, `tcp/127.0.0.1:7447`.
+            endpoint: Endpoint of the server, `tcp/127.0.0.1:7447`.
             robot: The robot's name.
             security: Folder with this client's certificate, for `tls/<host>:<port>`.
 
@@ -158,10 +158,10 @@ class ZenohTransport(Transport):
             raise self._gone()
         answer: asyncio.Future[bytes] = self._loop.create_future()
         self._pending.add(answer)
-        check = "check that the server still runs" + self._if_secured(
+        check = "check that the server is still running" + self._if_secured(
             "that this certificate is an operator's"
         )
-        nobody = NotConnectedError(f"nobody answers for robot {self._robot!r} at {self._endpoint}: {check}")
+        nobody = NotConnectedError(f"robot {self._robot!r} at {self._endpoint} does not answer: {check}")
 
         def on_reply(reply: zenoh.Reply) -> None:
             wake(self._loop, partial(_settle, answer, self._outcome(reply, timeout_s)))
@@ -191,9 +191,9 @@ class ZenohTransport(Transport):
         if why == b"Timeout":
             return AnswerTimeoutError(
                 f"robot {self._robot!r} at {self._endpoint} did not answer within {timeout_s:g} s: "
-                "it hangs, or needs longer"
+                "it hangs, or needs more time"
             )
-        return UnexpectedReplyError(f"not a robot's answer but an error: {why!r:.80}")
+        return UnexpectedReplyError(f"the answer is an error instead of a message: {why!r:.80}")
 
     def _on_alive(self, sample: zenoh.Sample) -> None:
         there = sample.kind == zenoh.SampleKind.PUT
@@ -212,7 +212,7 @@ class ZenohTransport(Transport):
         if self._closed:
             return NotConnectedError("the connection is closed: open another one")
         return NotConnectedError(
-            f"robot {self._robot!r} at {self._endpoint} has gone: this client finds it again when it is back"
+            f"robot {self._robot!r} at {self._endpoint} is gone: this client reconnects when it is back"
         )
 
     def _if_secured(self, check: str) -> str:
@@ -232,9 +232,9 @@ class ZenohTransport(Transport):
             robots = await _robots(self._session)
             if self._robot in robots:  # the machine is slow
                 return
-            there = f"those there are {', '.join(robots)}" if robots else "no robot is there"
+            there = f"the robots there are {', '.join(robots)}" if robots else "there are no robots"
             check = "check name and endpoint" + self._if_secured(
-                "that the robot knows this certificate's name"
+                "that the robot lists the name of this certificate"
             )
             why = f"there is no robot {self._robot!r} at {self._endpoint}; {there}: {check}"
             raise NotConnectedError(why) from None
@@ -244,7 +244,7 @@ async def robots_at(endpoint: str, security: Folder | None = None) -> list[str]:
     """Names of the robots at an endpoint, sorted.
 
     Args:
-        endpoint: Where the server listens, `tcp/127.0.0.1:7447`.
+        endpoint: Endpoint of the server, `tcp/127.0.0.1:7447`.
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
 
     Raises:
@@ -258,10 +258,10 @@ async def robots_at(endpoint: str, security: Folder | None = None) -> list[str]:
 
 
 async def only_robot(endpoint: str, wanted: str, security: Folder | None = None) -> str:
-    """Name of the robot that is meant where none is named: the wanted one, or where it is not there the only one.
+    """Choose a robot if no name is given: the preferred one, or if it is not there the only one.
 
     Args:
-        endpoint: Where the server listens, `tcp/127.0.0.1:7447`.
+        endpoint: Endpoint of the server, `tcp/127.0.0.1:7447`.
         wanted: Name of the one that is taken where it is there.
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
 
@@ -272,7 +272,7 @@ async def only_robot(endpoint: str, wanted: str, security: Folder | None = None)
     if wanted in robots or not robots:
         return wanted
     if len(robots) > 1:
-        why = f"there are several robots at {endpoint}, {', '.join(robots)}: say which one with --name"
+        why = f"there are several robots at {endpoint}, {', '.join(robots)}: choose one with --name"
         raise NotConnectedError(why)
     return robots[0]
 

@@ -39,7 +39,7 @@ def load(calibration: str | Path) -> Calibration:
     except OSError as error:
         known = ", ".join(available())
         raise CalibrationError(
-            f"calibration {str(calibration)!r}: neither one of {known} nor a readable file ({error.strerror})"
+            f"calibration {str(calibration)!r}: must be one of {known} or a readable file ({error.strerror})"
         ) from error
     except CalibrationError as error:
         raise CalibrationError(f"calibration {calibration}: {error}") from error

@@ -27,7 +27,7 @@ def modal_estimator(
     It takes under a millisecond, so that a payload can be declared between two ticks.
 
     Args:
-        calibration: Of this arm, with a modal model.
+        calibration: Calibration of this arm, with a modal model.
         description: The robot.
         payload: What the arm is believed to carry.
         modes: How many, the lowest.

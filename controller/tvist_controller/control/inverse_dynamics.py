@@ -81,7 +81,7 @@ class InverseDynamics:
         return np.array(pin.rnea(self._model, self._data, q, qd, qdd))
 
     def torques(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
-        """The same for k states of motion, each argument of shape (k, n): shape (k, n) [N m]."""
+        """Torques for k states of motion, each argument of shape (k, n): shape (k, n) [N m]."""
         found = np.empty_like(q)
         for number in range(len(q)):
             found[number] = pin.rnea(self._model, self._data, q[number], qd[number], qdd[number])

@@ -1,4 +1,4 @@
-"""Where the tool is, from joint angles."""
+"""Forward kinematics: pose and velocity of the tool from joint angles."""
 
 from collections.abc import Sequence
 

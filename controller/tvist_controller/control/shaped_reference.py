@@ -36,7 +36,7 @@ class ShapedReference:
 
         Args:
             posture_of: From samples to joint positions; None: they are joint positions.
-            sample: Where the path's parameter rests, shape (m,) [rad].
+            sample: Value at which the path's parameter rests, shape (m,) [rad].
         """
         self.posture_of = posture_of
         """From samples to joint positions; None: they are joint positions."""

@@ -13,7 +13,7 @@ class Meters:
     its current held. Ticks that were not looked at count as one step with the current at its end.
 
     Args:
-        ratings: Of each joint.
+        ratings: Ratings of each joint.
     """
 
     def __init__(self, ratings: list[JointRating]) -> None:
@@ -21,7 +21,7 @@ class Meters:
         self._tick = 0
         self._shares = self._over(PERIOD)
         self.temperatures = [AMBIENT] * len(ratings)
-        """Of the joints [°C]."""
+        """Temperatures of the joints [°C]."""
         self.power = 0.0
         """Taken from the supply now [W]."""
         self.consumed = 0.0
@@ -38,7 +38,7 @@ class Meters:
 
         Args:
             tick: Number of the control period; an earlier one, or the last one again, adds nothing.
-            current: Of each joint's motor [A].
+            current: Current of each joint's motor [A].
             mechanical: Power the motors give to the arm, negative where they brake [W].
             powered: Whether the arm has power.
         """

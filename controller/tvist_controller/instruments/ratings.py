@@ -18,7 +18,7 @@ BIG = 60.0
 AMBIENT = 25.0
 """Temperature around the arm [°C]."""
 BUS_VOLTAGE = 48.0
-"""Of the supply [V]."""
+"""Voltage of the supply [V]."""
 STANDBY = 5.0
 """What the electronics of a joint take as long as it has power [W]."""
 
@@ -45,7 +45,7 @@ class JointRating:
 
 
 def joint_ratings(description: RobotDescription) -> list[JointRating]:
-    """Of each joint of a robot."""
+    """Return the rating of each joint of a robot."""
     return [_big(torque) if torque > BIG else _small(torque) for torque in description.limits.torque]
 
 

@@ -27,8 +27,8 @@ class Reading:
         io: Terminals and registers in force.
         rigid: The arm's mechanics, shared by all ticks.
         wrench: What pushes its tool, shared likewise.
-        ratings: Of its joints.
-        current: Of its motors [A].
+        ratings: Ratings of the joints.
+        current: Currents of the motors [A].
         meters: Temperatures and energies at this tick.
         kept: Where doors keep what outlasts a tick.
     """

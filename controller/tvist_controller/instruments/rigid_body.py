@@ -73,7 +73,7 @@ class RigidBody:
             q: Joint positions [rad].
             qd: Joint velocities [rad/s].
             qdd: Joint accelerations [rad/s²].
-            offset: Of the tool centre point in the flange frame: x y z [m] and rotation vector [rad].
+            offset: Tool centre point in the flange frame: x y z [m] and rotation vector [rad].
         """
         model, data, flange = self._model, self._data, self._flange
         pin.forwardKinematics(model, data, np.array(q), np.array(qd), np.array(qdd))

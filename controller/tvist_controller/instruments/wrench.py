@@ -56,8 +56,8 @@ class ToolWrench:
 
         Args:
             q: Joint positions [rad].
-            torque: Of the surroundings on the joints, shape (n,) [N m].
-            offset: Of the tool centre point in the flange frame [m, rad].
+            torque: Torque of the surroundings on the joints, shape (n,) [N m].
+            offset: Tool centre point in the flange frame [m, rad].
         """
         jacobian = pin.computeFrameJacobian(
             self._model, self._data, np.array(q), self._flange, pin.LOCAL_WORLD_ALIGNED
@@ -80,7 +80,7 @@ class ToolWrench:
 
         Args:
             state: The tick.
-            offset: Of the tool centre point in the flange frame: x y z [m] and rotation vector [rad].
+            offset: Tool centre point in the flange frame: x y z [m] and rotation vector [rad].
         """
         if state.robot_mode != RUNNING:
             return [0.0] * 6

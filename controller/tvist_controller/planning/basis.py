@@ -28,7 +28,7 @@ class MotionBasis(Struct, frozen=True, eq=False, gc=False):
     """What a point-to-point motion depends on; there is one only while such a motion may begin."""
 
     q: Floats
-    """Where the reference rests, shape (n,) [rad]."""
+    """Joint angles at which the reference rests, shape (n,) [rad]."""
     speed: float
     """Share of the programmed speed that was set [-]."""
     slowest: float | None

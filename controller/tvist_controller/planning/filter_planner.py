@@ -51,7 +51,7 @@ class FilterPlanner:
         It has the estimator that was chosen, or the arm's own modal one where it takes that.
 
         Args:
-            name: Of the filter.
+            name: Name of the filter.
             modes: How many modes it shall suppress.
             source: The estimator that was chosen.
             declared: What the controller believes that the arm carries.

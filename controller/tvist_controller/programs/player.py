@@ -127,7 +127,7 @@ class ProgramPlayer:
     def _load(self, call: Call[ProgramLoad]) -> None:
         name = call.command.name
         if name not in self.known:
-            why = f"name is {name!r}: the programs are {', '.join(sorted(self.known))}"
+            why = f"name is {name!r}: must be one of {', '.join(sorted(self.known))}"
             raise RefusalError("out_of_range", "name", why)
         if self.state != "STOPPED":
             self.end()

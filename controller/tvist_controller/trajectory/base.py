@@ -38,7 +38,7 @@ class Trajectory(ABC):
     limits: Limits | None = None
     """What its samples keep; None: it bypasses the filter, or rests."""
     acceleration: float = 0.0
-    """Of a stop: the limit that every joint keeps in it [rad/s^2]; 0 for what is no stop."""
+    """Limit that every joint keeps in a stop [rad/s^2]; 0 for other trajectories."""
     foreseeable: bool = True
     """Whether it can be run ahead; False: somebody leads it from outside."""
 
@@ -77,7 +77,7 @@ class Rest(Trajectory):
         self._q = q
 
     def next(self) -> Floats:
-        """Where the arm stays."""
+        """Return the position at which the arm stays."""
         return self._q
 
     @property

@@ -47,13 +47,13 @@ class Curve(Path):
 
     def __init__(self, length: float, bends: Bends) -> None:
         if not 0.0 < length < np.inf:
-            raise ValueError(f"length is {length}: a curve's parameter ends above 0")
+            raise ValueError(f"length is {length}: must be more than 0")
         if not float(bends.slope.max()) <= 1.0 + ROUNDING:
             raise ValueError(
-                f"slope is {bends.slope.tolist()}: no joint may turn farther than the parameter goes"
+                f"slope is {bends.slope.tolist()}: no joint may turn farther than the curve's parameter"
             )
         if not (0.0 <= bends.second < np.inf and 0.0 <= bends.third < np.inf):
-            raise ValueError(f"second is {bends.second} and third {bends.third}: they have to be finite")
+            raise ValueError(f"second is {bends.second} and third {bends.third}: both must be finite")
         super().__init__(np.zeros(1), np.array([length]))
         self.bends = bends
         """Bounds of its derivatives."""
@@ -91,7 +91,7 @@ class Curve(Path):
             0.5 * CURVED_SHARE * limits.jerk / (3.0 * second * limits.acceleration),
         )
         kept = self.keeping(limits, float(velocity))
-        assert kept is not None, "the velocity leaves the rest of its shares"
+        assert kept is not None, "this velocity leaves room for acceleration and jerk"
         return kept
 
     def keeping(self, limits: Limits, velocity: float) -> Limits | None:

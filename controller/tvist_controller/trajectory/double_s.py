@@ -15,7 +15,7 @@ class DoubleS:
     Args:
         start: Parameter where it begins, shape (m,) [rad].
         end: Parameter where it ends, shape (m,) [rad].
-        limits: Of every entry.
+        limits: Limits of every entry.
 
     Raises:
         ValueError: There is no such motion within these limits, or it would last for hours.

@@ -68,7 +68,7 @@ class Limiter:
         self._reach = np.full(n, np.inf) if reach is None else np.array(reach, dtype=float)
         self._torque = torque
         self.q = np.array(q, dtype=float)
-        """Where the reference is, shape (n,) [rad]."""
+        """Position of the reference, shape (n,) [rad]."""
         # Velocity of the signal; differences of the reference, first, second, and second of the tick before.
         self._signal_qd, self._step, self._bend, self._bend_before = np.zeros((4, n))
         self._state: Floats | None = None  # derivatives, where they are not those of the differences
@@ -102,7 +102,7 @@ class Limiter:
         """One tick towards a position that itself moves.
 
         Args:
-            q: Where the signal is, shape (n,) [rad].
+            q: Position of the signal, shape (n,) [rad].
             qd: How fast it moves there, shape (n,) [rad/s].
 
         Returns:

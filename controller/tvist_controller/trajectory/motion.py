@@ -44,7 +44,7 @@ class Motion(Trajectory):
     Its samples are the path's parameter: of a straight joint line the joint positions.
 
     Args:
-        path: Where it goes.
+        path: Path of the motion.
         law: When it is where; from the path's start to its end.
         period: Tick [s].
         speed: Rate of its time against the clock's to start with [-].
@@ -137,7 +137,7 @@ class Motion(Trajectory):
 
     @property
     def velocity(self) -> float:
-        """Of the parameter's entry that goes farthest, now [rad/s]."""
+        """Current velocity of the parameter's entry that goes farthest [rad/s]."""
         return float(np.abs(self._law.at(self.time)[1]).max()) * self._pace.rate
 
     def hold(self, acceleration: float) -> bool:

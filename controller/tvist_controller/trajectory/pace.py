@@ -21,7 +21,7 @@ class Pace:
     The rate goes to its target time-optimally inside that room, its own jerk limited (ruckig).
 
     Args:
-        limits: Of the motion, for every joint.
+        limits: Limits of the motion, for every joint.
         period: Tick [s].
         rate: To start with [-].
     """

@@ -43,7 +43,7 @@ class Path(ABC):
         way = self.end - start
         farthest = float(np.abs(way).max())
         self.direction = way / farthest if farthest > 0.0 else np.zeros(len(start))
-        """Of the way from start to end; its largest entry is 1 or -1 (all are 0 where there is no way), shape (m,)."""
+        """Direction from start to end; its largest entry is 1 or -1 (all are 0 if start equals end), shape (m,)."""
         self.leading = int(np.argmax(np.abs(self.direction)))
         """Number of the entry that goes farthest."""
         self._sign = float(self.direction[self.leading])
@@ -71,7 +71,7 @@ class Path(ABC):
 
         Args:
             limits: That every joint is to keep; the velocity is not looked at.
-            velocity: Of the parameter [rad/s].
+            velocity: Velocity of the parameter [rad/s].
 
         Returns:
             None where the curve alone takes all that the joints may.

@@ -24,7 +24,7 @@ class PathStop(Trajectory):
     What hardly moves, so that the limits let it stand at once, does.
 
     Args:
-        path: Where it goes.
+        path: Path of the stop.
         x: Newest sample, shape (m,) [rad].
         step: By which it is ahead of the one before, along the path's direction, shape (m,) [rad].
         xdd: Second difference of the last three, likewise, shape (m,) [rad/s^2].
@@ -117,7 +117,7 @@ class PathStop(Trajectory):
 
     @property
     def end(self) -> Floats:
-        """Where it rests: joint positions, shape (n,) [rad]."""
+        """Joint positions at which the stop ends, shape (n,) [rad]."""
         return self.path.posture(self._at(self.duration))
 
     def _at(self, time: float) -> Floats:

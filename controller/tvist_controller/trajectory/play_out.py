@@ -20,7 +20,7 @@ CALM = 0.5
 SLOW = 0.05
 """Share of the velocity limit below which it is [-]."""
 CLOSE = 1e-6
-"""Where the delay is taken for what it is to be [ticks]."""
+"""Distance at which the delay counts as the wanted one [ticks]."""
 
 
 class PlayOut:
@@ -37,7 +37,7 @@ class PlayOut:
         first: Set-point to play next; it has just come.
         look_ahead: Periods between the position and the newest set-point it needs [-].
         ticks: Ticks in a period of the stream, at least one [-].
-        limits: Of the stream.
+        limits: Limits of the stream.
         period: Tick [s].
     """
 

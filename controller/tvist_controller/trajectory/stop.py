@@ -50,7 +50,7 @@ class Stop(Trajectory):
         return np.array(position), np.array(velocity), np.array(acceleration)
 
     def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
-        """As `at` at k moments, shape (k,) [s]; each of shape (k, n)."""
+        """Evaluate `at` at k moments, shape (k,) [s]; each result has shape (k, n)."""
         duration, at_time = self.duration, self._trajectory.at_time
         states = [at_time(min(time, duration)) for time in times.tolist()]
         position, velocity, acceleration = (
@@ -60,7 +60,7 @@ class Stop(Trajectory):
 
     @property
     def end(self) -> Floats:
-        """Where it rests, shape (n,) [rad]."""
+        """Position at which the stop ends, shape (n,) [rad]."""
         return self.at(self.duration)[0]
 
     def next(self) -> Floats:

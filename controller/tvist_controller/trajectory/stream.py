@@ -28,9 +28,9 @@ class SetpointStream(Trajectory):
     Whatever comes of it goes through the `Limiter`.
 
     Args:
-        q: Where the arm rests, shape (n,) [rad].
+        q: Joint angles at which the arm rests, shape (n,) [rad].
         stream_period: Time between set-points, at least a tick [s].
-        limits: Of velocity, acceleration and jerk, for every joint.
+        limits: Limits of velocity, acceleration and jerk, for every joint.
         period: Tick [s].
         reach: Joints' range either way, shape (n,) [rad]; None for no end.
         torque: What torque leaves to acceleration; None for enough.
@@ -55,7 +55,7 @@ class SetpointStream(Trajectory):
         self._curve, self._look_ahead = (linear, 1) if direct else (cubic, 2)
         self._period = period
         self.limits = limits
-        """Of the reference."""
+        """Limits of the reference."""
         self._reach = math.inf if reach is None else np.array(reach, dtype=float)
         self._limiter = Limiter(self._rest, limits, period, reach=reach, torque=torque)
         self._play_out: PlayOut | None = None

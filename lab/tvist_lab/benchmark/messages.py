@@ -24,7 +24,7 @@ class Messages:
     """A source of messages: half of them name the lease, half a lease that is none.
 
     Args:
-        seed: Of the choice.
+        seed: Seed of the choice.
         token: Names the lease.
         calibration: One that fits the robot.
     """

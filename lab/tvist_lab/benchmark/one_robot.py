@@ -19,7 +19,7 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.stream import State, Telemetry
 
 SWING = 0.05
-"""Of the sine that is streamed [rad]."""
+"""Amplitude of the streamed sine [rad]."""
 COMMANDS = 200
 """Commands that are timed."""
 

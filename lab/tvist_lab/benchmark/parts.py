@@ -22,7 +22,7 @@ from tvist_protocol.commands import MoveJ, SimulationReset, SimulationStep, Take
 from tvist_shaping import TvistFilter, shaper
 
 TICKS = 1250
-"""Of a motion: Q1 to Q3 without its last moment."""
+"""Number of ticks of a motion: Q1 to Q3 without its last moment."""
 BATCHES = 5
 """Repetitions, of which the fastest counts: what else the machine does only ever adds."""
 MUJOCO_STEP = 0.00025

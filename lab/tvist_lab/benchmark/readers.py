@@ -13,7 +13,7 @@ async def readers(module: str, *arguments: str) -> AsyncIterator[list[dict[str, 
 
     Args:
         module: Its name, `observers` or `rtde_clients`.
-        arguments: Of the module.
+        arguments: Arguments of the module.
 
     Yields:
         A list, in which stands at the end what each client received and lost.

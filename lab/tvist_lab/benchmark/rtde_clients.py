@@ -39,8 +39,8 @@ class Client:
     """One connection, that reads data packages.
 
     Args:
-        address: Of the robot.
-        port: Of its RTDE.
+        address: IP address of the robot.
+        port: Port of the robot's RTDE interface.
         names: Its recipe.
     """
 

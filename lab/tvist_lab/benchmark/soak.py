@@ -29,9 +29,9 @@ from tvist_protocol.stream import Telemetry
 
 OBSERVERS = 5
 SWING = 0.2
-"""Of the sine that is streamed [rad]."""
+"""Amplitude of the streamed sine [rad]."""
 CYCLE = 4.0
-"""Of the sine [s]."""
+"""Period of the sine [s]."""
 WARM = 60.0
 """Memory is compared with what it was then [s]; in a short soak, with what it was after a quarter."""
 

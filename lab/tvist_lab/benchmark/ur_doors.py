@@ -10,7 +10,7 @@ from tvist_plant.plant import PERIOD
 from tvist_server.ur_ports import UrPorts
 
 CLIENTS = 10
-"""Of RTDE, at 500 Hz, each with a recipe of its own."""
+"""Number of RTDE clients at 500 Hz, each with a recipe of its own."""
 ADDRESS = "127.0.0.1"
 
 

@@ -13,7 +13,7 @@ from tvist_plant.imperfections import Imperfections, YieldingBase
 from tvist_plant.plant import Plant
 
 SUBSTEPS = 8
-"""Of the integrator in a period where an arm has imperfections, which are explicit in it."""
+"""Number of the integrator's steps per period for an arm with imperfections, which are explicit in it."""
 SCATTER = 0.15
 """By which each stiffness and gain differs from the description's, up or down by chance [-]."""
 

@@ -32,7 +32,7 @@ class Baseline:
     label: str
     """For people."""
     shaper: str | None = None
-    """Of the catalogue; None: no shaper, the motion alone takes longer."""
+    """Shaper of the catalogue; None: no shaper, the motion itself takes longer."""
     f_d: float | None = None
     """Frequency it is designed for; None: the estimate at the move's target [Hz]."""
     zeta: float | None = None

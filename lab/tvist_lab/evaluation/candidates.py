@@ -86,7 +86,7 @@ class Held(Candidate):
     mean_delay: float
     """To which they are held back [s]."""
     modes: int
-    """Of which they are the shapers."""
+    """Number of modes."""
     name: str
     label: str
 
@@ -109,7 +109,7 @@ class Shaping(Candidate):
 
     @property
     def told_target(self) -> bool:
-        """Where it is designed for the target."""
+        """Whether it is designed for the target."""
         return self.baseline.f_d is None
 
     def stepper(self, task: Task) -> "Filtering":
@@ -160,5 +160,5 @@ class Filtering:
 
     @property
     def delay(self) -> float:
-        """Of the last output [s]."""
+        """Delay of the last output [s]."""
         return self.declared()

@@ -44,7 +44,7 @@ class Job:
     baselines: tuple[Baseline, ...] = ()
     """To be run beside it."""
     seed: int = 0
-    """Of gear errors."""
+    """Seed of gear errors."""
 
     @property
     def motions(self) -> int:
@@ -59,7 +59,7 @@ class Made:
     peak: float
     """Largest true |α| later than 10 ms after the reference stops [m/s²]."""
     duration: float
-    """Of the shaped reference [s]."""
+    """Duration of the shaped reference [s]."""
     still_after: float | None
     """From the start of the unshaped reference; None: not still when the rest ended [s]."""
     acceleration: float
@@ -197,7 +197,7 @@ def _row(job: Job, one: Judged) -> dict[str, Any]:
 
 
 def _summary(pairs: list[tuple[Judged, Made]]) -> dict[str, Any]:
-    """Of one way over all moves; reductions over those that count."""
+    """Summarize one way over all moves; reductions only over those that count."""
     reductions = np.array([one.reduction(made) for one, made in pairs if one.counts])
     delays = np.array([one.delay(made) for one, made in pairs])
     accelerations, velocities = np.array([[made.acceleration, made.velocity] for _, made in pairs]).T

@@ -36,9 +36,9 @@ class Info:
     period: float
     """Tick [s]."""
     joints: int
-    """Of the arm; `q_ref` has as many entries."""
+    """Number of joints of the arm; `q_ref` has as many entries."""
     limits: Limits
-    """Of the reference, for every joint: velocity [rad/s], acceleration [rad/s²], jerk [rad/s³]."""
+    """Limits of the reference, for every joint: velocity [rad/s], acceleration [rad/s²], jerk [rad/s³]."""
     payload: Payload
     """Declared: mass [kg], com [m], inertia [kg m²]."""
     robot: str
@@ -87,8 +87,8 @@ class Foreign:
     Args:
         made: Has `step`, and may have `reset` and `delay`.
         info: What it is told, but for the modes.
-        estimator: Of these.
-        start: Where the reference rests, shape (n,) [rad].
+        estimator: Estimator of these modes.
+        start: Joint angles at which the reference rests, shape (n,) [rad].
         reach: How far each joint turns either way, shape (n,) [rad].
 
     Raises:

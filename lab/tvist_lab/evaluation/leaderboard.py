@@ -30,7 +30,7 @@ def leaderboard(
     Args:
         candidates: The first is waiting.
         faults: One a candidate, of `inspect`.
-        jobs: Of those without a fault.
+        jobs: Jobs of the candidates without a fault.
         done: What came of them.
         bent: Curved paths and what came of them.
     """
@@ -117,7 +117,7 @@ def _row(
 
 
 def _summary(pairs: list[tuple[Score, Score]]) -> dict[str, Any]:
-    """Of scores, each with that of waiting on the same arm, move and payload."""
+    """Summarize scores, each with that of waiting on the same arm, move and payload."""
     still = np.array([1e3 * score.still for score, _ in pairs])
     worth = [100.0 * (1.0 - a.residual / b.residual) for a, b in pairs if b.residual >= WORTH]
     return {

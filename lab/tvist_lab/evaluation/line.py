@@ -142,10 +142,10 @@ def simulate(
 
     Args:
         cycle: The line, with `Unchanged` for a filter and any plant at its end.
-        start: Where it rests, shape (n,) [rad].
+        start: Joint angles at which the arm rests, shape (n,) [rad].
         reference: The unshaped one that all is compared with, shape (T, n) [rad].
         shaped: What the arm is to follow, shape (T', n) [rad].
-        seed: Of sensor noise and gear errors.
+        seed: Seed of sensor noise and gear errors.
         delay: That the shaper declares [s].
 
     Returns:
@@ -196,7 +196,7 @@ def control_line(
 
     Args:
         description: What the controller believes the arm to be.
-        start: Where it rests, shape (n,) [rad].
+        start: Joint angles at which the arm rests, shape (n,) [rad].
         declared: The payload the controller counts on.
         carried: The payload the arm has.
         plant: What the line moves; None: the arm that the description describes.

@@ -44,7 +44,7 @@ class Move:
     target: tuple[float, ...]
     """One angle a joint [rad]."""
     mass: float
-    """Of what the arm carries [kg]."""
+    """Mass of the payload [kg]."""
 
 
 class _Entry(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -53,7 +53,7 @@ class _Entry(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit
     start: tuple[Angle, ...]
     target: tuple[Angle, ...]
     payload: Mass | None = None
-    """Of this move; else the command's [kg]."""
+    """Payload of this move; None: the command's [kg]."""
 
 
 Entries = Annotated[tuple[_Entry, ...], Meta(min_length=1)]
@@ -102,7 +102,7 @@ class Drawn:
 
     @property
     def share(self) -> float:
-        """Of the draws that were free of collision [-]."""
+        """Share of the draws that were free of collision [-]."""
         return len(self.moves) / self.draws
 
 
@@ -120,7 +120,7 @@ def draw_moves(
     Args:
         description: The robot.
         count: How many.
-        seed: Of everything drawn.
+        seed: Seed of everything drawn.
         masses: Least and largest mass carried, uniform between them [kg].
         wrists: Turn the two outer joints of the wrist, too; otherwise they rest at zero.
         progress: Told of each move found.

@@ -86,7 +86,7 @@ class Recipe:
 
         Args:
             description: The robot.
-            mass: Of the payload declared [kg].
+            mass: Mass of the declared payload [kg].
 
         Raises:
             RecipeError: The calibration is of another arm, or does not know the modes that the filter wants.
@@ -104,7 +104,7 @@ class Recipe:
 
         Args:
             description: The robot.
-            mass: Of the payload declared [kg].
+            mass: Mass of the declared payload [kg].
             modes: How many.
 
         Raises:

@@ -30,7 +30,7 @@ from tvist_plant.model import FLANGE, rigid_model
 from tvist_plant.plant import PERIOD
 
 PAYLOAD_ERRORS = (0.0, 0.1, -0.1)
-"""Of the mass declared [-]."""
+"""Errors of the declared mass [-]."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class Job:
     move: Move
     """With the mass that is carried."""
     error: float
-    """Of the mass declared [-]."""
+    """Error of the declared mass [-]."""
     seed: int
-    """Of gear errors and scatter."""
+    """Seed of gear errors and scatter."""
     arms: tuple[int, ...]
     """Numbers of the arms."""
 
@@ -75,7 +75,7 @@ class Scores:
     velocity: float
     """Likewise [-]."""
     cost: float | None
-    """Of a tick [s]."""
+    """Processor time of a tick [s]."""
     fault: str | None = None
     """Why there are no scores."""
 
@@ -168,7 +168,7 @@ def _task(description: RobotDescription, move: Move) -> Task:
 
 
 def kinematics(description: RobotDescription) -> Kinematics:
-    """Where the flange of the rigid arm is."""
+    """Return the kinematics of the rigid arm's flange."""
     model = rigid_model(description, Payload())
     data, flange = model.createData(), model.getFrameId(FLANGE)
 

@@ -39,12 +39,12 @@ def retargeted(
     """A stream whose joints go to random targets and are called away from them, often before they are there.
 
     Args:
-        joints: Of the arm.
+        joints: Number of joints of the arm.
         seconds: How long it is [s].
-        seed: Of targets and of when they change.
+        seed: Seed of the targets and of the times at which they change.
         wrists: Turn the two outer joints of the wrist, too; otherwise they rest at zero.
         together: All joints arrive at the same time; otherwise each goes at its own limits.
-        limits: Of each joint.
+        limits: Limits of each joint.
 
     Returns:
         One sample a tick, shape (T, joints) [rad].
@@ -74,7 +74,7 @@ def retargeted(
 
 
 def peaks(q: Floats, limits: Limits = PAPER) -> Peaks:
-    """Of positions at every tick, shape (T, n) [rad]: by first and second difference."""
+    """Return the peaks of positions at every tick, shape (T, n) [rad], by first and second difference."""
     qd, qdd = (float(np.abs(np.diff(q, order, axis=0)).max()) / PERIOD**order for order in (1, 2))
     return Peaks(qd / limits.velocity, qdd / limits.acceleration)
 

@@ -1,4 +1,4 @@
-"""The same work on every core, with results that do not depend on how many there are."""
+"""Run work on every core, with results that do not depend on the number of cores."""
 
 import multiprocessing
 import os

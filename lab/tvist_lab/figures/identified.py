@@ -24,8 +24,8 @@ def identified_figure(
         q: Configurations, shape (N, n) [rad].
         f_d: Measured, shape (N,) [Hz].
         zeta: Measured, shape (N,) [-].
-        true_f_d: Of the lowest true mode, shape (N,) [Hz].
-        true_zeta: Of the lowest true mode, shape (N,) [-].
+        true_f_d: Damped frequency of the lowest true mode, shape (N,) [Hz].
+        true_zeta: Damping ratio of the lowest true mode, shape (N,) [-].
     """
     estimator = estimator_of(calibration)
     estimated = np.array([np.concatenate(estimator.estimate(row)) for row in q]).T

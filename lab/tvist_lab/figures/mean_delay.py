@@ -16,7 +16,7 @@ from tvist_shaping.base import Filter
 
 LIMITS = Limits(1.5, 2.0, 100.0)
 MODES = 3
-"""Of the product of zero-vibration shapers."""
+"""Number of modes in the product of zero-vibration shapers."""
 NAMES = ("zv of three modes", "auto, its mean delay constant")
 AFTER = 100
 """Ticks shown after the reference has stopped."""

@@ -13,7 +13,7 @@ def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
     """Each ranked shaper as a point, medians over arms, moves and payload errors; the front as a line.
 
     Args:
-        rows: Of the leaderboard.
+        rows: Rows of the leaderboard.
     """
     figure, (panel,) = panels(1, 4.6)
     ranked = [row for row in rows if row["ranked"]]

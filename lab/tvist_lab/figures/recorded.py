@@ -31,9 +31,9 @@ def motion_figure(name: str, unshaped: Recorded, shaped: Recorded) -> Figure:
     Time is zero where the reference starts.
 
     Args:
-        name: Of the motion, as heading.
+        name: Name of the motion, used as heading.
         unshaped: The motion without shaping.
-        shaped: The same with shaping.
+        shaped: Recording of the same motion with shaping.
 
     Raises:
         NotMeasurableError: The attained position cannot be told: too little rest was recorded.
@@ -42,10 +42,10 @@ def motion_figure(name: str, unshaped: Recorded, shaped: Recorded) -> Figure:
 
 
 def observed_figure(name: str, recorded: Recorded) -> Figure:
-    """The same panels for one motion of any recording.
+    """Draw the same panels for one motion of any recording.
 
     Args:
-        name: Of the motion, as heading.
+        name: Name of the motion, used as heading.
         recorded: The motion.
 
     Raises:

@@ -16,7 +16,7 @@ BEFORE = 0.1
 AFTER = 0.4
 """Time shown after the shaped reference stops [s]."""
 DASHES = (0, (4, 2))
-"""Of a fitted curve."""
+"""Dash pattern of a fitted curve."""
 
 
 def figure_16(motions: Mapping[str, tuple[Recorded, Recorded]]) -> Figure:

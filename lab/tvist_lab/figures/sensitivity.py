@@ -11,7 +11,7 @@ from tvist_lab.figures.style import FAINT, INK, MUTED, SHAPED, THIRD, UNSHAPED, 
 DESIGN = 10.5
 """Middle of the workspace's span [Hz]."""
 SPAN = (6.0, 15.0)
-"""Of the first mode's damped frequency over the UR5e's workspace with 5 kg [Hz]."""
+"""Range of the first mode's damped frequency over the UR5e's workspace with 5 kg [Hz]."""
 SHOWN = (5.5, 16.0)
 """Frequencies on the axis [Hz]."""
 

@@ -22,9 +22,9 @@ FAINT = "#8A8A8A"
 MUTED = "#5A5A5A"
 """Words of less weight."""
 DPI = 150
-"""Of saved bitmaps: 6.4 inches are 960 pixels."""
+"""Resolution of saved bitmaps: 6.4 inches are 960 pixels."""
 WIDTH = 6.4
-"""Of every figure [inch]."""
+"""Width of every figure [inch]."""
 
 
 def panels(
@@ -34,7 +34,7 @@ def panels(
 
     Args:
         rows: Number of panels.
-        height: Of the figure [inch].
+        height: Height of the figure [inch].
         share_x: All panels have the lowest one's axis.
         ratios: Relative heights of the panels.
     """

@@ -21,7 +21,7 @@ from tvist_plant.plant import PERIOD
 NOISE = 0.03
 """rms that is counted on, an axis [m/s^2]."""
 LIMITS = Limits(velocity=1.5, acceleration=2.0, jerk=100.0)
-"""Of the jog, as a client's `move_j` has them."""
+"""Limits of the jog, as in a client's `move_j`."""
 
 
 def choose(arm: Arm, candidates: Sequence[Floats], jog: Jog, counts: Sequence[int]) -> list[tuple[int, int]]:

@@ -60,7 +60,7 @@ def fit_polynomials(
         q: Configurations, shape (N, n) [rad].
         f_d: Measured there, shape (N,) [Hz].
         zeta: Measured there, shape (N,) [-].
-        weights: Of each, shape (N,) [-].
+        weights: Weight of each sample, shape (N,) [-].
         joints: Joints the modes depend on.
         degree: Highest total degree.
 

@@ -47,9 +47,9 @@ class Plan:
     repeats: int = REPEATS
     """Jogs averaged at each."""
     degree: int = DEGREE
-    """Of the polynomials."""
+    """Degree of the polynomials."""
     seed: int = 0
-    """Of the spread."""
+    """Seed of the spread of configurations."""
     jog: Jog = field(default_factory=Jog)
 
 
@@ -71,9 +71,9 @@ class Identification:
     against: str
     """What the errors below are against: the truth, or measurements that a fit did not see."""
     error_f_d: Spread
-    """Of the calibration [%]."""
+    """Error of the calibration's f_d [%]."""
     error_zeta: Spread
-    """Of the calibration [%]."""
+    """Error of the calibration's ζ [%]."""
     anchors: int = 0
     """How many of the configurations, the first ones, were named."""
 
@@ -109,7 +109,7 @@ async def identify(
         robot: The robot, on a network or in process.
         arm: Control of it.
         plan: What to measure.
-        name: Of the calibration.
+        name: Name of the calibration.
         command: What the user typed, for the calibration's provenance.
         progress: Told of each configuration done.
 

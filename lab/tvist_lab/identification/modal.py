@@ -63,7 +63,7 @@ UNSEEN = 60
 WORKSPACE = 200
 """Configurations in which the range of the modes is looked for."""
 MARGIN = 0.85
-"""Of the lowest frequency found there, and of the distance to the highest damping ratio [-]."""
+"""Margin on the lowest frequency found over the workspace, and on the distance to the highest damping ratio [-]."""
 
 Progress = Callable[[], None]
 
@@ -77,13 +77,13 @@ class ModalPlan:
     payloads: tuple[Payload, ...] = ()
     """Carried one after the other by a simulated arm; none: what it carries, which is what is declared."""
     seed: int = 0
-    """Of the candidates."""
+    """Seed of the candidates."""
     jog: Jog = field(default_factory=Jog)
 
 
 @dataclass(frozen=True)
 class ModeErrors:
-    """Of one mode [%]."""
+    """Errors of one mode [%]."""
 
     f_d: Spread
     zeta: Spread
@@ -117,7 +117,7 @@ async def identify_modal(
         control: Control of it.
         description: Its masses and geometry.
         plan: What to measure.
-        name: Of the calibration.
+        name: Name of the calibration.
         command: What the user typed, for the calibration's provenance.
         progress: Told of each ring-down done.
 

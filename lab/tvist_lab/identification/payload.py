@@ -70,7 +70,7 @@ class PayloadFound:
     mass_deviation: float
     """Standard deviation [kg]."""
     com_deviation: tuple[float, float, float]
-    """Of each coordinate [m]."""
+    """Standard deviation of each coordinate [m]."""
     mass_in_motion: float
     """What the short motion says [kg]."""
     mass_in_motion_deviation: float
@@ -97,7 +97,7 @@ async def identify_payload(
         control: Control of it.
         description: The arm's masses, geometry and friction.
         poses: In how many it rests, at least 3.
-        seed: Of the poses that are looked at.
+        seed: Seed of the poses to choose from.
         progress: Told of each pose done, and of the motion.
 
     Raises:

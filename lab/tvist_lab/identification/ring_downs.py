@@ -34,9 +34,9 @@ class Jog:
     """A short move that ends where the arm is to ring, with all big joints at once: it stirs every mode there is."""
 
     length: float = 0.06
-    """Of the fastest joint [rad]."""
+    """Length of the jog for the fastest joint [rad]."""
     shares: tuple[float, ...] = (0.6, 0.6, 1.0)
-    """Of the joints from the base on [-]."""
+    """Shares of the joints, from the base on [-]."""
 
     def of(self, joints: int) -> Floats:
         """Joint displacement, shape (joints,) [rad]."""
@@ -61,7 +61,7 @@ class Ringing:
 
     @property
     def rms(self) -> float:
-        """Of what is not constant, an axis [m/s^2]."""
+        """Rms of what is not constant, per axis [m/s^2]."""
         return float(np.sqrt(np.mean((self.force - self.force.mean(axis=0)) ** 2)))
 
 

@@ -86,7 +86,7 @@ class Arm:
         self.guess: Floats = np.log([self.unknowns[number].guess for number in self.sought])
         """Logarithms, shape (P,)."""
         self.deviation: Floats = np.array([self.unknowns[number].deviation for number in self.sought])
-        """Of the guess, shape (P,)."""
+        """Deviations of the initial guess, shape (P,)."""
 
     def flexible(self, payload: int) -> FlexibleModel:
         """Model with one of the payloads."""
@@ -104,8 +104,8 @@ class Arm:
         """Parameters as a calibration says them.
 
         Args:
-            logarithms: Of those sought, shape (P,).
-            deviations: Of the logarithms, shape (P,); None: not said.
+            logarithms: Logarithms of the sought parameters, shape (P,).
+            deviations: Standard deviations of the logarithms, shape (P,); None if unknown.
         """
         values = {number: float(np.exp(log)) for number, log in zip(self.sought, logarithms, strict=True)}
         errors = dict(zip(self.sought, deviations.tolist(), strict=True)) if deviations is not None else {}

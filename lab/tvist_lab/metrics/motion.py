@@ -1,4 +1,4 @@
-"""Where the motions of a recording begin and end."""
+"""Find the beginning and end of each motion in a recording."""
 
 from dataclasses import dataclass, replace
 from itertools import zip_longest

@@ -30,7 +30,7 @@ class Residual:
     stop: float
     """Time t_b at which the shaped reference stops [s]."""
     peak_times: Floats
-    """Of the peaks that were found [s], shape (P,)."""
+    """Times of the peaks that were found [s], shape (P,)."""
     peaks: Floats
     """Their |α| [m/s²], shape (P,)."""
     fitted: bool
@@ -49,9 +49,9 @@ class ModalResidual:
     value: float
     """Amplitude of the vibration at the stop, all modes together [m/s²]."""
     amplitudes: Floats
-    """Of each mode at the stop [m/s²], shape (M,). Modes that nearly coincide share theirs arbitrarily."""
+    """Amplitude of each mode at the stop [m/s²], shape (M,). Modes that nearly coincide share theirs arbitrarily."""
     rms: float
-    """Of what the modes do not explain, over all axes [m/s²]."""
+    """rms of what the modes do not explain, over all axes [m/s²]."""
 
 
 def residual(recording: Recording, motion: Motion) -> Residual:

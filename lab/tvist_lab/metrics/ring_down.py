@@ -39,7 +39,7 @@ class RingDown:
     zeta_error: float
     """Standard error of ζ [-]."""
     rms: float
-    """Of what the fit leaves, over all axes [m/s²]."""
+    """rms of the residual of the fit, over all axes [m/s²]."""
     r_squared: float
     """Share of the signal's energy that the fit explains [-]."""
     window: float
@@ -198,7 +198,7 @@ class _Ring:
         return RingDown(**{**vars(fit), "ok": not reason, "reason": reason})
 
     def _standard_errors(self, parameters: Floats, left: Floats, linear: int) -> Floats:
-        """Of f_d and ζ of each mode, from the Jacobian without what the amplitudes can follow."""
+        """Return the standard errors of each mode's f_d and ζ, from the Jacobian without the amplitudes' share."""
         step = np.tile([1e-4, 1e-5], parameters.size // 2)
         jacobian = np.column_stack(
             [

@@ -9,7 +9,7 @@ from tvist_lab.metrics.motion import Motion
 from tvist_lab.recordings import Floats, Recording
 
 REPEATABILITY = 3.0e-5
-"""Of the UR5e, half-width of the band around the attained position [m]."""
+"""Repeatability of the UR5e: half-width of the band around the attained position [m]."""
 TAIL = 0.2
 """Time at the end of the recorded rest over which the attained position is the mean [s]."""
 
@@ -47,7 +47,7 @@ def distance(recording: Recording, motion: Motion) -> Floats:
     """E: distance of the tool to its attained position [m], for the rows from the motion's start to its end.
 
     Raises:
-        NotMeasurableError: As in `attained_position`.
+        NotMeasurableError: See `attained_position`.
     """
     position = recording["actual_TCP_pose"][motion.start : motion.end, :3]
     return np.asarray(

@@ -16,7 +16,7 @@ from tvist_lab.metrics.vibration import tool_acceleration
 from tvist_lab.recordings import Recording
 
 COLUMNS = ("delay_ms", "stabilisation_ms", "cycle_ms", "overshoot_m", "residual_vibration_m_s2")
-"""Of Table 2, in the paper's order."""
+"""Columns of Table 2, in the paper's order."""
 IMPACTS = {
     "stabilisation": "stabilisation_ms",
     "cycle": "cycle_ms",

@@ -8,7 +8,7 @@ from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.recordings import Floats, Recording
 
 GRAVITY = 9.81
-"""Of the simulated world [m/s²]."""
+"""Gravity of the simulated world [m/s²]."""
 BAND = (3.0, 60.0)
 """Frequencies in which an arm vibrates [Hz]."""
 SENSOR = "actual_tool_accelerometer"

@@ -138,7 +138,7 @@ async def experiment(
         robot: The robot.
         arm: Control of it.
         runs: Repetitions, each with noise and gear errors of its own.
-        seed: Of the first repetition's.
+        seed: Seed of the first repetition.
         baselines: Whether to run those too.
         progress: Told of each run done.
     """

@@ -98,7 +98,7 @@ class EqualDuration(Method):
     """No shaper and no model at all: a longer jerk time, so that the motion takes as long as the shaped one."""
 
     delay: float
-    """Of the shaped motion [s]."""
+    """Delay of the shaped motion [s]."""
     name: str = "equal_duration_double_s"
     label: str = "longer double S"
 
@@ -115,7 +115,7 @@ def robust_over(name: str, f_d: tuple[float, float], zeta: tuple[float, float]) 
     taken to fall linearly from its highest value at the lowest frequency to its lowest at the highest.
 
     Args:
-        name: Of the shaper.
+        name: Name of the shaper.
         f_d: Lowest and highest damped frequency of the workspace [Hz].
         zeta: Lowest and highest damping ratio [-].
 

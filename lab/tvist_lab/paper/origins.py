@@ -21,7 +21,7 @@ def origins(result: dict[str, Any]) -> list[tuple[str, str, str, str, str]]:
     """Rows of figure, the paper's value, ours, where ours comes from, and why.
 
     Args:
-        result: Of `report.as_dict`, with the truth.
+        result: Result of `report.as_dict`, with the truth.
     """
     theirs = published()
     rows = []

@@ -11,7 +11,7 @@ def page(result: dict[str, Any], command: str) -> str:
     """Markdown of a search's result.
 
     Args:
-        result: Of `tvist_lab.safety.report.search`.
+        result: Result of `tvist_lab.safety.report.search`.
         command: That made it, for whoever wants to make it again.
     """
     lines = [

@@ -44,7 +44,7 @@ def search(
 
     Args:
         counts: How many of each.
-        seed: Of the cases; with others there are others.
+        seed: Seed of the cases; another seed gives other cases.
         robot: Robot file, or the name of one that comes with the package.
         flexible: Whether the flexible arm is simulated in stops and streams, too, to see how far it goes into what the
             reference stays clear of.

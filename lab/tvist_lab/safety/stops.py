@@ -79,7 +79,7 @@ class Outcome:
     near: float
     """How much nearer than the clearance two bodies came, by the reference [m]."""
     penetration: float
-    """The same by the flexible arm [m]; nan where it was not simulated."""
+    """Penetration by the flexible arm [m]; nan if it was not simulated."""
     duration: float
     """From the stop until it rested [s]."""
     left: float

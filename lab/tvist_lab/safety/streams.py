@@ -61,7 +61,7 @@ class StreamOutcome:
     near: float
     """How much nearer than the clearance two bodies came, by the reference; to be 0 or less [m]."""
     penetration: float
-    """The same by the flexible arm [m]; nan where it was not simulated."""
+    """Penetration by the flexible arm [m]; nan if it was not simulated."""
     stopped: bool
     """True when the robot ended the stream because two bodies would have met."""
     beyond: float

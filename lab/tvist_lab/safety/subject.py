@@ -59,11 +59,11 @@ class Subject:
 
     Args:
         description: The robot.
-        q: Where it rests [rad].
+        q: Joint angles at which it rests [rad].
         payload: Declared and carried.
         shaper: Its shaper.
         flexible: Whether the flexible arm is simulated, or only the references.
-        clock: Of the robot: in real time leases run out.
+        clock: Clock of the robot: leases expire only in real time.
         lease_s: Length of the lease [s].
     """
 

@@ -53,7 +53,7 @@ class Estimator(ABC):
         here: a jump would shake an arm that moves. Others estimate as ever.
 
         Args:
-            q: As of `estimate`.
+            q: Joint angles, see `estimate`.
 
         Returns:
             As of `estimate`.

@@ -55,8 +55,8 @@ class Basis:
             joints: Different indices from 0, at most 7.
             kind: `trigonometric` or `angles`.
             degree: A whole number, >= 0.
-            centre: As above; None for zeros.
-            scale: As above, > 0; None for ones, which `trigonometric` needs to be periodic in 2π.
+            centre: Centre of the angles, see above; None for zeros.
+            scale: Scale of the angles, see above, > 0; None for ones, which `trigonometric` needs to be periodic in 2π.
 
         Raises:
             EstimatorError: A parameter is wrong, or the terms are more than MAX_TERMS.

@@ -12,7 +12,7 @@ from tvist_shaping.impulses import F_D_RANGE
 
 
 class Fixed(Estimator):
-    """The same modes everywhere."""
+    """Estimator that gives the same modes at every configuration."""
 
     def __init__(self, f_d: Sequence[float], zeta: Sequence[float]) -> None:
         """Set the modes.

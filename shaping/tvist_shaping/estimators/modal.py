@@ -158,7 +158,7 @@ def follow(mass: Floats, rows: Floats, poles: Complex, shapes: Complex, scratch:
 def _converge(  # noqa: C901, PLR0912 - one kernel: its branches are loops over coordinates
     mass: Floats, rows: Floats, poles: Complex, shapes: Complex, matrix: Complex
 ) -> bool:
-    """As `follow`; where it fails, nothing of poles and shapes is of use."""
+    """Do the same as `follow`; if it fails, poles and shapes are not usable."""
     L = mass.shape[0]
     for k in range(poles.shape[0]):
         s = poles[k]
@@ -391,13 +391,13 @@ class Modal(Estimator):
         """The lowest modes at a configuration, whatever the last estimate was.
 
         Args:
-            q: As of `estimate`.
+            q: Joint angles, see `estimate`.
 
         Returns:
             As of `estimate`.
 
         Raises:
-            EstimatorError: As of `estimate`.
+            EstimatorError: See `estimate`.
         """
         if self._lie(q) != RESTING or not self._lowest:
             self._take_lowest(q, self._mass_matrix(q))
@@ -442,7 +442,9 @@ class Modal(Estimator):
         if len(poles) < self._modes:
             self._q = np.zeros(0)
             raise EstimatorError(
-                "modes", self._modes, f"at most {len(poles)}: no more vibrate at {q.tolist()}"
+                "modes",
+                self._modes,
+                f"at most {len(poles)}, the number of modes that vibrate at {q.tolist()}",
             )
         self._poles[:], self._shapes[:] = poles[: self._modes], shapes[: self._modes]
         self._lowest, self._lost = True, False

@@ -54,11 +54,11 @@ def evaluate(
     Args:
         q: Joint angles [rad], shape (n,).
         joints: Indices of the joints used, shape (k,).
-        trigonometric: Which basis.
+        trigonometric: Whether the basis is trigonometric.
         centre: Centre [rad], shape (k,).
         scale: Scale [rad], shape (k,).
         multiples: `Basis.multiples`, shape (rows, k).
-        coefficients: Of f_d and ζ, shape (2, terms).
+        coefficients: Coefficients of f_d and ζ, shape (2, terms).
         ranges: Lowest and highest f_d and ζ, shape (2, 2).
 
     Returns:
@@ -208,7 +208,7 @@ class Polynomial(Estimator):
         row = np.array(coefficients, dtype=float)
         if row.shape != (len(self.basis),) or not np.isfinite(row).all():
             raise EstimatorError(
-                name, coefficients, f"{len(self.basis)} finite numbers, one a term of the basis"
+                name, coefficients, f"{len(self.basis)} finite numbers, one per term of the basis"
             )
         return row
 

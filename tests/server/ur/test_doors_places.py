@@ -135,7 +135,7 @@ async def test_who_is_being_served_goes_for_nobody_and_the_last_newcomer_is_turn
     later(86_400.0)
     others = await readers(desk, MOST - 1)
     assert await is_cut_off((await connect(desk, "primary"))[0])
-    assert "was turned away: 256 of 256 places are taken" in caplog.text
+    assert "was refused: 256 of 256 connections are in use" in caplog.text
     await desk.tick()
     assert await package(served) == b"U"
     writer.write(PAUSE)

@@ -1,4 +1,4 @@
-"""What a person at the server's console has to know: stops and warnings, a line each, on the log."""
+"""Stops and warnings for the person at the server's console, one line each, on the log."""
 
 import logging
 import threading
@@ -13,19 +13,19 @@ from tvist_server.gateways.base import Gateway, Message
 log = logging.getLogger(__name__)
 
 WINDOW = 10.0
-"""Time in which lines are counted [s]."""
+"""Time window in which lines are counted [s]."""
 STOPS, WARNINGS = 10, 5
-"""Lines of each kind in that time; warnings never take the room of stops."""
+"""Largest number of lines of each kind per window; warnings never displace stops."""
 LEAVE = 0.2
-"""How long the end waits for a console that nobody reads [s]."""
+"""Longest wait at shutdown for a console that nobody reads [s]."""
 
 
 class Throttle:
-    """Lets through so many lines in a time, and counts the rest. Without a clock of its own.
+    """Lets a limited number of lines through per window and counts the rest; the caller supplies the time.
 
     Args:
-        lines: How many, in `WINDOW`.
-        what: What they are, for the line that says how many were left out.
+        lines: Largest number of lines in `WINDOW`.
+        what: Kind of the lines, for the line that says how many were left out.
     """
 
     def __init__(self, lines: int, what: str) -> None:
@@ -34,11 +34,11 @@ class Throttle:
         self._said = self._left_out = 0
 
     def take(self, line: str, now: float) -> list[str]:
-        """What to say where there is one more line.
+        """Return the lines to write when a new line comes.
 
         Args:
-            line: The line.
-            now: On any clock that goes forward [s].
+            line: The new line.
+            now: Time on any monotonic clock [s].
         """
         lines = self.due(now)
         if self._began is None:
@@ -50,18 +50,18 @@ class Throttle:
         return lines
 
     def due(self, now: float) -> list[str]:
-        """What to say once the time is over: how many lines were left out, if any were."""
+        """Return the line that says how many lines were left out, if the window is over and any were."""
         return [] if self._began is None or now - self._began < WINDOW else self.rest()
 
     def rest(self) -> list[str]:
-        """The same at once."""
+        """Return that line now and end the window."""
         left_out, self._began = self._left_out, None
         self._said = self._left_out = 0
         return [f"{left_out} more {self._what} in the last {WINDOW:g} s, left out here"] if left_out else []
 
 
 class Console:
-    """Writes lines on the log from a thread of its own, since a console that nobody reads makes its writer wait."""
+    """Writes lines to the log from a thread of its own, since a console that nobody reads blocks the writer."""
 
     def __init__(self) -> None:
         self._throttles = {"stop": Throttle(STOPS, "stops"), "warning": Throttle(WARNINGS, "warnings")}
@@ -70,11 +70,11 @@ class Console:
         self._thread = threading.Thread(target=self._write, name="tvist-console", daemon=True)
 
     def start(self) -> None:
-        """Begin to write; what was said before waits."""
+        """Begin to write; lines from before wait in the queue."""
         self._thread.start()
 
     def say(self, line: str, *, stop: bool) -> None:
-        """Write a line, unless there were too many.
+        """Write a line, unless the limit is reached.
 
         Args:
             line: The line.
@@ -84,13 +84,13 @@ class Console:
             self._put(self._throttles["stop" if stop else "warning"].take(line, time.monotonic()))
 
     def update(self) -> None:
-        """Say how many lines were left out, where it is time to: to be called now and then."""
+        """Write how many lines were left out, if it is time; to be called regularly."""
         with self._lock:
             for throttle in self._throttles.values():
                 self._put(throttle.due(time.monotonic()))
 
     def close(self) -> None:
-        """Say what is left to be said, as far as somebody reads it."""
+        """Write what remains, unless the console blocks."""
         with self._lock:
             for throttle in self._throttles.values():
                 self._put(throttle.rest())
@@ -108,12 +108,12 @@ class Console:
 
 
 class ConsoleGateway(Gateway):
-    """The way of one robot's events to the console. Nothing comes in here.
+    """Passes one robot's events to the console; it takes no input.
 
     Args:
-        console: Where they go.
-        name: The robot's.
-        command_line: What to type for a command to reach it.
+        console: Console to write to.
+        name: Name of the robot.
+        command_line: Function that returns the command line of a command for this robot.
     """
 
     setpoints_refused = 0
@@ -122,18 +122,18 @@ class ConsoleGateway(Gateway):
         self._console, self._name, self._command_line = console, name, command_line
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  every gateway gets it
-        """Say it where it is for a person."""
+        """Write stops and warnings to the console."""
         if not isinstance(message, Event) or message.kind not in _TOLD:
             return
         stop = message.kind != "warning"
-        # After other stops it depends on what has happened since: check says.
+        # After other stops the next step depends on what has happened since, which `tvist check` reports.
         command = {"protective_stop": "unlock", "safety_stop": "check"}.get(message.kind)
         then = "" if command is None else f". Next: {self._command_line(command)}"
         what = _TOLD[message.kind]
         self._console.say(f"{self._name}: {what} at tick {message.tick}: {message.why}{then}", stop=stop)
 
     def close(self) -> None:
-        """Do nothing: the console is several robots'."""
+        """Do nothing, since several robots share the console."""
 
 
 _TOLD: dict[EventKind, str] = {

@@ -1,13 +1,13 @@
-"""What a server that others can reach needs: certificates and roles, or somebody who says that it does not.
+"""Access protection of a server that other machines can reach: certificates and roles, or an explicit `--insecure`.
 
-The folder named by `--security` holds, as `tvist keys` makes it,
+`tvist keys` fills the folder given as `--security` with
 
     authority.pem    certificate of the authority that signs all others
     robot.pem        the robot's certificate, and
     robot.key        its private key
-    clients.toml     role by name: "anna" = "operator"; who is left out is nobody
+    clients.toml     role by name: "anna" = "operator"; a client that is not listed has no access
 
-Both sides show a certificate (mutual TLS); the common name of the client's decides what it may do.
+Both sides show a certificate (mutual TLS); the common name in the client's certificate determines its role.
 """
 
 import contextlib
@@ -29,34 +29,34 @@ AUTHORITY, CERTIFICATE, KEY, CLIENTS = "authority.pem", "robot.pem", "robot.key"
 _LINE = 'a line is "NAME" = "operator" or "NAME" = "viewer"'
 
 HANDSHAKE_MS = 60_000
-"""How long a TLS handshake may take [ms]. Zenoh accepts nobody for 100 ms after each that fails (its issue 2685),
-so a hundred given up at once keep the next client waiting for 10 s: a handshake must outlast that. Ten a second
-is also all that can fail, so no more than 600 are under way."""
+"""Longest time for a TLS handshake [ms]. Zenoh accepts no client for 100 ms after each failed handshake (its issue
+2685), so a hundred that fail at once delay the next client by 10 s, and a handshake must outlast that. Since at most
+ten can fail per second, no more than 600 are in progress."""
 
 LIMITS: Mapping[str, Any] = {
-    # What a client may make the server put together of fragments; the gateway refuses what is above MAX_BYTES.
+    # Largest message that the server assembles from fragments; the gateway refuses messages above MAX_BYTES.
     "transport/link/rx/max_message_size": 2 * MAX_BYTES,
 }
-"""Of a session that others can reach: path to value."""
+"""Zenoh settings of a session that other machines can reach, by path."""
 
 
 class ExposureError(ValueError):
-    """The robot would be reachable in a way nobody asked for; the sentence says what to do."""
+    """The robot would be reachable in an unintended way; the message says what to do."""
 
 
 def guarded(
     listen: Sequence[str], robots: Sequence[str], *, security: str | None, insecure: bool
 ) -> tuple[list[str], dict[str, Any]]:
-    """Endpoints to listen on and the settings that guard them.
+    """Return the endpoints to listen on and the settings that protect them.
 
     Args:
-        listen: Endpoints asked for.
+        listen: Requested endpoints.
         robots: Names of the robots served there.
         security: Folder with certificates and roles.
-        insecure: Whether anybody may do anything.
+        insecure: Whether clients need no authentication.
 
     Raises:
-        ExposureError: Others could reach an endpoint and nothing guards it, or the folder is not complete.
+        ExposureError: Other machines could reach an unprotected endpoint, or the folder is incomplete.
     """
     if security is not None:
         if insecure:
@@ -65,40 +65,40 @@ def guarded(
     for endpoint in listen:
         if protocol(endpoint) in {"tls", "quic"} and not options(endpoint):
             raise ExposureError(
-                f"listen is {endpoint}, which needs certificates: add --security DIR (`tvist keys`)"
+                f"listen is {endpoint}, which needs certificates: add --security DIR (made by `tvist keys`)"
             )
     exposed = [endpoint for endpoint in listen if not is_local(endpoint)]
     if exposed and not insecure:
         raise ExposureError(
-            f"listen is {exposed[0]}, which others than this machine can reach: add --security DIR (made by "
-            "`tvist keys`) and listen on tls/…, or --insecure to let anybody there move the robot"
+            f"listen is {exposed[0]}, which other machines can reach: add --security DIR (made by `tvist keys`) and "
+            "listen on tls/…, or add --insecure to let anyone move the robot"
         )
     return list(listen), {**(LIMITS if exposed else {}), "access_control": open_access(robots)}
 
 
 def guarded_doors(address: str, *, insecure: bool) -> None:
-    """Refuse to open UR's interfaces, which know no certificates, where others reach them unasked.
+    """Refuse to open UR's interfaces, which cannot authenticate clients, where other machines would reach them.
 
     Args:
-        address: IP address they listen at.
-        insecure: Whether anybody may do anything.
+        address: IP address on which they listen.
+        insecure: Whether clients need no authentication.
 
     Raises:
-        ExposureError: Others could.
+        ExposureError: Other machines could reach them.
     """
     if not insecure and not ipaddress.ip_address(address).is_loopback:
         raise ExposureError(
-            f"ur_address is {address}, which others than this machine can reach, and UR's interfaces ask nobody who "
-            "he is: add --insecure to let anybody there move the robot"
+            f"ur_address is {address}, which other machines can reach, and UR's interfaces do not authenticate "
+            "clients: add --insecure to let anyone move the robot"
         )
 
 
 def roles_in(folder: Path) -> dict[str, Role]:
-    """Role by name, from `clients.toml`.
+    """Read the role of each client from `clients.toml`.
 
     Raises:
-        ExposureError: It cannot be read, or a role is none.
-        UserFileError: It is no file with a text of that size, or is nested too deeply.
+        ExposureError: The file cannot be read, or a role is invalid.
+        UserFileError: The file is not text, too large or nested too deeply.
     """
     path = folder / CLIENTS
     try:
@@ -106,23 +106,25 @@ def roles_in(folder: Path) -> dict[str, Role]:
     except OSError as error:
         raise ExposureError(f"{path}: {error.strerror}; `tvist keys` makes it") from error
     except tomllib.TOMLDecodeError as error:
-        raise ExposureError(f"{path}: it is no TOML: {error}; {_LINE}") from error
+        raise ExposureError(f"{path}: it is not valid TOML: {error}; {_LINE}") from error
     except ProtocolError as error:
         raise ExposureError(f"{path}: {error.why}; {_LINE}") from error
 
 
 def _secured(endpoint: str) -> str:
-    """An endpoint under `--security`.
+    """Check an endpoint for use with `--security`.
 
-    Another protocol is refused, not turned into TLS: what the server says and what clients type would then
-    not be what was asked for, and a client of tcp/ would meet a silence that explains nothing.
+    Another protocol is refused rather than converted to TLS: the server would otherwise listen on a different endpoint
+    than the one requested, and a client of tcp/ would get no answer and no explanation.
     """
     if protocol(endpoint) != "tls":
         address = endpoint.partition("/")[2] or "<address>:<port>"
-        raise ExposureError(f"listen is {endpoint}: with --security every endpoint is tls/, as tls/{address}")
+        raise ExposureError(
+            f"listen is {endpoint}: with --security every endpoint must be tls/, such as tls/{address}"
+        )
     if options(endpoint):
         raise ExposureError(
-            f"listen is {endpoint}: with --security nothing may stand behind #, it would go before it"
+            f"listen is {endpoint}: with --security no options may follow #, since they would override it"
         )
     return f"{endpoint}#tls_handshake_timeout_ms={HANDSHAKE_MS}"
 
@@ -131,7 +133,9 @@ def _settings(security: str, robots: Sequence[str]) -> dict[str, Any]:
     folder = Path(security).absolute()
     roles = roles_in(folder)
     if not roles:
-        raise ExposureError(f"{folder / CLIENTS} names nobody: `tvist keys {security} --operator NAME` does")
+        raise ExposureError(
+            f"{folder / CLIENTS} lists no clients: add one with `tvist keys {security} --operator NAME`"
+        )
     _check_pair(folder)
     return {
         "transport/link/tls/enable_mtls": True,
@@ -144,7 +148,7 @@ def _settings(security: str, robots: Sequence[str]) -> dict[str, Any]:
 
 
 def _check_pair(folder: Path) -> None:
-    """Shake hands with oneself, as a client will: Zenoh would say what is wrong in its own words, or to nobody."""
+    """Try a TLS handshake with itself, since Zenoh would not report clearly what is wrong with the files."""
     for name in (AUTHORITY, CERTIFICATE, KEY):
         try:
             read_bytes(folder / name, "certificate or key")
@@ -154,15 +158,13 @@ def _check_pair(folder: Path) -> None:
         server = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         server.load_cert_chain(folder / CERTIFICATE, folder / KEY)
         client = ssl.create_default_context(cafile=folder / AUTHORITY)
-        client.check_hostname = False  # clients do that: they know by which name they came
+        client.check_hostname = False  # only clients know the name by which they reach the robot
         _shake_hands(server, client)
     except ssl.SSLCertVerificationError as error:
         why = f"no client would trust {CERTIFICATE}: {error.verify_message}"
-        raise ExposureError(
-            f"{folder}: {why}; `tvist keys` makes another one once it is moved away"
-        ) from error
+        raise ExposureError(f"{folder}: {why}; move it away and run `tvist keys` again") from error
     except ssl.SSLError as error:
-        why = f"{AUTHORITY}, {CERTIFICATE} and {KEY} are no certificates and key that belong together"
+        why = f"{AUTHORITY}, {CERTIFICATE} and {KEY} do not belong together"
         raise ExposureError(f"{folder}: {why} ({error.reason or error})") from error
 
 

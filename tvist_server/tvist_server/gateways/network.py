@@ -26,7 +26,7 @@ CONFIG: Mapping[str, Any] = {
     # A state costs about 20 µs a subscriber: this many would use up the 2 ms of a tick several times.
     "transport/unicast/max_sessions": 256,
 }
-"""Of the session: path to value."""
+"""Zenoh settings of the session, by path."""
 REALTIME: Mapping[str, Any] = {
     # What the system holds for a client beyond that is dropped, not late: half a second of states. By itself it
     # holds 3 MB, and a client on a slow link gets states and answers of half a minute ago.
@@ -109,10 +109,10 @@ def _explain(error: zenoh.ZError, endpoints: str) -> str:
     """Zenoh's reason in one sentence, without the places in its sources where it passed."""
     cause = str(error)
     reasons = {
-        "Address already in use": "the port is in use: stop the server that has it or take another port",
-        "Cannot assign requested address": "this machine has no such address; 0.0.0.0 stands for all it has",
-        "Permission denied": "that is not permitted: take a port above 1023",
-        "failed to lookup": "there is no host of that name",
+        "Address already in use": "the port is in use: stop the server that uses it, or choose another port",
+        "Cannot assign requested address": "this machine does not have this address; use 0.0.0.0 for all its addresses",
+        "Permission denied": "that is not permitted: choose a port above 1023",
+        "failed to lookup": "there is no host of this name",
         "must be of the form": "an endpoint has the form tcp/<address>:<port>",
         "invalid port": "a port is a number up to 65535",
     }

@@ -75,7 +75,7 @@ class Recorder(Sink):
             raise RecordingError(f"queue_size is {queue_size}: must be at least 1")
         self.path = Path(path)
         self.place: Path | None = self.path
-        """Where the file is, as far as is known: `path`, unless it was moved away. After `close` it is where it was
+        """Place of the file, as far as is known: `path`, unless it was moved away. After `close` it is where it was
         at the end."""
         self.error: str | None = None
         """Why the recording stopped by itself, as a sentence."""
@@ -152,11 +152,13 @@ class Recorder(Sink):
         try:
             topic_of, first = topics(info.name), heading(info, start)
         except (TypeError, ValueError, TvistError) as error:
-            raise RecordingError(f"{self.path} cannot be begun: {error}") from error
+            raise RecordingError(f"{self.path} cannot be started: {error}") from error
         try:
             self._stream = self.path.open("wb" if overwrite else "xb")
         except FileExistsError:
-            raise RecordingError(f"{self.path} exists, and is not replaced unasked") from None
+            raise RecordingError(
+                f"{self.path} exists already and is not overwritten: choose another file"
+            ) from None
         except OSError as error:
             raise RecordingError(f"{self.path} cannot be written: {_reason(error)}") from error
         try:
@@ -195,7 +197,7 @@ class Recorder(Sink):
         """
         self.place = whereabouts(self.path, self._stream.fileno())
         if self.place != self.path and self._on_moved is not None:
-            where = "it goes on in that file" if self.place is None else f"it goes on in {self.place}"
+            where = "it continues in that file" if self.place is None else f"it continues in {self.place}"
             self._on_moved(f"the recording {self.path} was moved away: {where}")
             self._on_moved = None
 

@@ -12,7 +12,7 @@ def whereabouts(path: Path, descriptor: int) -> Path | None:
     """Where an open file is now.
 
     Args:
-        path: Where it was opened.
+        path: Path at which the file was opened.
         descriptor: It.
 
     Returns:

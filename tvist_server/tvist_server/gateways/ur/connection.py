@@ -27,7 +27,7 @@ HEARS = MOST_UNREAD // 4
 ANSWERS = MOST_UNREAD // 2
 """Where more waits, no more is taken of it, in real time, until it has read."""
 MOST_UNREAD_LOCKSTEP = 64_000_000
-"""The same in lockstep, where samples wait, too: a minute of them."""
+"""Limit in lockstep, where samples wait as well: a minute of them."""
 
 FIRST_WORD = 30.0
 """Time in which a client has to say something where it has to begin [s]."""
@@ -42,7 +42,7 @@ class Connection(asyncio.BufferedProtocol):
     Args:
         make: Its session.
         lease: Control for a host.
-        places: Of the robot; the connection takes one as long as it lives.
+        places: Places of the robot; the connection occupies one as long as it lives.
         notices: Tells the server's console what was done with whom.
         lossless: Whether samples wait for a client that is slow: where a client lets time pass.
     """
@@ -98,7 +98,7 @@ class Connection(asyncio.BufferedProtocol):
         self._guarded(self.session.opened)
 
     def get_buffer(self, sizehint: int) -> bytearray:  # noqa: ARG002  it is always the same
-        """Where the next piece goes."""
+        """Return the buffer for the next piece of data."""
         return self._piece
 
     def buffer_updated(self, nbytes: int) -> None:
@@ -148,12 +148,12 @@ class Connection(asyncio.BufferedProtocol):
         if self._first_word is not None:
             self._first_word.cancel()
         if self.dropped:
-            log.warning("a client of a UR door read too slowly: %d samples were dropped", self.dropped)
+            log.warning("a client of a UR interface read too slowly: %d samples were dropped", self.dropped)
         if session is not None:
             try:
                 session.closed()
             except Exception:
-                log.exception("a UR door could not close a session")
+                log.exception("a UR interface could not close a session")
             self._control.leave()
 
     def send(self, data: bytes) -> None:
@@ -162,7 +162,7 @@ class Connection(asyncio.BufferedProtocol):
         if transport is not None and not transport.is_closing():
             transport.write(data)
             if transport.get_write_buffer_size() > self._most_unread:
-                log.warning("a client of a UR door was cut off: it does not read")
+                log.warning("a client of a UR interface was disconnected because it does not read")
                 transport.abort()
 
     def tell(self, message: bytes) -> None:
@@ -179,7 +179,7 @@ class Connection(asyncio.BufferedProtocol):
         try:
             data = session.sample(snapshot)
         except Exception:
-            log.exception("a UR door failed, its client is cut off")
+            log.exception("a UR interface failed and disconnected its client")
             transport.abort()
             return
         if session.over:
@@ -225,7 +225,7 @@ class Connection(asyncio.BufferedProtocol):
         try:
             action()
         except Exception:
-            log.exception("a UR door failed, its client is cut off")
+            log.exception("a UR interface failed and disconnected its client")
             if self._transport is not None:
                 self._transport.abort()
 

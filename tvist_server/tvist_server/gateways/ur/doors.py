@@ -42,7 +42,7 @@ FIRST = 1000
 MOST_PENDING = 250
 """States that may wait for this thread: half a second."""
 LEAD = 20
-"""The same in lockstep: the further a step runs ahead of what clients are told, the later their answers come."""
+"""Largest lead in lockstep: the further a step runs ahead of what clients are told, the later their answers come."""
 PAUSE = 0.02
 """Time between two looks for room, in lockstep [s]."""
 
@@ -84,7 +84,7 @@ class UrDoors(Gateway):
         self._early = deque[State](maxlen=FIRST)
         """Those before the doors open: temperatures and energies begin with the first tick."""
         self._connections: set[Connection] = set()
-        """As their `Places` know them, while the doors are open."""
+        """Connections in their `Places` while the doors are open."""
         self._leases = WeakValueDictionary[str, HostLease]()
         """By host, as long as one of its connections lives."""
         self._lockstep = lockstep
@@ -276,8 +276,8 @@ def _listen(address: str, port: int, door: Door) -> socket.socket:
 
 def _reason(error: OSError) -> str:
     reasons = {
-        errno.EADDRINUSE: "the port is in use: stop what has it, or move the door with --ur-port",
-        errno.EADDRNOTAVAIL: "this machine has no such address; 127.0.0.1 to 127.255.255.254 are its own",
-        errno.EACCES: "that is not permitted: take a port above 1023",
+        errno.EADDRINUSE: "the port is in use: stop the program that uses it, or choose another port with --ur-port",
+        errno.EADDRNOTAVAIL: "this machine does not have this address; it has 127.0.0.1 to 127.255.255.254",
+        errno.EACCES: "that is not permitted: choose a port above 1023",
     }
     return reasons.get(error.errno or 0, error.strerror or str(error))

@@ -111,7 +111,7 @@ class ConnectionControl(Control):
     """One connection's way to the controller.
 
     Args:
-        lease: Of its host.
+        lease: Lease of the client's host.
         hear: Called with each answer, as a call to make.
         peer: Who the client is, for a person; its host where nothing else is said.
     """

@@ -6,7 +6,7 @@ from typing import Final, Generic, Protocol, TypeVar
 MOST: Final = 256
 """Connections to all doors of a robot together."""
 KEPT: Final = 8
-"""Of them, kept for clients on this machine: whoever sits at it gets in, however many others have come."""
+"""Number of places kept for clients on this machine, so that a local user can always connect."""
 SCARCE: Final = 0.9
 """Share of the places that may be taken before somebody has to go for each newcomer [-]."""
 
@@ -68,7 +68,7 @@ class Places(Generic[AnOccupant]):
         if len(self.taken) < self._most - kept:
             return True
         self._note(
-            f"{peer} was turned away: {len(self.taken)} of {self._most} places are taken"
+            f"{peer} was refused: {len(self.taken)} of {self._most} connections are in use"
             + (f", and {KEPT} are kept for this machine" if kept else "")
         )
         return False
@@ -86,5 +86,5 @@ class Places(Generic[AnOccupant]):
         self.taken.discard(silent)
         self._note(
             f"{silent.peer}, silent for {self._now() - silent.heard:.0f} s, was closed to make room for {newcomer}: "
-            f"{taken} of {self._most} places were taken"
+            f"{taken} of {self._most} connections were in use"
         )

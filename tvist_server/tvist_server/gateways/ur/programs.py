@@ -46,10 +46,10 @@ class Programs:
         self._host = host
         self._known = known
         self.path: str | None = None
-        """Of the loaded program; None before the first."""
+        """Path of the loaded program; None before the first."""
         self.state: ProgramState = "STOPPED"
         self._control: Control | None = None
-        """Of whoever plays it: it lasts as long as the program, its client may go."""
+        """Control of the client that plays the program; it lasts as long as the program, even without the client."""
 
     @property
     def name(self) -> str | None:
@@ -79,8 +79,8 @@ class Programs:
         """Load a program, and stop the one that runs.
 
         Args:
-            path: Of its file; folders before its name make no difference.
-            control: Of who loads it.
+            path: Path of the file; folders before its name make no difference.
+            control: Control of the client that loads it.
             heard: Called once.
         """
         name = PurePosixPath(path).name
@@ -98,7 +98,7 @@ class Programs:
         """Start the loaded program, or go on with a paused one.
 
         Args:
-            control: Of who plays it.
+            control: Control of the client that plays it.
             heard: Called once, as soon as it runs or cannot.
         """
         if self.path is None or control.held_by_other:
@@ -121,7 +121,7 @@ class Programs:
         """Hold the program that runs.
 
         Args:
-            control: Of who pauses it.
+            control: Control of the client that pauses it.
             heard: Called once.
         """
         if not self.playing or control.held_by_other:
@@ -133,7 +133,7 @@ class Programs:
         """End the program, and whatever moves: anyone may.
 
         Args:
-            control: Of who stops it.
+            control: Control of the client that stops it.
             heard: Called once.
         """
         command: Command = ProgramStop()

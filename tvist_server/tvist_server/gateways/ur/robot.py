@@ -37,7 +37,7 @@ class UrRobot:
         self.latest: Snapshot | None = None
         """The last tick; None before the first."""
         self.operational_mode = NO_MODE
-        """As the dashboard sets it."""
+        """Operational mode set by the dashboard."""
         self.inputs = InputOwners()
         self.programs = Programs(self, built_in(description))
         self._tell = tell

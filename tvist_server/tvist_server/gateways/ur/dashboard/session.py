@@ -43,7 +43,7 @@ class DashboardSession(Session):
         self._asked = 0
         """Commands begun."""
         self._answered = 0
-        """Of them, answered."""
+        """Number of commands answered."""
         self._working = False
         self._rested: Callable[[bool], None] | None = None
         """What waits until the arm rests."""
@@ -114,7 +114,7 @@ class DashboardSession(Session):
             command.carry_out(Request(self._robot, self._control, keyword, argument, answer, self._at_rest))
 
     def _at_rest(self, moves: bool, then: Callable[[bool], None]) -> None:
-        """As `AtRest` says: a program that was stopped may be played as soon as that is answered."""
+        """Call a function at rest, see `AtRest`: a stopped program may be played as soon as that is answered."""
         latest = self._robot.latest
         if latest is None or (latest.runtime_state == RuntimeState.STOPPED and not moves):
             then(True)

@@ -15,17 +15,17 @@ from tvist_server.gateways.ur.primary import messages
 
 ROBOT_STATE: Final = 16
 JOINTS: Final = 6
-"""Of the package; of an arm with fewer the others are 0."""
+"""Number of joints in a package; for an arm with fewer, the others are 0."""
 NOMINAL: Final = 0xFFFFFFFF
 """Checksum of kinematics that were not calibrated."""
 SUBTYPE: Final = 3
-"""Of an e-Series arm."""
+"""Robot subtype of an e-Series arm."""
 BOARD_TEMPERATURE: Final = 25.0
 """[°C]"""
 FULL_SPEED: Final = 1.0
 MOTION_DEFAULTS: Final = (1.0471975511965976, 1.3962634015954636, 0.25, 1.2, 0.25)
-"""Of a new program: joint velocity [rad/s] and acceleration [rad/s²], tool velocity [m/s] and acceleration [m/s²],
-and the radius that weighs turning against travel [m]."""
+"""Defaults of a new program: joint velocity [rad/s] and acceleration [rad/s²], tool velocity [m/s] and acceleration
+[m/s²], and the radius that weighs turning against travel [m]."""
 _TYPES: Final = {"UR5": 1, "UR10": 2, "UR3": 3, "UR16": 4, "UR20": 7, "UR30": 8}
 
 _PACKAGE = Struct(">iB")

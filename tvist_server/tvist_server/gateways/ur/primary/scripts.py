@@ -26,7 +26,7 @@ class Unit:
     """A line or a block, complete."""
 
     text: str
-    """As it was sent, lines ended by line feeds; of one that is too long, the beginning."""
+    """Text as it was sent, with lines ended by line feeds; only the beginning if it is too long."""
     line: int
     """Where its code begins, 1 the first line: comments may stand before it."""
     column: int
@@ -41,7 +41,7 @@ class Unit:
 
     @property
     def name(self) -> str | None:
-        """Of the program that it defines; None for others."""
+        """Name of the program that the script defines; None for others."""
         head = _HEAD.match(self._first)
         return None if head is None else head[1]
 
@@ -65,7 +65,7 @@ class Intake:
 
     def __init__(self) -> None:
         self._rest = bytearray()
-        """Of a line that is not complete."""
+        """Beginning of a line that is not yet complete."""
         self._unit = bytearray()
         """Lines of the unit that is not complete: as bytes, since a string a line takes twenty times as much."""
         self._depth = 0

@@ -36,7 +36,7 @@ class PrimarySession(Session):
         self._due = 0
         """Tick of the next robot state."""
         self._safety_mode: int | None = None
-        """As the client knows it; it is told of changes alone."""
+        """Safety mode that the client knows; it is told only of changes."""
 
     def opened(self) -> None:
         """Say what runs here; the first robot state follows with the next tick."""

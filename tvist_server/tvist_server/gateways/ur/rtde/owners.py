@@ -41,7 +41,7 @@ class Ledger:
         """Whether to ask for a value.
 
         Args:
-            key: Of the terminal or register.
+            key: Key of the terminal or register.
             value: Wanted.
             present: What the robot told last; None where it has told nothing.
         """

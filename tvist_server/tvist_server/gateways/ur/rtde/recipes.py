@@ -12,7 +12,7 @@ from tvist_server.gateways.ur.rtde.registers import EncodedRegisters
 from tvist_server.gateways.ur.rtde.wire import Wire
 
 Value = int | float | tuple[float, ...]
-"""Of an input variable."""
+"""Value of an input variable."""
 
 _SHARED = "rtde"
 
@@ -53,7 +53,7 @@ class OutputRecipe:
     """Variables that a client reads.
 
     Args:
-        names: Of output variables, as the client wrote them.
+        names: Names of output variables, as the client wrote them.
     """
 
     def __init__(self, names: tuple[str, ...]) -> None:
@@ -90,7 +90,7 @@ class InputRecipe:
     """Variables that a client writes.
 
     Args:
-        names: Of input variables, all of which exist.
+        names: Names of input variables, all of which exist.
     """
 
     def __init__(self, names: tuple[str, ...]) -> None:

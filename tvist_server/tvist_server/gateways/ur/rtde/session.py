@@ -18,7 +18,7 @@ from tvist_server.gateways.ur.rtde.recipes import InputRecipe, OutputRecipe, spl
 from tvist_server.gateways.ur.rtde.writing import InputWriter
 
 RATE = 500.0
-"""Of control periods, and the highest frequency of packages [Hz]."""
+"""Rate of control periods, and the highest frequency of packages [Hz]."""
 RECIPES = 255
 """Input recipes that a connection can number."""
 SENTENCES = 64
