@@ -61,7 +61,7 @@ class Ringing:
 
     @property
     def rms(self) -> float:
-        """rms of what is not constant, per axis [m/s^2]."""
+        """Return the rms of what is not constant, per axis [m/s^2]."""
         return float(np.sqrt(np.mean((self.force - self.force.mean(axis=0)) ** 2)))
 
 
