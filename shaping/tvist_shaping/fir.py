@@ -76,7 +76,7 @@ class FirDesign:
 
     @property
     def modes(self) -> int:
-        """How many."""
+        """Number of modes."""
         return len(self.spread)
 
     @property

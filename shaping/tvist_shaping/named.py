@@ -85,11 +85,11 @@ class Registry:
             raise UnknownShaperError(name, self.names(), near[0] if near else None)
 
     def modes_of(self, name: str, modes: int = 1) -> int:
-        """How many modes the filter of a name wants to know.
+        """Return the number of modes that the filter of a name needs.
 
         Args:
             name: Name of the filter.
-            modes: How many a shaper of impulses is to suppress; a design or a FIR filter has its own number.
+            modes: Number of modes that a shaper of impulses suppresses; a design or a FIR filter has its own number.
 
         Raises:
             UnknownShaperError: There is none of that name.

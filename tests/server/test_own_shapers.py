@@ -252,7 +252,7 @@ FAILING = {
     "raises": (divides, "raises ZeroDivisionError"),
     "exits": (exits, "raises SystemExit"),
     "NaN": (lambda _f_d, _zeta: Impulses(np.array([np.nan]), np.array([0.0])), "must be finite"),
-    "nothing": (lambda _f_d, _zeta: None, "gives NoneType"),
+    "nothing": (lambda _f_d, _zeta: None, "returns NoneType"),
     "sum": (lambda _f_d, _zeta: Impulses(np.array([2.0]), np.array([0.0])), "must sum to 1"),
     "too long": (lambda f_d, zeta: zv(1e-3 * f_d, zeta), "beyond"),
 }

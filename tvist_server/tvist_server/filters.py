@@ -1,4 +1,4 @@
-"""Which filter shapes, and where it has its modes from: changed on the line, and watched."""
+"""The filter of the line and the source of its modes: changes and supervision."""
 
 from tvist_protocol.commands import SetEstimator, SetShaper
 from tvist_protocol.values import Payload

@@ -46,7 +46,7 @@ class ModeSource:
 
     @property
     def most(self) -> int:
-        """How many modes it can give."""
+        """Largest number of modes that it can give."""
         if self.name == "modal":
             return self.description.joints + 2 * len(self.description.link_flexibility.links)
         return len(self.f_d) if self.name == "fixed" else 1

@@ -17,7 +17,7 @@ class FilterBasis(NamedTuple):
     name: str
     """Name of the present filter."""
     modes: int
-    """How many modes it works with."""
+    """Number of modes that it uses."""
     source: ModeSource
     """Where they come from."""
     declared: Payload

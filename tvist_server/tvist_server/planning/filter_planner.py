@@ -52,7 +52,7 @@ class FilterPlanner:
 
         Args:
             name: Name of the filter.
-            modes: How many modes it shall suppress.
+            modes: Number of modes to suppress.
             source: The estimator that was chosen.
             declared: What the controller believes that the arm carries.
             where: Field that the name comes from.

@@ -87,7 +87,7 @@ class Motion(Trajectory):
         """Position, velocity and acceleration of the joints at some moments of the whole motion at full speed.
 
         Args:
-            count: How many; each state has three arrays of shape (n,).
+            count: Number of states; each has three arrays of shape (n,).
         """
         for time in np.linspace(0.0, self.duration, count).tolist():
             x, xd, xdd = (np.array(values) for values in self._law.at(time))

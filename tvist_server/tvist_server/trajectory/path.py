@@ -113,15 +113,15 @@ class JointLine(Path):
     posture_of = None
 
     def states(self, x: Floats, xd: Floats, xdd: Floats) -> tuple[Floats, Floats, Floats]:
-        """Those of the parameter."""
+        """Return the states of the parameter unchanged."""
         return x, xd, xdd
 
     def planned(self, limits: Limits) -> Limits:
-        """Those of the joints."""
+        """Return the limits of the joints unchanged."""
         return limits
 
     def keeping(self, limits: Limits, velocity: float) -> Limits:  # noqa: ARG002  a straight line takes nothing
-        """Those of the joints."""
+        """Return the limits of the joints unchanged."""
         return limits
 
     def way(self, start: Floats, end: Floats) -> Way:

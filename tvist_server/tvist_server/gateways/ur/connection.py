@@ -70,7 +70,7 @@ class Connection(asyncio.BufferedProtocol):
         """What ends the connection of a client that says nothing."""
         self.session: Session | None = None
         self.peer = "a client"
-        """Who it is and which door it uses, for a person."""
+        """Name of the client and of the door it uses, for people."""
         self.heard = 0.0
         """When it last sent something, or came [s of the loop's clock]."""
         self.dropped = 0

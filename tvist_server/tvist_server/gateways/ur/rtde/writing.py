@@ -27,7 +27,7 @@ class InputWriter:
     what was never given a value is not set.
 
     Args:
-        robot: Whose inputs they are.
+        robot: Robot to write to.
         control: The way to it.
         complain: Takes sentences for the client.
     """
