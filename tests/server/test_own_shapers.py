@@ -164,7 +164,7 @@ class TestStart:
             from_mapping({"shaper": f"{file}:mine", "state": str(path)}, "configuration").setup()
 
     def test_one_that_cannot_be_loaded_is_a_wrong_configuration(self, file):
-        with pytest.raises(ConfigError, match="has no nobody"):
+        with pytest.raises(ConfigError, match="does not contain nobody"):
             from_mapping({"shaper": f"{file}:nobody"}, "configuration").setup()
 
     def test_one_that_lasts_too_long_for_this_robot_does_not_start(self, file):
