@@ -11,7 +11,7 @@ TvistError
     │   ├── StreamStoppedError   the robot ended the stream of set-points
     │   └── ProtectiveStopError  an unlocked robot stopped again at once
     ├── ArgumentError        an argument is no value of its kind; also a ValueError
-    ├── UnexpectedReplyError the answer is none of this protocol
+    ├── UnexpectedReplyError the answer is not one of this protocol
     └── MisuseError          called when it makes no sense
 """
 

@@ -111,7 +111,7 @@ class _Content:
         except _DAMAGE as error:
             self.damage = f"is damaged ({error or type(error).__name__})"
         except ProtocolError as error:
-            self.damage = f"holds what is none of ours ({error.why})"
+            self.damage = f"contains an invalid message ({error.why})"
 
     def file(self) -> RecordingFile:
         if self.robot is None:

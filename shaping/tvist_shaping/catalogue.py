@@ -82,7 +82,7 @@ def shaper(name: str) -> Shaper:
         The shaper.
 
     Raises:
-        UnknownShaperError: There is none of that name; it lists those there are and the nearest.
+        UnknownShaperError: There is no shaper of that name; the error lists all names and the most similar one.
     """
     try:
         return SHAPERS[name]

@@ -78,7 +78,7 @@ class Registry:
         """Check that there is a filter of a name.
 
         Raises:
-            UnknownShaperError: There is none; it lists those there are and the nearest.
+            UnknownShaperError: There is no shaper of that name; the error lists all names and the most similar one.
         """
         if name not in DESIGNS and name not in SHAPERS and name not in self.own:
             near = get_close_matches(name, self.names(), n=1)
@@ -92,7 +92,7 @@ class Registry:
             modes: Number of modes that a shaper of impulses suppresses; a design or a FIR filter has its own number.
 
         Raises:
-            UnknownShaperError: There is none of that name.
+            UnknownShaperError: There is no shaper of that name.
         """
         self.check(name)
         shaper = self.own.get(name)
@@ -109,7 +109,7 @@ class Registry:
             joints: Entries of a sample.
 
         Raises:
-            UnknownShaperError: There is none of that name.
+            UnknownShaperError: There is no shaper of that name.
             FilterError: Filter and estimator do not go together.
             ShaperFailureError: The function of an own shaper fails at once.
         """
