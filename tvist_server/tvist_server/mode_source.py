@@ -1,4 +1,4 @@
-"""Where a filter's modes come from: what makes an estimator for as many modes as a filter wants, and for a payload."""
+"""Source of a filter's modes: makes an estimator for any number of modes and for a payload."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -36,7 +36,7 @@ class Mistaken(Estimator):
 
     @property
     def modes(self) -> int:
-        """As many as the other's."""
+        """Number of modes, the same as the other's."""
         return self._right.modes
 
     @property

@@ -19,7 +19,7 @@ class FilterBasis(NamedTuple):
     modes: int
     """Number of modes that it uses."""
     source: ModeSource
-    """Where they come from."""
+    """Source of the modes."""
     declared: Payload
     """What the controller believes that the arm carries."""
 

@@ -13,7 +13,7 @@ from tvist_shaping.base import Filter
 from tvist_shaping.estimators.base import Estimator
 
 PlannedFilter = tuple[ModeSource, Filter]
-"""Where its modes come from, and the filter."""
+"""Source of the modes, and the filter."""
 
 
 class FilterPlanner:

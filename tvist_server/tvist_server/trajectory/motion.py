@@ -187,7 +187,7 @@ def quickest_motion(path: Path, limits: Limits, period: float, speed: float = 1.
     """The motion along a path from rest to rest that a double S makes of limits.
 
     Args:
-        path: Where to go.
+        path: Path of the motion.
         limits: That every joint is to keep.
         period: Tick [s].
         speed: Rate of its time against the clock's to start with [-].

@@ -1,4 +1,4 @@
-"""Where a planned motion goes, whatever the time it takes: joint positions as a function of a parameter."""
+"""Path of a planned motion, independent of time: joint positions as a function of a parameter."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -83,7 +83,7 @@ class Path(ABC):
 
         Args:
             start: Parameter, shape (m,) [rad].
-            end: Likewise.
+            end: Parameter at the end, shape (m,) [rad].
         """
 
     @property
@@ -106,8 +106,8 @@ class JointLine(Path):
     Its parameter is the posture itself, shape (n,): to shape the one is to shape the other.
 
     Args:
-        start: Joint positions, shape (n,) [rad].
-        end: Likewise.
+        start: Joint positions at the start, shape (n,) [rad].
+        end: Joint positions at the end, shape (n,) [rad].
     """
 
     posture_of = None
