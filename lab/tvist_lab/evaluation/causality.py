@@ -54,7 +54,10 @@ def _outputs(candidate: Candidate, task: Task) -> Floats | None:
 
 
 def _elsewhere(candidate: Candidate, task: Task, tick: int, sign: float) -> Task:
-    """Return the task with a reference that leaves the first one on a parabola after a tick."""
+    """Return the task with a reference that leaves the first one on a parabola after a tick.
+
+    A candidate that is told the target is still told that of the first reference.
+    """
     reference = task.reference.copy()
     late = PERIOD * np.arange(1, len(reference) - tick)
     reference[tick + 1 :] += sign * 0.5 * ELSEWHERE * late[:, None] ** 2
