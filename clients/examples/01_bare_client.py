@@ -45,7 +45,7 @@ def swing(t: float) -> float:
 
 
 def delay(reference: Sequence[float], target: Sequence[float], longest: int = 100) -> float:
-    """How many samples `target` lags behind `reference`: least squares, between samples by a parabola."""
+    """Return by how many samples `target` lags behind `reference`: least squares, between samples by a parabola."""
     n = range(longest, len(target))
     error = [sum((target[i] - reference[i - lag]) ** 2 for i in n) for lag in range(longest + 1)]
     best = min(range(1, longest), key=error.__getitem__)

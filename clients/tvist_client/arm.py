@@ -316,7 +316,7 @@ async def hold_control(
     Args:
         robot: Robot to control.
         transport: The robot's; the client is announced there first.
-        client: Who asks.
+        client: Name of the client.
         lease_s: How long control lasts without a sign of life [s].
     """
     check_client_name(client)

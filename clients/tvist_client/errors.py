@@ -4,14 +4,14 @@ TvistError
 ├── RefusedError             the robot refused a command, which changed nothing (of `tvist_protocol`)
 ├── ProtocolError            a value cannot be sent: no number, no name (of `tvist_protocol`)
 └── ClientError
-    ├── NotConnectedError    nobody answers; also a ConnectionError
+    ├── NotConnectedError    no server or robot answers; also a ConnectionError
     ├── AnswerTimeoutError   the robot is connected but does not answer; also a TimeoutError
     ├── StoppedError         the robot ended something, and told why in an event
     │   ├── MotionStoppedError   a motion ended before its target
     │   ├── StreamStoppedError   the robot ended the stream of set-points
     │   └── ProtectiveStopError  an unlocked robot stopped again at once
     ├── ArgumentError        an argument is no value of its kind; also a ValueError
-    ├── UnexpectedReplyError the answer is none of this protocol
+    ├── UnexpectedReplyError the answer is not one of this protocol
     └── MisuseError          called when it makes no sense
 """
 

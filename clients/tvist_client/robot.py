@@ -150,7 +150,7 @@ class Robot:
         """Every state from now on, once a tick; a slow reader loses the oldest, counted in `dropped`.
 
         Args:
-            buffer: How many may wait.
+            buffer: Number of messages that may wait.
         """
         return self._states.stream(buffer)
 
@@ -198,7 +198,7 @@ class Robot:
 
         Raises:
             RefusedError: The robot refused it, which changed nothing.
-            NotConnectedError: Nobody answers.
+            NotConnectedError: The robot does not answer.
             AnswerTimeoutError: No answer came in time.
             ProtocolError: The command holds what cannot be sent.
         """
@@ -226,7 +226,7 @@ class Robot:
         lease is kept alive in the background.
 
         Args:
-            client: Who asks: shown to others.
+            client: Name of this client, shown to others.
             lease_s: How long control lasts without a sign of life [s].
 
         Raises:
@@ -243,7 +243,7 @@ class Robot:
         In lockstep and free. It is another right than control, which another client may have meanwhile.
 
         Args:
-            client: Who asks: shown to others; its going gives the clock back at once.
+            client: Name of this client, shown to others; the clock is released when it disconnects.
 
         Raises:
             RefusedError: Another client holds the clock, whose name is in the sentence; or time passes by itself.
@@ -255,7 +255,7 @@ class Robot:
         """Let ticks pass: by steps in lockstep and free, by waiting in real time.
 
         Args:
-            ticks: How many control periods, at least 1.
+            ticks: Number of control periods, at least 1.
 
         Returns:
             The last tick that passed; its state has arrived.

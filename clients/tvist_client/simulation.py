@@ -52,7 +52,7 @@ class Simulation(Leased):
         Where this client holds the clock, too (`Robot.clock_control`), it steps by that right.
 
         Args:
-            ticks: How many control periods.
+            ticks: Number of control periods.
             setpoints: Set-points of a running stream, at most 1000, in order and one per tick; `Servo.step_through`
                 numbers them.
 

@@ -39,7 +39,7 @@ class Stepper:
         """Let ticks pass by one command; what other clients send meanwhile is carried out between them.
 
         Args:
-            ticks: How many control periods, 1 to 100000.
+            ticks: Number of control periods, 1 to 100000.
 
         Returns:
             The last tick that passed; its state has arrived. It is an earlier one where the clock was lost meanwhile.
@@ -59,9 +59,9 @@ async def hold_clock(robot: "Robot", transport: Transport, client: str) -> Async
     """Hold the clock for as long as the block lasts; see `Robot.clock_control`.
 
     Args:
-        robot: Whose time passes by the client's steps.
+        robot: Robot to step.
         transport: The robot's; the client is announced there first, so that its going gives the clock back.
-        client: Who asks.
+        client: Name of the client.
     """
     check_client_name(client)
     await transport.announce(client)
@@ -92,9 +92,9 @@ async def step(
     """Send one `simulation.step`, and wait for the state of its last tick.
 
     Args:
-        robot: Whose time passes.
+        robot: Robot to step.
         token: Token of the clock, or of the lease if no client holds the clock.
-        ticks: How many control periods, 1 to 100000.
+        ticks: Number of control periods, 1 to 100000.
         setpoints: Set-points of a running stream in order, one per tick.
         motion_token: Token of the lease, if there are set-points and `token` is that of the clock.
 

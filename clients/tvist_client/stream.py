@@ -17,7 +17,7 @@ class Stream(AsyncIterator[M], Generic[M]):
     never older than the buffer. It ends when the robot's connection is closed.
 
     Args:
-        size: How many messages may wait.
+        size: Number of messages that may wait.
     """
 
     def __init__(self, size: int) -> None:

@@ -14,7 +14,7 @@ from tvist_protocol.info import StopReason
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 
 CLIENT = "tvist unlock"
-"""Who asks for control."""
+"""Name of the client that takes control."""
 _WHAT_IT_FOUND: dict[str | None, str] = {
     SafetyMode.VIOLATION.name: "had found a violation",
     SafetyMode.FAULT.name: "had failed",
@@ -62,7 +62,7 @@ def unlock(
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
 
     Raises:
-        NotConnectedError: Nobody listens there, there is no such robot, or there are several and none was named.
+        NotConnectedError: No server listens there, there is no such robot, or there are several and no name was given.
         RefusedError: Another client has control.
     """
     return asyncio.run(_unlock(endpoint, name, security, power_on=power_on))

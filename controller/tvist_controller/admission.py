@@ -46,7 +46,7 @@ class Admitted(NamedTuple):
     session: str | None = None
     """Session of the client that it gives control or the clock to, where its going will be told."""
     client: str | None = None
-    """Who sent it, by its token or the name in it; None where it has neither."""
+    """Client that sent it, by its token or the name in it; None if it has neither."""
 
 
 def admit(data: bytes, lease: Lease | None, clock: ClockHold | None = None) -> Admitted | Refused:
@@ -56,8 +56,8 @@ def admit(data: bytes, lease: Lease | None, clock: ClockHold | None = None) -> A
 
     Args:
         data: The message.
-        lease: Who has control.
-        clock: Who holds the clock.
+        lease: Lease that gives control.
+        clock: Current hold of the clock.
     """
     try:
         if len(data) > EXPLAINED_BYTES:
@@ -77,8 +77,8 @@ def admit_command(
 
     Args:
         command: The command.
-        lease: Who has control.
-        clock: Who holds the clock.
+        lease: Lease that gives control.
+        clock: Current hold of the clock.
     """
     try:
         client = _authorize(command, lease, clock)
@@ -100,7 +100,7 @@ def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | 
 
     Args:
         data: The message.
-        lease: Who has control.
+        lease: Lease that gives control.
     """
     if lease is None or len(data) > EXPLAINED_BYTES:
         return None

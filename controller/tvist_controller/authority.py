@@ -1,4 +1,4 @@
-"""Who has control and who holds the clock, and what ends with that: the commands of both rights."""
+"""Control of the robot and of its clock: the commands of both rights, and what ends with them."""
 
 from collections.abc import Callable
 

@@ -59,7 +59,7 @@ class Faults:
         """Begin a fault.
 
         Args:
-            command: Which one.
+            command: Command that causes the fault.
             tick: The next one.
 
         Raises:

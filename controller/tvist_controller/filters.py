@@ -1,4 +1,4 @@
-"""Which filter shapes, and where it has its modes from: changed on the line, and watched."""
+"""The filter of the line and the source of its modes: changes and supervision."""
 
 from tvist_controller.calibrations import fits
 from tvist_controller.command_row import Call, Row

@@ -1,4 +1,4 @@
-"""Where a filter's modes come from: what makes an estimator for as many modes as a filter wants, and for a payload."""
+"""Source of a filter's modes: makes an estimator for any number of modes and for a payload."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -46,7 +46,7 @@ class ModeSource:
 
     @property
     def most(self) -> int:
-        """How many modes it can give."""
+        """Largest number of modes that it can give."""
         if self.name == "modal":
             return self.description.joints + 2 * len(self.description.link_flexibility.links)
         return len(self.f_d) if self.name == "fixed" else 1

@@ -9,7 +9,7 @@ from tvist_controller.trajectory import Motion
 PAUSE_SHARE = 0.95
 """Share of the acceleration that torque leaves on the way that a pause uses: the filter may add a little [-]."""
 LEAST_PAUSE = 0.2
-"""Where torque leaves less than this share of a motion's acceleration to a pause, the motion goes on to its end [-]."""
+"""Share of a motion's acceleration that torque must leave to a pause; otherwise the motion runs to its end [-]."""
 
 
 class Move:

@@ -1,4 +1,4 @@
-"""Which clients are there, by their liveliness tokens."""
+"""Presence of clients, by their liveliness tokens."""
 
 from tvist_controller.session import NoControlError
 

@@ -28,7 +28,7 @@ class SafetySystem:
     safeguard: bool = False
     """Whether a safeguard asks for a stop."""
     emergencies: set[Emergency] = field(default_factory=set)
-    """Whose emergency stops are pressed."""
+    """Emergency stops that are pressed."""
     latched: Latched | None = None
     """What it has found wrong, until it is restarted."""
 

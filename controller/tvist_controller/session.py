@@ -1,4 +1,4 @@
-"""Who may move the arm: control by lease. It knows no motion, network or clock: the time is an argument."""
+"""Control of the arm by lease. It knows no motion, network or clock: the time is an argument."""
 
 from dataclasses import dataclass, replace
 
@@ -43,7 +43,7 @@ def check_token(lease: Lease | None, token: str, where: str = "token") -> Lease:
         where: Field that holds it.
 
     Raises:
-        NoControlError: Nobody has control, or the token is another one's or an old one.
+        NoControlError: No client has control, or the token is another client's or an old one.
     """
     if lease is None:
         raise NoControlError("no_control", "no client has control: send take_control first", where)

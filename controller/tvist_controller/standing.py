@@ -11,11 +11,11 @@ class Standing(NamedTuple):
     """State of a controller between two ticks; a new one replaces it, so that any thread may read it."""
 
     lease: Lease | None
-    """Who has control."""
+    """Lease of the client that has control."""
     basis: Basis
     """What plans for commands depend on."""
     clock: ClockHold | None
-    """Who holds the clock."""
+    """Hold of the client that has the clock."""
 
     def sessions_of(self, client: str) -> set[str | None]:
         """Sessions with whose going a client loses control or the clock; empty where it has neither."""

@@ -1,4 +1,4 @@
-"""Who may let time pass, where it does not pass by itself: the holder of the clock, or else of the lease.
+"""The right to step time in lockstep: the holder of the clock has it, or else the holder of the lease.
 
 It knows no motion, network or clock.
 """
@@ -23,7 +23,7 @@ def check_clock_token(hold: ClockHold | None, token: str) -> ClockHold:
     """The hold of the clock that a token names.
 
     Raises:
-        NoControlError: Nobody holds the clock, or the token is another one's or an old one.
+        NoControlError: No client holds the clock, or the token is another client's or an old one.
     """
     if hold is None:
         raise NoControlError("no_control", "no client holds the clock: send take_clock first")

@@ -111,7 +111,7 @@ class _Content:
         except _DAMAGE as error:
             self.damage = f"is damaged ({error or type(error).__name__})"
         except ProtocolError as error:
-            self.damage = f"holds what is none of ours ({error.why})"
+            self.damage = f"contains an invalid message ({error.why})"
 
     def file(self) -> RecordingFile:
         if self.robot is None:
@@ -152,7 +152,7 @@ class _Content:
         if found is None or found["kind"] not in _KINDS or channel.message_encoding != "json":
             return
         if self.robot not in (None, found["robot"]):
-            raise self._error(f"holds several robots, {self.robot} and {found['robot']}")
+            raise self._error(f"contains several robots, {self.robot} and {found['robot']}")
         if found["kind"] == tag(State):
             self.robot = found["robot"]
         self.readers.setdefault(channel.id, (JsonReader(_KINDS[found["kind"]]), self.messages[found["kind"]]))

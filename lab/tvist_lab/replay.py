@@ -77,12 +77,10 @@ def replay_file(
     """
     if not content.start:  # a recording made from outside has an empty one
         raise ReplayError(
-            "the recording does not say how its robot started: only tvist serve --record writes that"
+            "the recording has no initial setup of its robot; only tvist serve --record writes it"
         )
     if (content.dropped or {}).get("journal"):
-        raise ReplayError(
-            "the recorder dropped messages of its journal: no equal run can be made of what is left"
-        )
+        raise ReplayError("the recorder dropped messages of the journal, so an equal run is not possible")
     used, notes = _used(content.start, own_shapers)
     setup = Setup.from_builtins(content.start, used)
     done = replay(setup, content.journal, content.states)
@@ -105,7 +103,7 @@ def _used(start: dict[str, Any], given: Sequence[OwnShaper]) -> tuple[list[OwnSh
         own = by_name.pop(one.name, None)
         if own is None:
             raise ReplayError(
-                f"the robot was served with the shaper {one.name} of {place}, which a recording does not hold: "
+                f"the robot was served with the shaper {one.name} of {place}, which the recording does not contain: "
                 f"give --shaper {place}, or where the file is now"
             )
         used.append(own)

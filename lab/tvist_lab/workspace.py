@@ -1,4 +1,4 @@
-"""Where a six-joint arm on a stand is measured and tried out."""
+"""Workspace in which a six-joint arm on a stand is measured and tested."""
 
 from dataclasses import dataclass
 

@@ -58,7 +58,7 @@ class _Fault:
 
 
 def explain_refusal(error: msgspec.ValidationError, data: bytes, types: Types) -> ProtocolError:
-    """Error of a message that is MessagePack, and is none of the expected messages.
+    """Return the error of a message that is valid MessagePack but not one of the expected messages.
 
     Args:
         error: What msgspec said.
@@ -97,7 +97,7 @@ def _explain(
 
 
 def explain_unknown_type(name: object, types: Types) -> ProtocolError:
-    """Error of a message whose `type` is none of the expected ones; the nearest of them are named."""
+    """Return the error of a message with an unexpected `type`; it names the most similar expected types."""
     near = list(types) if len(types) <= 3 else get_close_matches(str(name)[:SHOWN], types, n=3)
     return ProtocolError(
         "unknown_type", "type", f"type {quoted(name)} is unknown for this key{_suggest(near)}"

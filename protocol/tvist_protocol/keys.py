@@ -96,7 +96,7 @@ def client(robot: str, name: str, session: str = "") -> str:
         session: Zenoh's id of its session, which tells it from another one of that name; empty leaves it out.
 
     Raises:
-        ProtocolError: A name or the id is none; code `out_of_range`.
+        ProtocolError: A name or the id is invalid; code `out_of_range`.
     """
     key = f"{_key(robot, 'client')}/{check_client_name(name)}"
     return f"{key}/{_checked('session', session, _SESSION)}" if session else key

@@ -67,7 +67,7 @@ class Transition:
 
 
 class Control(StrEnum):
-    """Who may move the robot."""
+    """State of the right to move the robot."""
 
     FREE = "FREE"
     """No client has control; the next one that asks gets it."""

@@ -71,7 +71,7 @@ class Filter(ABC):
         self.excess, self.clipped, self.fault = 0.0, False, None
         self._line = DelayLine(joints, capacity)
         self._reach = capacity
-        """How many of the newest samples any weights may read."""
+        """Number of the newest samples that weights may use."""
         self._posture: Posture | None = None
         self._q_star: Floats = np.zeros(joints)
         """Shaped sample of the last tick."""

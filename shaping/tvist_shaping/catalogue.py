@@ -23,7 +23,9 @@ SHAPERS: Mapping[str, Shaper] = MappingProxyType(
                 peak=3.0,
             ),
             Shaper("zv", "zero vibration: the shortest that keeps the limits, the paper's", impulses.zv, 0.5),
-            Shaper("mzv", "modified zero vibration: a little longer, a little wider", impulses.mzv, 0.75),
+            Shaper(
+                "mzv", "modified zero vibration: slightly longer and more robust than zv", impulses.mzv, 0.75
+            ),
             Shaper(
                 "um_zvd",
                 "unity magnitude: shorter than zvd, up to 5 times the acceleration",
@@ -32,32 +34,34 @@ SHAPERS: Mapping[str, Shaper] = MappingProxyType(
                 unity.UM_ZVD.zeta_max,
                 peak=5.0,
             ),
-            Shaper("zvd", "zero vibration and derivative: forgives 14 % of frequency", impulses.zvd, 1.0),
-            Shaper("ei", "extra-insensitive: as long as zvd, forgives 20 %", impulses.ei, 1.0),
+            Shaper(
+                "zvd", "zero vibration and derivative: tolerates frequency errors of 14 %", impulses.zvd, 1.0
+            ),
+            Shaper("ei", "extra-insensitive: as long as zvd, tolerates 20 %", impulses.ei, 1.0),
             Shaper(
                 "ei_exact",
-                "ei with 5 % at f_d whatever the damping: forgives more there",
+                "ei with 5 % at f_d for any damping: more robust there",
                 exact.ei_exact,
                 exact.EI.duration_periods,
                 exact.EI.zeta_max,
             ),
             si_of(
-                0.75, 1.25, name="si", description="specified insensitivity: the shortest that forgives 25 %"
+                0.75, 1.25, name="si", description="specified insensitivity: the shortest that tolerates 25 %"
             ),
-            Shaper("zvdd", "zero vibration and two derivatives: forgives 24 %", impulses.zvdd, 1.5),
-            Shaper("ei2", "two-hump extra-insensitive: forgives 36 %", impulses.ei2, 1.5),
+            Shaper("zvdd", "zero vibration and two derivatives: tolerates 24 %", impulses.zvdd, 1.5),
+            Shaper("ei2", "two-hump extra-insensitive: tolerates 36 %", impulses.ei2, 1.5),
             Shaper(
                 "ei2_exact",
-                "ei2 with humps of 5 % whatever the damping",
+                "ei2 with humps of 5 % for any damping",
                 exact.ei2_exact,
                 exact.EI2.duration_periods,
                 exact.EI2.zeta_max,
             ),
-            Shaper("zvddd", "zero vibration and three derivatives: forgives 31 %", impulses.zvddd, 2.0),
-            Shaper("ei3", "three-hump extra-insensitive: forgives 48 %", impulses.ei3, 2.0),
+            Shaper("zvddd", "zero vibration and three derivatives: tolerates 31 %", impulses.zvddd, 2.0),
+            Shaper("ei3", "three-hump extra-insensitive: tolerates 48 %", impulses.ei3, 2.0),
             Shaper(
                 "ei3_exact",
-                "ei3 with humps of 5 % whatever the damping",
+                "ei3 with humps of 5 % for any damping",
                 exact.ei3_exact,
                 exact.EI3.duration_periods,
                 exact.EI3.zeta_max,
@@ -78,7 +82,7 @@ def shaper(name: str) -> Shaper:
         The shaper.
 
     Raises:
-        UnknownShaperError: There is none of that name; it lists those there are and the nearest.
+        UnknownShaperError: There is no shaper of that name; the error lists all names and the most similar one.
     """
     try:
         return SHAPERS[name]

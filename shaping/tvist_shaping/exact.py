@@ -36,7 +36,7 @@ class HumpShaper:
         """Set up the shaper.
 
         Args:
-            humps: How many, at least 1.
+            humps: Number of humps, at least 1.
             V: Their height [-].
 
         Raises:

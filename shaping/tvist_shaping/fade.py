@@ -31,7 +31,7 @@ NEGLIGIBLE = 1e-10
 ROUNDING = 1e-7
 """Share of the acceleration limit that the step from almost 1 to 1 may add [-]."""
 EQUAL = 1e-6
-"""Difference of two mean delays that is none [s]."""
+"""Difference of two mean delays that counts as zero [s]."""
 STRAIGHT = 1e-6
 """Share of the farthest a joint may go in a tick by which it may be off the straight line of the others [-]."""
 QUICKEST = 0.3

@@ -30,7 +30,7 @@ ENERGY = 0.01
 STEPS = 60
 """Newton steps before it begins anew from cold."""
 SOLVED = 1e-9
-"""Residual of the dual's gradient that is none [-]."""
+"""Residual of the dual's gradient that counts as zero [-]."""
 SCALE = 0.03
 """Scale of the mean delay's row, so that all rows have the same magnitude [s]."""
 QUICKEST = 0.15
@@ -76,7 +76,7 @@ class FirDesign:
 
     @property
     def modes(self) -> int:
-        """How many."""
+        """Number of modes."""
         return len(self.spread)
 
     @property

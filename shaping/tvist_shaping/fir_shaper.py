@@ -30,7 +30,7 @@ class FirShaper:
         function: (f_d [Hz], ζ [-]), each of shape (modes,), the lowest mode first -> weights h_n of the samples of n
             ticks ago [-], shape (N,) with N at most `taps`, sum 1.
         taps: Largest number of taps, 1 to 500.
-        modes: How many modes the function is told, 1 to 8.
+        modes: Number of modes passed to the function, 1 to 8.
         peak: Σ|h_n| at the most, by which it may exceed its reference's velocity and acceleration; 1 where no tap is
             negative [-].
         period: Tick [s].

@@ -42,7 +42,7 @@ def ei_of(
     """Extra-insensitive shaper with humps of another height, or more of them.
 
     Args:
-        humps: How many, 1 to 10; it lasts (humps + 1)/2 periods.
+        humps: Number of humps, 1 to 10; the shaper lasts (humps + 1)/2 periods.
         V: Their height, the residual vibration allowed [-], 1e-4 to 0.5.
         exact: Whether the humps are to be of that height with damping too, see `tvist_shaping.exact`; its
             damping is then limited, the more the higher and the more the humps. Otherwise they are lower.

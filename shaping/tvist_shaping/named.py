@@ -78,21 +78,21 @@ class Registry:
         """Check that there is a filter of a name.
 
         Raises:
-            UnknownShaperError: There is none; it lists those there are and the nearest.
+            UnknownShaperError: There is no shaper of that name; the error lists all names and the most similar one.
         """
         if name not in DESIGNS and name not in SHAPERS and name not in self.own:
             near = get_close_matches(name, self.names(), n=1)
             raise UnknownShaperError(name, self.names(), near[0] if near else None)
 
     def modes_of(self, name: str, modes: int = 1) -> int:
-        """How many modes the filter of a name wants to know.
+        """Return the number of modes that the filter of a name needs.
 
         Args:
             name: Name of the filter.
-            modes: How many a shaper of impulses is to suppress; a design or a FIR filter has its own number.
+            modes: Number of modes that a shaper of impulses suppresses; a design or a FIR filter has its own number.
 
         Raises:
-            UnknownShaperError: There is none of that name.
+            UnknownShaperError: There is no shaper of that name.
         """
         self.check(name)
         shaper = self.own.get(name)
@@ -109,7 +109,7 @@ class Registry:
             joints: Entries of a sample.
 
         Raises:
-            UnknownShaperError: There is none of that name.
+            UnknownShaperError: There is no shaper of that name.
             FilterError: Filter and estimator do not go together.
             ShaperFailureError: The function of an own shaper fails at once.
         """

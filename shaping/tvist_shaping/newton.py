@@ -12,7 +12,7 @@ STEP = 1e-7
 FARTHEST = 0.2
 """No unknown changes by more in one step [-]."""
 SOLVED = 1e-12
-"""Largest residual of an equation that is none [-]."""
+"""Largest residual of an equation that counts as zero [-]."""
 
 
 def solve(equations: Callable[[Floats], Floats], start: Floats) -> Floats:

@@ -40,7 +40,7 @@ class Design(ABC):
     modes: int
     """Modes it wants to know."""
     taps: int
-    """How many it gives."""
+    """Number of taps."""
     period: float
     """Tick [s]."""
     peak: float = 1.0
@@ -83,7 +83,7 @@ class ProductDesign(Design):
 
         Args:
             mean_delay: The longest that the product has anywhere where the arm goes [s], > 0.
-            modes: How many modes, 1 to 6.
+            modes: Number of modes, 1 to 6.
             longest: Longest delay of an impulse that is not clipped [s].
             period: Tick [s], > 0.
 

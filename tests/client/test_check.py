@@ -45,7 +45,7 @@ def test_a_person_reads_a_line_a_step(realtime, endpoint, capsys):
 
 def test_nobody_there_is_a_failure_that_says_what_to_check(endpoint, capsys):
     assert main(["check", endpoint]) == 1
-    assert "check that the server runs" in capsys.readouterr().out
+    assert "check that it is running" in capsys.readouterr().out
     assert main(["check", endpoint, "--json"]) == 1
     assert json.loads(capsys.readouterr().out)["protocol"] is None
 
@@ -66,7 +66,7 @@ def test_a_name_that_is_none_is_a_failure(capsys):
 @pytest.mark.parametrize(
     ("answer", "sentence"),
     [
-        (Done(), "does not guard control"),
+        (Done(), "does not check control"),
         (Refused(code="busy", where="", why="not now"), "busy: not now"),
     ],
 )

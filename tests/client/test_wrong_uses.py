@@ -96,9 +96,9 @@ async def test_a_wrong_command_is_a_sentence_and_the_arm_stays_under_control(rob
 
 SETPOINTS = {
     "five angles": (Q1[:5], r"q has 5 angles; this arm has 6 joints", "q", 6),
-    "NaN": ((math.nan, *Q1[1:]), r"q\[0\] is nan: an angle is a finite number", "q[0]", None),
+    "NaN": ((math.nan, *Q1[1:]), r"q\[0\] is nan: must be a finite number", "q[0]", None),
     "infinity": ((*Q1[:5], -math.inf), r"q\[5\] is -inf", "q[5]", None),
-    "out of range": ((0, 7, *Q1[2:]), r"q\[1\] is 7 rad; joint shoulder goes from -6.2", "q[1]", 2 * math.pi),
+    "out of range": ((0, 7, *Q1[2:]), r"q\[1\] is 7 rad; joint shoulder allows -6.2", "q[1]", 2 * math.pi),
     "text": ("Q1", r"q is 'Q1': must be a list", "q", None),
 }  # fmt: skip
 

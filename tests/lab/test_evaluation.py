@@ -90,7 +90,7 @@ class TestFiles:
             ([{"start": HOME, "target": but(0, 1.0), "payload": -1}], ["move 1", "payload", "0"]),
             (
                 [{"start": HOME, "target": but(0, 1.0)}, {"start": HOME, "target": HOME}],
-                ["move 2", "nowhere"],
+                ["move 2", "is too short"],
             ),
             ([{"start": HOME, "target": HOME[:5]}], ["move 1", "target", "5 angles", "6 joints"]),
             ([{"start": HOME, "target": but(2, 9.0)}], ["move 1", "target", "joint 3", "elbow", "±6.28319"]),

@@ -235,7 +235,7 @@ def test_a_message_that_is_none_ends_what_can_be_read(path):
     found = read(foreign(path, messages=[to_json(STATE), b'{"type":"state"}', to_json(STATE)]))
     assert len(found.states) == 1
     assert not found.complete
-    assert "is no state" in found.note
+    assert "is not a valid state" in found.note
 
 
 def test_two_robots_in_one_file_are_refused(path):

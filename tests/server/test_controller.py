@@ -512,7 +512,7 @@ def test_a_lease_that_runs_out_in_mid_motion_stops_the_arm():
         ("lease_lost", None, 501),
         ("motion_stopped", motion, 501),
     ]
-    assert "ran out" in robot.events[-1].why
+    assert "expired" in robot.events[-1].why
     stopped_within_limits(robot)
     assert robot.send(c.KeepAlive).code == "no_control"
     assert robot.send(c.TakeControl, client="b").token

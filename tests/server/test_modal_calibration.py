@@ -90,9 +90,9 @@ def test_a_parameter_that_is_missing_or_said_twice_is_refused_by_name(calibratio
 def test_a_calibration_without_any_model_is_refused():
     content = msgspec.to_builtins(load("ur5e_5kg"))
     del content["polynomial"]
-    with pytest.raises(ProtocolError, match="neither polynomial nor modal"):
+    with pytest.raises(ProtocolError, match="polynomial and modal are both missing"):
         calibration_of(content)
-    with pytest.raises(CalibrationError, match="neither polynomial nor modal"):
+    with pytest.raises(CalibrationError, match="polynomial and modal are both missing"):
         calibration_from_json(msgspec.json.encode(content))
 
 

@@ -164,7 +164,7 @@ class TestStart:
             from_mapping({"shaper": f"{file}:mine", "state": str(path)}, "configuration").setup()
 
     def test_one_that_cannot_be_loaded_is_a_wrong_configuration(self, file):
-        with pytest.raises(ConfigError, match="has no nobody"):
+        with pytest.raises(ConfigError, match="does not contain nobody"):
             from_mapping({"shaper": f"{file}:nobody"}, "configuration").setup()
 
     def test_one_that_lasts_too_long_for_this_robot_does_not_start(self, file):
@@ -252,7 +252,7 @@ FAILING = {
     "raises": (divides, "raises ZeroDivisionError"),
     "exits": (exits, "raises SystemExit"),
     "NaN": (lambda _f_d, _zeta: Impulses(np.array([np.nan]), np.array([0.0])), "must be finite"),
-    "nothing": (lambda _f_d, _zeta: None, "gives NoneType"),
+    "nothing": (lambda _f_d, _zeta: None, "returns NoneType"),
     "sum": (lambda _f_d, _zeta: Impulses(np.array([2.0]), np.array([0.0])), "must sum to 1"),
     "too long": (lambda f_d, zeta: zv(1e-3 * f_d, zeta), "beyond"),
 }

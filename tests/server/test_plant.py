@@ -124,7 +124,7 @@ def test_true_modes_that_the_plant_does_not_know_are_empty():
     ("field", "value", "said"),
     [
         ("q", np.zeros(5), r"measured q has shape \(5,\): its shape must be \(6,\)"),
-        ("qd", [0.0] * 6, "measured qd is no array"),
+        ("qd", [0.0] * 6, "measured qd is not an array"),
         ("moment", np.zeros((6, 1)), "measured moment has shape"),
         ("accelerometer", np.zeros(6), r"must be \(3,\)"),
     ],

@@ -266,7 +266,7 @@ def test_a_client_that_left_before_its_reply_disturbs_nobody(gateway, desk, sess
         ("nonsense", "an endpoint has the form tcp/<address>:<port>"),
         ("tcp/127.0.0.1:99999", "a port is a number up to 65535"),
         ("tcp/nowhere.invalid:7447", "there is no host of this name"),
-        ("tcp/192.0.2.1:7447", "no such address"),
+        ("tcp/192.0.2.1:7447", "does not have this address"),
     ],
 )
 def test_an_endpoint_that_cannot_be_listened_on_is_one_clear_sentence(endpoint, sentence):

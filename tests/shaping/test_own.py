@@ -57,14 +57,14 @@ WRONG = {
     "shapes": (bare([1.0], [0.0, 0.1]), "must be (N,)"),
     "times": (bare([0.5, 0.5], [0.1, 0.2]), "must ascend from 0"),
     "list": (lambda _f_d, _zeta: [0.5, 0.5], "returns list instead of Impulses"),
-    "nothing": (lambda _f_d, _zeta: None, "gives NoneType"),
+    "nothing": (lambda _f_d, _zeta: None, "returns NoneType"),
 }
 WRONG_TAPS = {
     "raises": (fails, "raises ZeroDivisionError"),
     "NaN": (lambda _f_d, _zeta: [np.nan, 1.0], "not finite"),
     "sum": (lambda _f_d, _zeta: [0.5, 0.4], "sum to 0.9"),
     "shape": (lambda _f_d, _zeta: [[1.0]], "shape (1, 1)"),
-    "many": (lambda _f_d, _zeta: np.full(21, 1 / 21), "must give 1 to 20"),
+    "many": (lambda _f_d, _zeta: np.full(21, 1 / 21), "must return 1 to 20"),
     "none": (lambda _f_d, _zeta: [], "shape (0,)"),
     "peak": (lambda _f_d, _zeta: [2.0, -1.0], "sum to 3, more than its peak of 1"),
     "words": (lambda _f_d, _zeta: "taps", "raises ValueError"),

@@ -388,7 +388,7 @@ def test_misuse_is_exit_code_2_and_a_sentence_that_names_it(arguments, named):
 )
 def test_nobody_there_is_exit_code_1_and_a_sentence(arguments, tmp_path):
     endpoint = free_endpoint()
-    assert tvist(*arguments, endpoint, cwd=tmp_path).assert_failed(1, "nobody answers", endpoint).out == ""
+    assert tvist(*arguments, endpoint, cwd=tmp_path).assert_failed(1, "no server answers", endpoint).out == ""
     assert list(tmp_path.iterdir()) == []
 
 

@@ -218,7 +218,7 @@ class TestProgram:
         with Served("--security", str(ring), endpoint=free_tls_endpoint()) as served:
             yield served.endpoint, ring
 
-    @pytest.mark.parametrize(("name", "said"), [("anna", "no_control"), ("wall", "viewer's")])
+    @pytest.mark.parametrize(("name", "said"), [("anna", "no_control"), ("wall", "the role viewer")])
     def test_check(self, robot, name, said, capsys):
         endpoint, ring = robot
         ended = tvist("check", endpoint, "--security", ring / name)
@@ -249,7 +249,7 @@ class TestProgram:
 
     def test_an_endpoint_and_keys_that_do_not_go_together(self, robot, tmp_path):
         endpoint, ring = robot
-        failed(tvist("check", endpoint), 1, endpoint, "name the folder")
+        failed(tvist("check", endpoint), 1, endpoint, "give its folder")
         plain = endpoint.replace("tls/", "tcp/")
         failed(tvist("check", plain, "--security", ring / "anna"), 1, plain, "tls/<host>:<port>")
         failed(tvist("check", endpoint, "--security", tmp_path), 1, str(tmp_path), "tvist keys")

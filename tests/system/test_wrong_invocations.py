@@ -127,14 +127,14 @@ def test_misuse_is_a_sentence_and_exit_code_2(tvist, arguments, words):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("move", "-0.5,-3,0,0,0,0", "--endpoint", NOWHERE), ["nobody answers", NOWHERE, "tvist serve"]),
+        (("move", "-0.5,-3,0,0,0,0", "--endpoint", NOWHERE), ["no server answers", NOWHERE, "tvist serve"]),
         (("move", "q1", "--endpoint", "localhost"), ["'localhost'", "tcp/<host>:<port>"]),
         (("move", "Q1", "--endpoint", "tcp/127.0.0.1:99999"), ["1 to 65535"]),
         (("watch", ""), ["''", "tcp/<host>:<port>"]),
         (("check", "tls/127.0.0.1:7447"), ["certificate"]),
         (("check", NOWHERE, "--security", "nope"), ["tls/<host>:<port>"]),
         (("check", "tls/127.0.0.1:7447", "--security", "nope"), ["nope", "tvist keys"]),
-        (("record", "x.mcap", "--endpoint", NOWHERE), ["nobody answers"]),
+        (("record", "x.mcap", "--endpoint", NOWHERE), ["no server answers"]),
         (("analyze", "."), [".", "directory"]),
         (("serve", "--state", "."), ["state .", "directory"]),
         (("serve", "--robot", "."), ["robot file .", "directory"]),
@@ -153,20 +153,20 @@ FILES = [
     ("--config", "x.toml", "payload = true", ["payload must be a number", "not a boolean"]),
     ("--config", "x.toml", "clock = 'never'", ["clock is 'never'", "'lockstep'"]),
     ("--config", "x.toml", "shapr = 'zv'", ["'shapr'", "did you mean 'shaper'?"]),
-    ("--config", "x.toml", "payload =", ["no TOML", "end of document"]),
+    ("--config", "x.toml", "payload =", ["not valid TOML", "end of document"]),
     ("--config", "x.toml", "ur_ports = {rtde = 70000}", ["ur_ports.rtde is 70000", "65535"]),
-    ("--state", "x.json", '{"q": [1, 2', ["no JSON", "line 1"]),
+    ("--state", "x.json", '{"q": [1, 2', ["not valid JSON", "line 1"]),
     ("--state", "x.json", '{"q": [NaN]}', ["NaN"]),
     ("--state", "x.json", '{"q": [1, "two"]}', ["q[1] must be a number", "not a string"]),
     ("--state", "x.toml", "mode = 'DANCING'", ["mode is 'DANCING'", "'POWER_OFF'"]),
     ("--state", "x.toml", "payload = {mass = 1}", ["payload.com is missing"]),
     ("--state", "x.toml", "payload = {mass = 1, com = [0, 0]}", ["com has 2 entries", "3"]),
     ("--robot", "x.toml", "[robot]\nname = 3", ["robot.name", "text"]),
-    ("--robot", "x.toml", "colour = 'red'", ["colour is no key"]),
+    ("--robot", "x.toml", "colour = 'red'", ["colour is not a key"]),
     ("--robot", "x.toml", "[limits]\npayload = 5", ["missing"]),
     ("--calibration", "x.json", "{}", ["is missing"]),
     ("--calibration", "x.json", "[1]", ["must be a map", "not a list"]),
-    ("--calibration", "x.json", "hello", ["no JSON"]),
+    ("--calibration", "x.json", "hello", ["not valid JSON"]),
 ]  # fmt: skip
 
 
@@ -183,7 +183,7 @@ def test_a_wrong_file_is_a_sentence_with_file_key_value_and_what_is_allowed(
     [
         ('anna = "king"', ["anna is 'king'", "'operator'"]),
         ("anna = 3", ["anna must be a string", "'NAME' = 'operator'".replace("'", '"')]),
-        ("anna", ["no TOML"]),
+        ("anna", ["not valid TOML"]),
     ],
 )
 def test_a_wrong_line_of_the_roles_is_named(tvist, tmp_path, line, words):

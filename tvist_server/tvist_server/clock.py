@@ -1,4 +1,4 @@
-"""Who lets time pass for served robots: the wall clock, or a client's steps.
+"""Clocks of served robots: the wall clock, or a client's steps.
 
 Either way one thread owns a controller; jobs from elsewhere reach it through a queue.
 """
@@ -50,7 +50,7 @@ class Driven:
 
         Args:
             do: What is to be done.
-            client: Who sent it, where that is known.
+            client: Client that sent it, if known.
         """
         self.jobs.post(do, client)
 
@@ -64,7 +64,7 @@ class Clock(ABC):
     """A thread that runs jobs and ticks.
 
     Args:
-        robots: Whose.
+        robots: Robots to tick.
     """
 
     def __init__(self, robots: Sequence[Driven]) -> None:
@@ -131,7 +131,7 @@ class Realtime(Clock):
     """Ticks at every period of the monotonic clock, for all robots in one thread, by a `Schedule`.
 
     Args:
-        robots: Whose.
+        robots: Robots to tick.
         hand_on: Called after ticks, to hand on what the robots said.
         period: Tick [s].
         speed: Simulation speed relative to real time [-].

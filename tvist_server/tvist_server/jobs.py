@@ -30,7 +30,7 @@ class Jobs:
 
         Args:
             do: What is to be done.
-            client: Who sent it; None where nobody can tell, or nobody did.
+            client: Client that sent it; None if it is unknown or there is none.
         """
         self._new.put(_Job(do, client))
 

@@ -1,4 +1,4 @@
-"""Where a robot's messages arrive, in threads of the network's."""
+"""Reception of a robot's messages, in threads of the network."""
 
 import threading
 from collections.abc import Callable

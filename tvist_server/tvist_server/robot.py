@@ -58,7 +58,7 @@ class ServedRobot:
         self._plan_ahead = None if lockstep else PlanAhead(self._host, Planner(setup), self.driven.post)
         carry_out = self._carry_out if self._plan_ahead is None else self._plan_ahead.submit
         self.reception = Reception(self._host, self.driven.post, carry_out, self._outlet.answer)
-        """Where gateways hand in what arrives."""
+        """Reception that gateways pass messages to."""
         self._gateways: Sequence[Gateway] = ()
 
     def open(self, gateways: Sequence[Gateway], wake: Callable[[], None] | None = None) -> None:

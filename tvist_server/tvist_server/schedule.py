@@ -18,7 +18,7 @@ class Schedule:
     after a week they are still on time.
 
     Args:
-        robots: How many.
+        robots: Number of robots.
         period: Period of each robot's ticks [s].
         start: Now; the first tick is due a period later [s].
     """

@@ -49,8 +49,8 @@ def serve(
         robots: Serve several robots, given as ROBOT[*COUNT] separated by commas: ur5e*2,other.toml serves ur5e-1,
             ur5e-2 and other. Replaces --name and --robot.
         listen: Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447].
-        security: Folder made by tvist keys. The endpoint is then tls/ADDRESS:PORT, and clients without a role are
-            refused.
+        security: Folder made by tvist keys. The endpoint is then tls/ADDRESS:PORT, and clients without a role have no
+            access.
         insecure: Accept remote connections without TLS and do not authenticate clients; anyone can move the robot.
         payload: Mass of the disc on the flange in kg, both carried and declared to the controller [5].
         overload: Start even if the payload exceeds the robot's rating. The drives may not hold it; the robot then makes

@@ -22,7 +22,7 @@ class Transport(ABC):
             timeout_s: How long the robot may take [s].
 
         Raises:
-            NotConnectedError: Nobody answers, or the robot went away while it was waited for.
+            NotConnectedError: The robot does not answer, or disconnected meanwhile.
             AnswerTimeoutError: The answer took longer than `timeout_s`.
         """
 

@@ -33,7 +33,7 @@ def open_session(endpoint: str, security: Folder | None = None) -> zenoh.Session
         security: Folder with the client's certificate, where the server asks for one.
 
     Raises:
-        NotConnectedError: Nobody listens there, or the certificate is not taken.
+        NotConnectedError: No server listens there, or the certificate is rejected.
     """
     if not isinstance(endpoint, str) or not _ENDPOINT.fullmatch(endpoint):
         raise NotConnectedError(_no_endpoint(endpoint))

@@ -72,7 +72,7 @@ class ZenohTransport(Transport):
             security: Folder with this client's certificate, for `tls/<host>:<port>`.
 
         Raises:
-            NotConnectedError: Nobody listens there, or no robot of that name is there or shows itself.
+            NotConnectedError: No server listens there, or there is no visible robot of that name.
             ProtocolError: `robot` cannot be a robot's name.
         """
         keys.check_robot_name(robot)
@@ -248,7 +248,7 @@ async def robots_at(endpoint: str, security: Folder | None = None) -> list[str]:
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
 
     Raises:
-        NotConnectedError: Nobody listens there.
+        NotConnectedError: No server listens there.
     """
     session = await asyncio.to_thread(open_session, endpoint, security)
     try:
@@ -266,7 +266,7 @@ async def only_robot(endpoint: str, wanted: str, security: Folder | None = None)
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
 
     Raises:
-        NotConnectedError: Nobody listens there, no robot is there, or there are several others.
+        NotConnectedError: No server listens there, there is no robot, or there are several others.
     """
     robots = await robots_at(endpoint, security)
     if wanted in robots or not robots:

@@ -30,7 +30,7 @@ def modal_estimator(
         calibration: Calibration of this arm, with a modal model.
         description: The robot.
         payload: What the arm is believed to carry.
-        modes: How many, the lowest.
+        modes: Number of modes, the lowest first.
 
     Raises:
         EstimatorError: The calibration has no modal model, is of another arm, or does not say each parameter of each

@@ -82,11 +82,11 @@ class JointValues(Reading):
 
     @property
     def joint_temperatures(self) -> list[float]:
-        """Computed: a body a joint in air of 25 °C, heated by its electronics and R i² in some 20 minutes [°C]."""
+        """Computed: one body per joint in air of 25 °C, heated by its electronics and R i² in about 20 minutes [°C]."""
         return self._temperatures
 
     @cached_property
     def joint_position_deviation_ratio(self) -> float:
-        """Computed: largest difference of measured and target angle, over 0.05 rad [-]."""
+        """Computed: largest difference of measured and target angle, divided by 0.05 rad [-]."""
         state = self.state
         return max(abs(a - t) for a, t in zip(state.actual_q, state.target_q, strict=True)) / DEVIATION

@@ -30,7 +30,7 @@ class Reading:
         ratings: Ratings of the joints.
         current: Currents of the motors [A].
         meters: Temperatures and energies at this tick.
-        kept: Where doors keep what outlasts a tick.
+        kept: Values that doors keep from tick to tick.
     """
 
     def __init__(

@@ -128,12 +128,12 @@ class StatusValues(Reading):
 
     @property
     def actual_robot_current(self) -> float:
-        """Computed: power over voltage; power is 5 W a joint, the motors' heat and what they give to the arm [A]."""
+        """Computed: power over voltage; power is 5 W per joint, the motors' heat and their mechanical power [A]."""
         return self._power / BUS_VOLTAGE
 
     @property
     def actual_robot_energy_consumed(self) -> float:
-        """Computed: integral of the power the robot takes, since the first tick [J]."""
+        """Computed: integral of the power that the robot consumes, since the first tick [J]."""
         return self._consumed
 
     @property

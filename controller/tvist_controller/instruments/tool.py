@@ -53,9 +53,9 @@ class ToolValues(Reading):
 
     @cached_property
     def actual_TCP_acceleration(self) -> list[float]:
-        """Computed: the accelerometer's reading turned to the base, without gravity, carried to the TCP [m/s², rad/s²].
+        """Computed: the accelerometer's value without gravity, in the base frame and at the TCP [m/s², rad/s²].
 
-        Angular acceleration is the target's: no sensor measures it.
+        The angular acceleration is that of the target, since no sensor measures it.
         """
         linear: list[float] = (self._rotation @ np.array(self.state.actual_tool_accelerometer)).tolist()
         linear[2] -= GRAVITY
@@ -69,8 +69,9 @@ class ToolValues(Reading):
     def actual_TCP_force(self) -> list[float]:
         """Computed: force at the TCP that explains the measured torques, through the Jacobian [N, N m].
 
-        Of them is taken off what the target needs: rigid arm with the declared payload, rotors, friction. Where the
-        posture is nearly singular part of the force cannot be felt, and is left out. Braked, it is zero.
+        The torque that the target motion needs (rigid arm with the declared payload, rotors, friction) is subtracted
+        first. Near a singularity part of the force cannot be measured and is left out. It is zero while the arm is
+        braked.
         """
         force: list[float] = self._force.tolist()
         return force
@@ -88,10 +89,10 @@ class ToolValues(Reading):
 
     @cached_property
     def ft_raw_wrench(self) -> list[float]:
-        """Computed: what a sensor between flange and payload would feel, in the flange frame [N, N m].
+        """Computed: wrench that a sensor between flange and payload would measure, in the flange frame [N, N m].
 
-        Weight and inertial force of the declared payload as the accelerometer tells, without those of its turning,
-        and the TCP force.
+        It is the weight and inertial force of the declared payload, from the accelerometer and without the effect of
+        rotation, plus the TCP force.
         """
         payload, force = self.io.payload, self._force
         carries = [-payload.mass * felt for felt in self.state.actual_tool_accelerometer]
@@ -152,9 +153,9 @@ class ToolValues(Reading):
 
     @cached_property
     def target_base_wrench(self) -> list[float]:
-        """Computed: force and torque on its foot of the arm with the declared payload as the target moves [N, N m].
+        """Computed: force and torque at the base of the arm with the declared payload, for the target motion [N, N m].
 
-        The foot's own weight is not in it.
+        The weight of the base itself is not included.
         """
         state = self.state
         return self._rigid.base_wrench(state.target_q, state.target_qd, state.target_qdd, self.io.payload)

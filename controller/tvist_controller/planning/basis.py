@@ -17,9 +17,9 @@ class FilterBasis(NamedTuple):
     name: str
     """Name of the present filter."""
     modes: int
-    """How many modes it works with."""
+    """Number of modes that it uses."""
     source: ModeSource
-    """Where they come from."""
+    """Source of the modes."""
     declared: Payload
     """What the controller believes that the arm carries."""
 

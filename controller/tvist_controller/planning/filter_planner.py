@@ -13,7 +13,7 @@ from tvist_shaping.base import Filter
 from tvist_shaping.estimators.base import Estimator
 
 PlannedFilter = tuple[ModeSource, Filter]
-"""Where its modes come from, and the filter."""
+"""Source of the modes, and the filter."""
 
 
 class FilterPlanner:
@@ -52,7 +52,7 @@ class FilterPlanner:
 
         Args:
             name: Name of the filter.
-            modes: How many modes it shall suppress.
+            modes: Number of modes to suppress.
             source: The estimator that was chosen.
             declared: What the controller believes that the arm carries.
             where: Field that the name comes from.

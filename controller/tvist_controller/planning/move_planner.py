@@ -65,7 +65,7 @@ class MovePlanner:
         """Plan a motion along a path, from rest to rest.
 
         Args:
-            path: Where to go; it begins where the reference rests.
+            path: Path of the move; it begins where the reference is at rest.
             limits: That every joint is to keep.
             basis: What it depends on.
 

@@ -70,7 +70,7 @@ class Rest(Trajectory):
     """No motion.
 
     Args:
-        q: Where to stay, shape (n,) [rad].
+        q: Joint angles to stay at, shape (n,) [rad].
     """
 
     def __init__(self, q: Floats) -> None:

@@ -38,7 +38,7 @@ class Curve(Path):
     so bounds of the derivatives, and |q'| ≤ 1, turn limits of the joints into limits of s.
 
     Args:
-        length: Where s ends [rad], above 0.
+        length: Value of s at the end [rad], above 0.
         bends: Bounds of the derivatives.
 
     Raises:

@@ -152,7 +152,7 @@ class Limiter:
         return np.stack((q, step / h + h * (mean / 6.0 + qdd / 3.0), qdd))
 
     def _fits(self, step: Floats, bend: Floats) -> Bools:
-        """Which joints' differences are within the limits, and can stay so."""
+        """Return which joints' differences are within the limits, and can stay so."""
         fastest, hardest, harshest = self._most
         size, turn = np.abs(step), np.abs(bend)
         fits: Bools = size <= fastest
@@ -172,7 +172,7 @@ class Limiter:
         return fits
 
     def _meets(self, qd: Floats, step: Floats, bend: Floats) -> Bools:
-        """Which joints, put onto the signal now, can go on with it inside the limits."""
+        """Return which joints, put onto the signal now, can continue with it inside the limits."""
         h, limits = self._period, self._limits
         signal = self._signal_acceleration(qd, limits.acceleration)
         following = (qd - step / h) / h + 0.5 * signal  # second difference at the next tick
@@ -182,7 +182,7 @@ class Limiter:
         return meets
 
     def _stoppable(self, q: Floats, qd: Floats, qdd: Floats) -> Bools:
-        """Which joints can come to rest inside their range, two ticks spare."""
+        """Return which joints can come to rest inside their range, with two ticks to spare."""
         limits, jerk = self._limits, self._limits.jerk
         sign = np.sign(qd)
         speed, rise = np.abs(qd), sign * qdd

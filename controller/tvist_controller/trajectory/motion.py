@@ -87,7 +87,7 @@ class Motion(Trajectory):
         """Position, velocity and acceleration of the joints at some moments of the whole motion at full speed.
 
         Args:
-            count: How many; each state has three arrays of shape (n,).
+            count: Number of states; each has three arrays of shape (n,).
         """
         for time in np.linspace(0.0, self.duration, count).tolist():
             x, xd, xdd = (np.array(values) for values in self._law.at(time))
@@ -187,7 +187,7 @@ def quickest_motion(path: Path, limits: Limits, period: float, speed: float = 1.
     """The motion along a path from rest to rest that a double S makes of limits.
 
     Args:
-        path: Where to go.
+        path: Path of the motion.
         limits: That every joint is to keep.
         period: Tick [s].
         speed: Rate of its time against the clock's to start with [-].

@@ -1,4 +1,4 @@
-"""Where a planned motion goes, whatever the time it takes: joint positions as a function of a parameter."""
+"""Path of a planned motion, independent of time: joint positions as a function of a parameter."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -83,7 +83,7 @@ class Path(ABC):
 
         Args:
             start: Parameter, shape (m,) [rad].
-            end: Likewise.
+            end: Parameter at the end, shape (m,) [rad].
         """
 
     @property
@@ -106,22 +106,22 @@ class JointLine(Path):
     Its parameter is the posture itself, shape (n,): to shape the one is to shape the other.
 
     Args:
-        start: Joint positions, shape (n,) [rad].
-        end: Likewise.
+        start: Joint positions at the start, shape (n,) [rad].
+        end: Joint positions at the end, shape (n,) [rad].
     """
 
     posture_of = None
 
     def states(self, x: Floats, xd: Floats, xdd: Floats) -> tuple[Floats, Floats, Floats]:
-        """Those of the parameter."""
+        """Return the states of the parameter unchanged."""
         return x, xd, xdd
 
     def planned(self, limits: Limits) -> Limits:
-        """Those of the joints."""
+        """Return the limits of the joints unchanged."""
         return limits
 
     def keeping(self, limits: Limits, velocity: float) -> Limits:  # noqa: ARG002  a straight line takes nothing
-        """Those of the joints."""
+        """Return the limits of the joints unchanged."""
         return limits
 
     def way(self, start: Floats, end: Floats) -> Way:

@@ -21,7 +21,7 @@ FILTERS = ("zv", "zvd", "ei", "none", "auto", "nonsense")
 
 
 class Messages:
-    """A source of messages: half of them name the lease, half a lease that is none.
+    """A source of messages: half of them have the token of the lease, half an invalid token.
 
     Args:
         seed: Seed of the choice.
@@ -77,7 +77,7 @@ class Messages:
         ]
 
     def _unsound(self) -> bytes:
-        """Bytes that are no command: cut off, changed, or none of ours from the beginning."""
+        """Return bytes that are not a command: truncated, modified or random."""
         chance, data = self._random, bytearray(self._sound())
         match chance.randrange(3):
             case 0:

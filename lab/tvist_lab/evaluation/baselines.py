@@ -113,7 +113,7 @@ def workspace_range(
 def longest_mean_delay(
     recipe: Recipe, description: RobotDescription, masses: tuple[float, float], modes: int
 ) -> float:
-    """Of the product of the modes' zero-vibration shapers, anywhere in the workspace and with any payload [s].
+    """Return the longest mean delay of the product of the modes' ZV shapers, over workspace and payloads [s].
 
     Args:
         recipe: Says where estimates come from.

@@ -14,7 +14,7 @@ from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
 
 PLACES = (0.15, 0.5, 0.8)
-"""Of the tick after which the references differ, as shares of the motion [-]."""
+"""Ticks after which the references differ, as shares of the motion [-]."""
 ELSEWHERE = 1.0
 """Acceleration with which the other reference goes its own way [rad/s²]."""
 TWICE = "gives another output when the same reference is run again: it keeps something, or draws by chance"
@@ -54,7 +54,10 @@ def _outputs(candidate: Candidate, task: Task) -> Floats | None:
 
 
 def _elsewhere(candidate: Candidate, task: Task, tick: int, sign: float) -> Task:
-    """The same up to a tick, then off on a parabola; only a candidate that is told the target has the first one."""
+    """Return the task with a reference that leaves the first one on a parabola after a tick.
+
+    A candidate that is told the target is still told that of the first reference.
+    """
     reference = task.reference.copy()
     late = PERIOD * np.arange(1, len(reference) - tick)
     reference[tick + 1 :] += sign * 0.5 * ELSEWHERE * late[:, None] ** 2

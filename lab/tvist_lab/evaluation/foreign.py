@@ -133,7 +133,7 @@ class Foreign:
                 f"gives {type(given).__name__} {where}, where {q.size} numbers are wanted"
             ) from None
         if q_star.shape != q.shape:
-            raise ShaperFaultError(f"gives shape {q_star.shape} {where}, where {q.shape} is wanted")
+            raise ShaperFaultError(f"returns shape {q_star.shape} {where} instead of {q.shape}")
         if not np.isfinite(q_star).all():
             raise ShaperFaultError(f"gives {q_star.tolist()} {where}: not every number is finite")
         if (np.abs(q_star) > self._reach).any():
@@ -182,7 +182,9 @@ def _load(file: Path, said: Path) -> Callable[[], Any]:
     ]
     if len(classes) > 1:
         found = ", ".join(value.__name__ for value in classes)
-        raise CandidateError(f"shaper {said}: holds several classes with a method step, {found}: leave one")
+        raise CandidateError(
+            f"shaper {said}: contains several classes with a method step, {found}: keep only one"
+        )
     if classes:
         try:
             classes[0]()
@@ -194,7 +196,7 @@ def _load(file: Path, said: Path) -> Callable[[], Any]:
     if inspect.isfunction(getattr(module, "step", None)):
         return lambda: module
     raise CandidateError(
-        f"shaper {said}: holds neither a class with a method step(q_ref, info) nor a function step"
+        f"shaper {said}: contains neither a class with a method step(q_ref, info) nor a function step"
     )
 
 

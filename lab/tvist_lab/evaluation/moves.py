@@ -202,7 +202,7 @@ def _check(number: int, move: Move, description: RobotDescription) -> None:
                     f"must be within ±{limit:.6g} rad"
                 )
     if max(abs(a - b) for a, b in zip(move.start, move.target, strict=True)) < LEAST:
-        raise MovesError(f"move {number} goes nowhere: no joint turns by {LEAST:g} rad or more")
+        raise MovesError(f"move {number} is too short: no joint turns by {LEAST:g} rad or more")
 
 
 def _in_words(why: str) -> str:

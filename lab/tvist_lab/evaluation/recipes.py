@@ -36,7 +36,7 @@ class Mistaken(Estimator):
 
     @property
     def modes(self) -> int:
-        """As many as the other's."""
+        """Number of modes, the same as the other's."""
         return self._right.modes
 
     @property
@@ -115,12 +115,12 @@ class Recipe:
             raise RecipeError(f"shaper {self.shaper} needs a calibration")
         if known.robot != description.robot.model:
             raise RecipeError(
-                f"calibration {known.name} is of a {known.robot}; this arm is a {description.robot.model}"
+                f"calibration {known.name} is for a {known.robot}, but this arm is a {description.robot.model}"
             )
         source = ModeSource("polynomial" if known.modal is None else "modal", description, known)
         if modes > source.most:
             raise RecipeError(
-                f"shaper {self.shaper} wants {modes} modes, calibration {known.name} knows {source.most}"
+                f"shaper {self.shaper} needs {modes} modes, but calibration {known.name} has {source.most}"
                 + (": make one with tvist identify --model modal" if known.modal is None else "")
             )
         right = source.estimator(modes, paper_payload(description, mass))

@@ -65,15 +65,15 @@ class Score:
 
 @dataclass(frozen=True)
 class Scores:
-    """What came of a job."""
+    """Result of a job."""
 
     scores: tuple[Score, ...]
     delay: float
-    """[s]."""
+    """Delay of the shaped reference [s]."""
     acceleration: float
-    """Peak over the limit of the reference [-]."""
+    """Largest acceleration relative to the limit of the reference [-]."""
     velocity: float
-    """Likewise [-]."""
+    """Largest velocity relative to the limit of the reference [-]."""
     cost: float | None
     """Processor time of a tick [s]."""
     fault: str | None = None

@@ -1,4 +1,4 @@
-"""Where to make the arm ring so that few ring-downs say most: greedy D-optimal design.
+"""Choose ring-downs so that few of them give the most information: greedy D-optimal design.
 
 The arm as it is guessed is made to ring at many configurations; each ring-down has an information matrix about the
 parameters. One after the other those are chosen that make the determinant of the sum largest, so the volume of what

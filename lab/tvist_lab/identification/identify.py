@@ -142,7 +142,7 @@ async def identify(
         progress()
     if not kept:
         raise IdentificationError(
-            "no ring-down could be fitted: does the arm move, and is its accelerometer read?"
+            "no ring-down could be fitted: check that the arm moves and that its accelerometer works"
         )
     named = sum(weight > 1.0 for weight in weights)
     f_d, zeta = np.array(values).T

@@ -177,7 +177,7 @@ async def _measure(
     if len(ringings) < plan.ring_downs:
         raise IdentificationError(
             f"only {len(ringings)} of {plan.ring_downs} ring-downs could be used, {rejected} configurations were "
-            "out of reach or too quiet: does the arm move, and is its accelerometer read?"
+            "out of reach or too quiet: check that the arm moves and that its accelerometer works"
         )
     return ringings, rejected
 
@@ -303,7 +303,7 @@ def _check_contradictions(arm: Arm, ringings: Sequence[Ringing], fit: ModalFit) 
         )
         raise IdentificationError(
             f"ring-downs that contradict the other {len(rest)}: {names}. Was the payload the declared one, and was "
-            "the arm free? See to that and measure again, or take another seed for other configurations"
+            "the arm free? Check this and measure again, or use another seed for other configurations"
         )
 
 

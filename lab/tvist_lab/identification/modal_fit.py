@@ -164,9 +164,9 @@ class OwnPoles:
     zeta: Floats
     """Shape (k,) [-]."""
     f_d_error: Floats
-    """Standard deviation of the logarithm, shape (k,) [-]."""
+    """Standard deviation of the logarithm of f_d, shape (k,) [-]."""
     zeta_error: Floats
-    """Likewise."""
+    """Standard deviation of the logarithm of ζ, shape (k,) [-]."""
     significance: float
     """Sum of squares that the other poles leave more than these, over the noise's variance; 8 by chance [-]."""
     share: float

@@ -61,7 +61,7 @@ class Ringing:
 
     @property
     def rms(self) -> float:
-        """Rms of what is not constant, per axis [m/s^2]."""
+        """Return the rms of what is not constant, per axis [m/s^2]."""
         return float(np.sqrt(np.mean((self.force - self.force.mean(axis=0)) ** 2)))
 
 
@@ -138,7 +138,9 @@ async def listen(robot: Robot, arm: Arm, q: Floats, payload: int, jog: Jog) -> R
         await robot.advance(SKIPPED + SAMPLES + 50)
     recording = collected.recording()
     if recording.missing_ticks:
-        raise RecordingError(f"{recording.missing_ticks} states were lost: the way to the robot is too slow")
+        raise RecordingError(
+            f"{recording.missing_ticks} states were lost: the connection to the robot is too slow"
+        )
     force = recording["actual_tool_accelerometer"]
     moved = motions(recording)[-1]
     first = moved.shaped_stop + SKIPPED

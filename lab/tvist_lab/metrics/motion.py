@@ -44,7 +44,7 @@ class Motion:
         """Duration of the shaped reference [s].
 
         A shaper's first impulse has no delay, so both begin together; the tick between shaper and publication
-        is none of the shaper's and is taken off.
+        does not belong to the shaper and is subtracted.
         """
         published = recording.time[self.shaped_stop] - recording.time[self.start]
         return float(published - DIFFERENTIATOR_TICKS * recording.period)
@@ -55,10 +55,10 @@ class Motion:
 
 
 def motions(recording: Recording) -> list[Motion]:
-    """The motions of a recording in order.
+    """Find the motions of a recording, in order.
 
-    They come from the events `motion_started`, `motion_done` and `motion_stopped` where there are any, else
-    from the reference itself. A motion that goes nowhere is none.
+    They come from the events `motion_started`, `motion_done` and `motion_stopped` if there are any, otherwise
+    from the reference itself. A motion without any movement does not count.
     """
     if len(recording) < 2:
         return []

@@ -1,4 +1,4 @@
-"""Where each figure comes from: fitted to the paper, tuned to it, predicted, or not matched."""
+"""Origin of each figure: fitted to the paper, tuned to it, predicted, or not matched."""
 
 from typing import Any
 

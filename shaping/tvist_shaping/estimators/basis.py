@@ -153,7 +153,7 @@ def terms(
 
     Args:
         q: Configurations [rad], shape (N, n).
-        joints: As in `Polynomial`, and so the rest.
+        joints: Joints, as in `Polynomial`; the other arguments are also those of `Polynomial`.
         basis: `trigonometric` or `angles`.
         degree: Highest total degree.
         centre: Centre of the angles [rad], shape (len(joints),).

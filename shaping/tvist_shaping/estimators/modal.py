@@ -329,7 +329,7 @@ class Modal(Estimator):
             mass_matrix: M(q) for joint angles of shape (joints,) [rad], symmetric, shape (L, L) [kg m^2]; a new
                 array or always the same one.
             drivetrain: Springs and motors of the L coordinates.
-            modes: How many are wanted, the lowest, 1 to L.
+            modes: Number of modes to estimate, the lowest, 1 to L.
             f_d_min: Lowest damped frequency that is believed [Hz], > 0: says how long a filter can get.
             zeta_max: Highest damping ratio that is believed [-], 0 to 1.
 

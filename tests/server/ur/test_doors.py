@@ -111,7 +111,7 @@ async def test_a_port_in_use_is_said_with_what_to_do(desk):
     ports = {"rtde": desk.doors.ports["rtde"]}
     with pytest.raises(GatewayError, match=rf"port {ports['rtde']} for rtde: .*--ur-port"):
         UrDoors(desk, UR5E, "ur5e", "127.0.0.1", ports)
-    with pytest.raises(GatewayError, match="no such address"):
+    with pytest.raises(GatewayError, match="does not have this address"):
         UrDoors(desk, UR5E, "ur5e", "203.0.113.7", {"rtde": 0})
 
 

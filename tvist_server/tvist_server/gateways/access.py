@@ -1,4 +1,4 @@
-"""Who may do what on the network, as rules for Zenoh's access control: data made of names, nothing else.
+"""Rights of clients on the network, as rules for Zenoh's access control: data made of names, nothing else.
 
 What no rule allows is denied, without a word to whoever tried. A rule holds for a key only where its own key
 includes it, so `tvist/**` is denied where `tvist/ur5e/state` is allowed. Flows are the server's: `ingress` is

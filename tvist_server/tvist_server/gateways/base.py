@@ -20,7 +20,7 @@ class GatewayError(Exception):
 
 
 class Desk(Protocol):
-    """Where a gateway hands in what arrives. Callable from any thread; nothing here may wait."""
+    """Receives what arrives at a gateway. Callable from any thread; nothing here may wait."""
 
     def request(self, data: bytes, answer: Answer) -> None:
         """Take an encoded command; `answer` is called once: at once if it is turned away, else from another thread."""

@@ -43,7 +43,7 @@ class Network:
     """Listens on endpoints; each robot has a gateway of its own there.
 
     Args:
-        endpoints: Where to listen, `tcp/127.0.0.1:7447`.
+        endpoints: Endpoints to listen on, such as `tcp/127.0.0.1:7447`.
         guard: Settings of the session that keep others out, path to value.
         lockstep: Whether a client lets time pass: then one that is slow is waited for.
 

@@ -1,4 +1,4 @@
-"""Where a file is that is being written: somebody may move or delete it meanwhile, which no write fails at."""
+"""Current place of a file that is being written: it may be moved or deleted meanwhile without an error."""
 
 import os
 from pathlib import Path
@@ -9,7 +9,7 @@ class DeletedError(Exception):
 
 
 def whereabouts(path: Path, descriptor: int) -> Path | None:
-    """Where an open file is now.
+    """Return the current path of an open file.
 
     Args:
         path: Path at which the file was opened.

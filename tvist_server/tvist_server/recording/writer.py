@@ -47,7 +47,7 @@ class RecordingWriter:
     """Writes one recording.
 
     Args:
-        stream: Where to; stays the caller's to close.
+        stream: Stream to write to; the caller closes it.
         topic_of: Topic of each kind of message.
         heading: What stands at its beginning.
 

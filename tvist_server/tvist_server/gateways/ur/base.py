@@ -19,7 +19,7 @@ class Control(Protocol):
     """The way of one connection to the controller."""
 
     peer: str
-    """Who the client is and which door it uses, for a person."""
+    """Name of the client and of the door it uses, for people."""
 
     def change(self, command: Callable[[str], Command], then: Then) -> None:
         """Send a command that needs control, and take control first where nobody has it.

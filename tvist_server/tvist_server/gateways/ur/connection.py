@@ -23,9 +23,9 @@ MOST_COMMANDS = 32
 MOST_UNREAD = 1_000_000
 """Bytes that may wait for a client that does not read them; then it is cut off."""
 HEARS = MOST_UNREAD // 4
-"""Where more waits, it is told no more of what everybody is told, in real time."""
+"""Unread bytes above which, in real time, a client gets no messages that go to all clients."""
 ANSWERS = MOST_UNREAD // 2
-"""Where more waits, no more is taken of it, in real time, until it has read."""
+"""Unread bytes above which, in real time, nothing more is read from a client until it has read."""
 MOST_UNREAD_LOCKSTEP = 64_000_000
 """Limit in lockstep, where samples wait as well: a minute of them."""
 
@@ -70,7 +70,7 @@ class Connection(asyncio.BufferedProtocol):
         """What ends the connection of a client that says nothing."""
         self.session: Session | None = None
         self.peer = "a client"
-        """Who it is and which door it uses, for a person."""
+        """Name of the client and of the door it uses, for people."""
         self.heard = 0.0
         """When it last sent something, or came [s of the loop's clock]."""
         self.dropped = 0

@@ -82,7 +82,7 @@ class UrDoors(Gateway):
         self._instruments = Instruments(description)
         self._io: Io | None = None
         self._early = deque[State](maxlen=FIRST)
-        """Those before the doors open: temperatures and energies begin with the first tick."""
+        """States before the doors open: temperatures and energies begin with the first tick."""
         self._connections: set[Connection] = set()
         """Connections in their `Places` while the doors are open."""
         self._leases = WeakValueDictionary[str, HostLease]()

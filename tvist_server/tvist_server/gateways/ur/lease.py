@@ -113,7 +113,7 @@ class ConnectionControl(Control):
     Args:
         lease: Lease of the client's host.
         hear: Called with each answer, as a call to make.
-        peer: Who the client is, for a person; its host where nothing else is said.
+        peer: Name of the client, for people; by default its host.
     """
 
     def __init__(
@@ -164,4 +164,4 @@ def _at_once(action: Callable[[], None]) -> None:
 
 
 def _nothing(reply: Reply) -> None:
-    """Nobody waits for it."""
+    """Ignore the reply."""

@@ -16,7 +16,7 @@ class Occupant(Protocol):
 
     @property
     def peer(self) -> str:
-        """Who it is, for a person."""
+        """Name of the client, for people."""
 
     @property
     def heard(self) -> float:
@@ -59,7 +59,7 @@ class Places(Generic[AnOccupant]):
         """Whether a newcomer may come in; if need be somebody goes first.
 
         Args:
-            peer: Who comes, for a person.
+            peer: Name of the new client, for people.
             local: Whether it is on this machine.
         """
         if len(self.taken) >= SCARCE * self._most:

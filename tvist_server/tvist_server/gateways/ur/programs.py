@@ -15,7 +15,7 @@ from tvist_server.gateways.ur.base import Control
 from tvist_server.gateways.ur.primary import messages
 
 FOLDER = "/programs"
-"""Where a controller keeps programs; every other folder will do as well."""
+"""Folder in which a controller keeps programs; every other folder is accepted as well."""
 
 Heard = Callable[[bool], None]
 """Takes whether it was done."""

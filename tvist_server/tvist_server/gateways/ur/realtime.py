@@ -83,7 +83,7 @@ class RealtimeSession(Session):
     """One client of the real-time interface. What it sends is taken for URScript, as on the primary interface.
 
     Args:
-        robot: Whose ticks these are.
+        robot: Robot that ticks.
         control: The way to its controller.
         send: Not needed: answers to scripts come on the primary interface.
         read_only: Whether what the client sends is thrown away.

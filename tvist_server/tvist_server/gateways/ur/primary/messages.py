@@ -79,8 +79,8 @@ def runtime_exception(time: int, line: int, column: int, what: str) -> bytes:
 
     Args:
         time: [µs].
-        line: Where, 1 the first.
-        column: Where in it, 1 the first.
+        line: Line, 1 for the first.
+        column: Column in the line, 1 for the first.
         what: Why.
     """
     return _message(time, Kind.RUNTIME_EXCEPTION, _PLACE.pack(line, column) + _text(what))

@@ -28,9 +28,9 @@ class Unit:
     text: str
     """Text as it was sent, with lines ended by line feeds; only the beginning if it is too long."""
     line: int
-    """Where its code begins, 1 the first line: comments may stand before it."""
+    """Line at which its code begins, 1 for the first: comments may come before it."""
     column: int
-    """Where in that line, 1 the first."""
+    """Column in that line, 1 for the first."""
     too_long: bool = False
     """Whether it is longer than `LONGEST` bytes: then it is thrown away to its end."""
 

@@ -10,21 +10,27 @@ DIGITAL: dict[str, tuple[int, int]] = {"standard": (0, 8), "configurable": (8, 8
 """Groups of digital outputs: the first bit among all, and how many there are."""
 
 NAMED: dict[str, tuple[Wire, str]] = {
-    "speed_slider_mask": (Wire.UINT32, "1: use the fraction."),
-    "speed_slider_fraction": (Wire.DOUBLE, "The speed slider, 0 to 1."),
-    "standard_digital_output_mask": (Wire.UINT8, "Which of the eight standard digital outputs to set."),
-    "standard_digital_output": (Wire.UINT8, "What to set them to."),
-    "configurable_digital_output_mask": (Wire.UINT8, "Which of the eight configurable ones to set."),
-    "configurable_digital_output": (Wire.UINT8, "What to set them to."),
-    "tool_digital_output_mask": (Wire.UINT8, "Which of the tool's two to set."),
-    "tool_digital_output": (Wire.UINT8, "What to set them to."),
-    "standard_analog_output_mask": (Wire.UINT8, "Which of the two analogue outputs to set."),
-    "standard_analog_output_type": (Wire.UINT8, "A bit each: 0 is current (4–20 mA), 1 voltage (0–10 V)."),
-    "standard_analog_output_0": (Wire.DOUBLE, "Share of its range, 0 to 1."),
-    "standard_analog_output_1": (Wire.DOUBLE, "Share of its range, 0 to 1."),
+    "speed_slider_mask": (Wire.UINT32, "1: use `speed_slider_fraction`."),
+    "speed_slider_fraction": (Wire.DOUBLE, "Position of the speed slider, 0 to 1."),
+    "standard_digital_output_mask": (Wire.UINT8, "Mask of the eight standard digital outputs to set."),
+    "standard_digital_output": (Wire.UINT8, "Values of the standard digital outputs."),
+    "configurable_digital_output_mask": (
+        Wire.UINT8,
+        "Mask of the eight configurable digital outputs to set.",
+    ),
+    "configurable_digital_output": (Wire.UINT8, "Values of the configurable digital outputs."),
+    "tool_digital_output_mask": (Wire.UINT8, "Mask of the tool's two digital outputs to set."),
+    "tool_digital_output": (Wire.UINT8, "Values of the tool's digital outputs."),
+    "standard_analog_output_mask": (Wire.UINT8, "Mask of the two analogue outputs to set."),
+    "standard_analog_output_type": (
+        Wire.UINT8,
+        "Type of each analogue output: 0 is current (4–20 mA), 1 voltage (0–10 V).",
+    ),
+    "standard_analog_output_0": (Wire.DOUBLE, "Value of analogue output 0 as a share of its range, 0 to 1."),
+    "standard_analog_output_1": (Wire.DOUBLE, "Value of analogue output 1 as a share of its range, 0 to 1."),
     "external_force_torque": (
         Wire.VECTOR6D,
-        "Left aside, as UR does without ft_rtde_input_enable.",
+        "Ignored, as UR does without ft_rtde_input_enable.",
     ),
 }
 """All but the registers, with what they are for."""

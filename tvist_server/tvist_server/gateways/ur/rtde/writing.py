@@ -27,7 +27,7 @@ class InputWriter:
     what was never given a value is not set.
 
     Args:
-        robot: Whose inputs they are.
+        robot: Robot to write to.
         control: The way to it.
         complain: Takes sentences for the client.
     """
@@ -56,7 +56,7 @@ class InputWriter:
         if "external_force_torque" in values and not self._told_of_force:
             self._told_of_force = True
             self._complain(
-                "external_force_torque counts for nothing: it takes ft_rtde_input_enable, which this robot has not"
+                "external_force_torque is ignored: it needs ft_rtde_input_enable, which this robot does not have"
             )
         if "speed_slider_mask" in values or "speed_slider_fraction" in values:
             self._set_speed()
