@@ -3,6 +3,8 @@ PYTHON ?= python3
 BIN := .venv/bin
 # Matrices here are small: threads for them only get in each other's way.
 export OPENBLAS_NUM_THREADS ?= 1
+# Processes that run tests side by side.
+WORKERS ?= auto
 READY := .venv/.ready
 
 .PHONY: setup demo test test-all lint bench soak format lock schemas clean
@@ -20,11 +22,16 @@ $(READY): requirements.lock pyproject.toml
 demo: setup
 	$(BIN)/tvist demo
 
+# Side by side, a file in one process; what is in real time alone after that, as it needs the machine.
+BESIDE := $(BIN)/pytest --numprocesses $(WORKERS) --dist loadfile
+
 test: setup
-	$(BIN)/pytest -m "not nightly"
+	$(BESIDE) --hypothesis-profile quick -m "not (slow or nightly or realtime)"
+	$(BIN)/pytest --hypothesis-profile quick -m "realtime and not (slow or nightly)"
 
 test-all: setup
-	$(BIN)/pytest
+	$(BESIDE) -m "not (nightly or realtime)"
+	$(BIN)/pytest -m "realtime and not nightly"
 
 lint: setup
 	$(BIN)/ruff check
@@ -35,8 +42,9 @@ lint: setup
 bench: setup
 	$(BIN)/tvist bench
 
-# Searches for hours on what `make test` tries for a minute.
+# The tests that take minutes each, and a search for an hour of what `.ci/run` searches for a minute.
 soak: setup
+	$(BIN)/pytest -m nightly
 	$(BIN)/tvist search --stops 2000 --streams 500 --changes 500 --sequences 3000 --flexible
 
 format: setup

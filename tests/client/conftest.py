@@ -2,12 +2,12 @@
 
 import asyncio
 import queue
-import socket
 import threading
 from contextlib import ExitStack, contextmanager
 
 import pytest
 from blockbuster import blockbuster_ctx
+from tests.places import free_endpoint
 
 from tvist_client import LoopbackTransport, Robot
 from tvist_protocol.codec import decode_command, decode_setpoint, encode
@@ -283,9 +283,7 @@ def _no_blocking_calls_on_the_loop():
 
 @pytest.fixture
 def endpoint():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    return free_endpoint()
 
 
 @pytest.fixture

@@ -2,21 +2,16 @@
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 import threading
+
+from tests.places import free_endpoint
 
 PATIENCE = 300.0
 """After how long something is taken to hang [s], on the slowest of machines: no test looks at how fast it is."""
 NOISE = ("Traceback", "leaked", "nanobind", "Exception ignored", "Fatal Python error", "panicked")
 """What no process says that ended well."""
-
-
-def free_endpoint():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 def refused_to_start(*options, endpoint=None):
@@ -42,6 +37,10 @@ class Served:
     """What Python runs."""
 
     def __init__(self, *options, name="ur5e", endpoint=None):
+        beside_others = "PYTEST_XDIST_WORKER" in os.environ and "lockstep" not in options
+        assert not beside_others, (
+            "a robot in real time needs the machine: mark the test `realtime`, run it without -n"
+        )
         self.name, self.endpoint = name, endpoint or free_endpoint()
         self.lines = []
         named = () if name is None else ("--name", name)

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 from tests.conformance.served import Served
+from tests.places import own_address
 
 from tvist_client.blocking import Robot
 
@@ -147,7 +148,7 @@ def realtime():
 def doors():
     """Address of a robot whose UR interfaces are open."""
     pytest.importorskip("rtde_receive")
-    address = f"127.19.{os.getpid() % 200}.{os.getpid() // 200 % 200 + 1}"
+    address = own_address(1)
     with Served("--ur", "--ur-address", address):
         yield address
 
@@ -186,9 +187,9 @@ def tell(folder, words, endpoint):
     return told
 
 
+@pytest.mark.slow
+@pytest.mark.realtime
 class TestTutorial:
-    pytestmark = pytest.mark.slow
-
     def test_every_command_works_in_its_order(self, story):
         _, said = story
         assert [words[0] for words, _ in said] == ["check", "watch", *["move"] * 4, "analyze", "replay"]
@@ -218,6 +219,8 @@ class TestSnippets:
         assert results.attempted > 0
         assert results.failed == 0
 
+    @pytest.mark.slow
+    @pytest.mark.realtime
     @pytest.mark.parametrize("text", blocks("python"))
     def test_scripts_run(self, text, request, tmp_path):
         folder = ROOT

@@ -10,6 +10,8 @@ from tests.docs.test_docs import DOCS, FENCE, assert_well, run
 
 from tvist_client.blocking import Robot
 
+pytestmark = pytest.mark.realtime
+
 PAGE = DOCS / "how-to" / "change-a-shaper.md"
 TEXT = PAGE.read_text(encoding="utf-8")
 NEVER_SERVED = {"shapers", "evaluate", "shaperbench", "replay"}

@@ -3,11 +3,18 @@
 import numpy as np
 import pytest
 
-from tvist_lab.figures import catalogue_figure, figure_4, figure_7, figure_16, motion_figure, save
 from tvist_lab.metrics import motions
 from tvist_shaping import SHAPERS, custom, residual
 
 TICKS = 1500
+
+
+@pytest.fixture(scope="module")
+def figures():
+    """The module, imported where it is used: matplotlib takes a second that other tests need not wait."""
+    import tvist_lab.figures
+
+    return tvist_lab.figures
 
 
 @pytest.fixture
@@ -34,8 +41,8 @@ def texts(panel):
     return [text.get_text() for text in panel.texts]
 
 
-def test_figure_4_shows_that_the_least_sensitive_shaper_leaves_36_percent():
-    figure = figure_4()
+def test_figure_4_shows_that_the_least_sensitive_shaper_leaves_36_percent(figures):
+    figure = figures.figure_4()
     (panel,) = figure.axes
     assert any(text.startswith("35.8 %") for text in texts(panel))
     curves = {line.get_label(): line.get_xydata() for line in panel.get_lines()}
@@ -44,14 +51,14 @@ def test_figure_4_shows_that_the_least_sensitive_shaper_leaves_36_percent():
     assert np.interp(10.5, *curves["ZV"].T) == pytest.approx(0.0, abs=0.1)
 
 
-def test_figure_7_shows_rounded_delays_jump_and_fractional_ones_not():
-    rounded, fractional, *_ = figure_7().axes[2].get_lines()
+def test_figure_7_shows_rounded_delays_jump_and_fractional_ones_not(figures):
+    rounded, fractional, *_ = figures.figure_7().axes[2].get_lines()
     assert np.max(np.abs(rounded.get_ydata())) > 50.0
     assert np.max(np.abs(fractional.get_ydata())) < 2.1
 
 
-def test_figures_12_to_14_have_the_papers_five_panels_on_one_clock(recorded):
-    figure = motion_figure("Q1 → Q2", *recorded)
+def test_figures_12_to_14_have_the_papers_five_panels_on_one_clock(figures, recorded):
+    figure = figures.motion_figure("Q1 → Q2", *recorded)
     assert len(figure.axes) == 5
     assert [panel.get_ylabel().split()[-1] for panel in figure.axes] == [
         "(rad/s$^2$)",
@@ -67,8 +74,8 @@ def test_figures_12_to_14_have_the_papers_five_panels_on_one_clock(recorded):
     assert r"$\ddot q^*_1$, $\ddot q^*_2$" in joints
 
 
-def test_figure_16_writes_the_rv_it_draws_and_where_it_is_no_fit(recorded):
-    figure = figure_16({"Q1 → Q2": recorded, "Q1 → Q3": recorded})
+def test_figure_16_writes_the_rv_it_draws_and_where_it_is_no_fit(figures, recorded):
+    figure = figures.figure_16({"Q1 → Q2": recorded, "Q1 → Q3": recorded})
     assert len(figure.axes) == 2
     words = texts(figure.axes[0])
     assert any("RV 0.9" in text or "RV 1.0" in text for text in words)
@@ -76,17 +83,17 @@ def test_figure_16_writes_the_rv_it_draws_and_where_it_is_no_fit(recorded):
     assert sum(text == "$t_b$" for text in words) == 2
 
 
-def test_a_saved_figure_is_an_equal_file_each_time_and_makes_its_folder(tmp_path):
-    files = [save(figure_4(), tmp_path / name / "figure_4.png") for name in ("a", "b")]
+def test_a_saved_figure_is_an_equal_file_each_time_and_makes_its_folder(figures, tmp_path):
+    files = [figures.save(figures.figure_4(), tmp_path / name / "figure_4.png") for name in ("a", "b")]
     first, second = (file.read_bytes() for file in files)
     assert first == second
     assert first.startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("zeta", [0.0, 0.34])
-def test_the_figure_of_the_catalogue_shows_every_shaper_that_is_for_the_damping(zeta):
+def test_the_figure_of_the_catalogue_shows_every_shaper_that_is_for_the_damping(figures, zeta):
     mine = custom("mine", [0.5, 0.5], [0.0, 0.5])
-    figure = catalogue_figure([*SHAPERS.values(), mine], zeta)
+    figure = figures.catalogue_figure([*SHAPERS.values(), mine], zeta)
     *families, price = figure.axes
     shown = [
         line.get_label() for panel in families for line in panel.get_lines() if line.get_label()[0] != "_"

@@ -5,14 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-pytest.importorskip("mujoco")
-
 from tvist_client.blocking import Robot
 from tvist_client.transports.loopback import LoopbackTransport
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.setup import body
 from tvist_lab.in_process import free_setup
-from tvist_lab.mujoco_arm import MujocoArm
 from tvist_plant.description import Payload, load
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
@@ -21,6 +18,15 @@ from tvist_protocol.codec import decode_state
 from tvist_protocol.errors import RefusedError
 
 TARGET = [0.4, -2.9, 0.3, -1.4, 0.0, 0.1]
+
+
+@pytest.fixture(scope="module")
+def mujoco_arm():
+    """The class, imported where it is used: other tests do not need to wait for MuJoCo."""
+    pytest.importorskip("mujoco")
+    from tvist_lab.mujoco_arm import MujocoArm
+
+    return MujocoArm
 
 
 @pytest.fixture(scope="module")
@@ -51,9 +57,9 @@ def moved(plant):
     return states, truth
 
 
-def test_a_hosted_controller_moves_it_as_it_moves_the_flexible_arm():
+def test_a_hosted_controller_moves_it_as_it_moves_the_flexible_arm(mujoco_arm):
     setup = quiet_setup()
-    found = [moved(make(setup.description, body(setup.payload))) for make in (MujocoArm, FlexibleArm)]
+    found = [moved(make(setup.description, body(setup.payload))) for make in (mujoco_arm, FlexibleArm)]
     (theirs, their_truth), (ours, our_truth) = found
     assert len(theirs) == len(ours) > 500
     columns = (
@@ -72,17 +78,17 @@ def test_a_hosted_controller_moves_it_as_it_moves_the_flexible_arm():
         np.testing.assert_allclose(a, b, rtol=0.0, atol=2e-4, err_msg=name)
 
 
-def test_it_can_be_neither_pushed_nor_broken():
+def test_it_can_be_neither_pushed_nor_broken(mujoco_arm):
     setup = free_setup()
-    plant = MujocoArm(setup.description, body(setup.payload))
+    plant = mujoco_arm(setup.description, body(setup.payload))
     with Robot.over(LoopbackTransport(LoopbackHost(setup, plant))) as robot, robot.control("test") as arm:
         for fault in ({"fault": "torque", "joint": 0, "value": 5.0, "seconds": 0.1}, {"fault": "nan"}):
             with pytest.raises(RefusedError, match="MujocoArm"):
                 arm.inject(fault.pop("fault"), **fault)
 
 
-def test_it_carries_what_a_reset_says(ur5e, still):
-    arm = MujocoArm(ur5e, ur5e.payload)
+def test_it_carries_what_a_reset_says(mujoco_arm, ur5e, still):
+    arm = mujoco_arm(ur5e, ur5e.payload)
     arm.reset(still)
     loaded = arm.truth().gear_deflection[1]
     arm.reset(still, payload=Payload())
@@ -92,18 +98,18 @@ def test_it_carries_what_a_reset_says(ur5e, still):
     assert arm.payload == Payload()
 
 
-def test_at_rest_its_motors_and_its_accelerometer_say_what_the_flexible_arms_do(ur5e, still):
+def test_at_rest_its_motors_and_its_accelerometer_say_what_the_flexible_arms_do(mujoco_arm, ur5e, still):
     quiet = ur5e.disturbed_by(["friction"])
     theirs, ours = (
-        MujocoArm(quiet, quiet.payload).reset(still),
+        mujoco_arm(quiet, quiet.payload).reset(still),
         FlexibleArm(quiet, quiet.payload).reset(still),
     )
     for name in ("q", "qd", "moment", "accelerometer"):
         np.testing.assert_allclose(getattr(theirs, name), getattr(ours, name), rtol=0.0, atol=1e-9)
 
 
-def test_measurements_are_the_receivers_own(ur5e, still):
-    arm = MujocoArm(ur5e, ur5e.payload)
+def test_measurements_are_the_receivers_own(mujoco_arm, ur5e, still):
+    arm = mujoco_arm(ur5e, ur5e.payload)
     first = arm.reset(still)
     kept = [getattr(first, name).copy() for name in ("q", "qd", "moment", "accelerometer")]
     truth = arm.truth()
@@ -117,9 +123,9 @@ def test_measurements_are_the_receivers_own(ur5e, still):
 
 
 @pytest.mark.filterwarnings("ignore:.*:RuntimeWarning")
-def test_a_command_without_sense_raises_and_a_reset_heals(ur5e, still, tmp_path, monkeypatch):
+def test_a_command_without_sense_raises_and_a_reset_heals(mujoco_arm, ur5e, still, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # MuJoCo writes a log of its warnings where it is
-    arm = MujocoArm(ur5e, ur5e.payload)
+    arm = mujoco_arm(ur5e, ur5e.payload)
     first = arm.reset(still)
     with pytest.raises(PlantError, match="finite"):  # noqa: PT012 - some ticks pass
         for _ in range(10):

@@ -3,11 +3,17 @@
 import numpy as np
 import pytest
 
-from tvist_lab.second_opinion import SecondOpinion
 from tvist_plant.flexible_arm import FlexibleArm
 
 from .arms import chain, hold, quiet
 from .reference import commands
+
+
+def second_opinion(*arguments):
+    """MuJoCo's arm; imported here, as other tests do not need to wait for it."""
+    from tvist_lab.second_opinion import SecondOpinion
+
+    return SecondOpinion(*arguments)
 
 
 def angles(description, drive):
@@ -16,7 +22,7 @@ def angles(description, drive):
 
 
 def other_angles(description, drive, timestep):
-    other = SecondOpinion(description, description.payload, timestep)
+    other = second_opinion(description, description.payload, timestep)
     return np.array([other.reset(drive[0]), *(other.step(command) for command in drive[1:])])
 
 
@@ -41,7 +47,7 @@ def test_static_equilibrium_is_that_of_mujoco(ur5e):
         command = hold(arm, pose)
         ours = FlexibleArm(arm, arm.payload).reset(command).q
         np.testing.assert_allclose(
-            SecondOpinion(arm, arm.payload, 0.00025).reset(command), ours, rtol=0.0, atol=1e-12
+            second_opinion(arm, arm.payload, 0.00025).reset(command), ours, rtol=0.0, atol=1e-12
         )
 
 
@@ -58,4 +64,4 @@ def test_other_arms_agree_too(joints):
 def test_a_time_step_must_divide_the_period(ur5e):
     for timestep in (0.0003, 0.004):
         with pytest.raises(ValueError, match="timestep"):
-            SecondOpinion(ur5e, ur5e.payload, timestep)
+            second_opinion(ur5e, ur5e.payload, timestep)

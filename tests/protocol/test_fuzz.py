@@ -5,8 +5,9 @@ import json
 import jsonschema
 import msgpack
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from tests.examples import examples
 
 from tvist_protocol import (
     ProtocolError,
@@ -83,13 +84,13 @@ def decoded(decode, data):
 
 @pytest.mark.parametrize("decode", DECODERS)
 @given(data=st.binary(max_size=200))
-@settings(deadline=None, max_examples=60)
+@examples(60)
 def test_random_bytes(decode, data):
     decoded(decode, data)
 
 
 @given(value=values | st.dictionaries(fields | keys, values, max_size=6))
-@settings(deadline=None, max_examples=200)
+@examples(200)
 def test_random_messagepack(value):
     for decode in DECODERS:
         decoded(decode, msgpack.packb(value))
@@ -106,7 +107,7 @@ def damaged(draw):
 
 
 @given(data=damaged())
-@settings(deadline=None, max_examples=400)
+@examples(400)
 def test_golden_messages_with_damaged_bytes(data):
     for decode in DECODERS:
         decoded(decode, data)
@@ -137,7 +138,7 @@ def children(place):
 
 
 @given(value=changed())
-@settings(deadline=None, max_examples=400)
+@examples(400)
 def test_what_a_decoder_accepts_the_schema_accepts_and_it_survives_a_round_trip(value):
     data = msgpack.packb(value)
     for decode in (decode_command, decode_setpoint):

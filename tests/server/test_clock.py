@@ -7,6 +7,8 @@ import pytest
 
 from tvist_server.clock import PRIORITY, Driven, Lockstep, Realtime
 
+pytestmark = pytest.mark.realtime
+
 WAIT = 100.0
 PERIOD = 0.002
 

@@ -5,8 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import ruckig
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from tests.examples import examples
 
 from tvist_controller.trajectory import Limits
 from tvist_controller.trajectory.limiter import Limiter
@@ -38,7 +39,7 @@ def assert_within(out: np.ndarray, limits: Limits) -> None:
     assert orders[2] <= limits.jerk * (1 + 1e-5) + 10 * ROUNDING / H
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(
     seed=st.integers(0, 2**32 - 1),
     joints=st.integers(1, 7),
@@ -203,7 +204,7 @@ class Narrow:
         return self.limit()
 
 
-@settings(max_examples=10, deadline=None)
+@examples(10)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_limit_that_falls_in_motion_is_kept_to_what_jerk_needs(seed):
     """Acceleration is taken back at the jerk limit; until then it is beyond by what the limit fell."""

@@ -3,8 +3,9 @@
 from types import SimpleNamespace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from tests.examples import examples
 
 from tvist_controller.programs.built_in import built_in
 from tvist_protocol import commands as c
@@ -364,7 +365,7 @@ COMMANDS = {
 }
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     st.lists(st.tuples(st.sampled_from(sorted(COMMANDS)), st.sampled_from([0, 1, 3, 100, 600])), max_size=25)
 )

@@ -16,6 +16,7 @@ from hypothesis.stateful import (
     rule,
     run_state_machine_as_test,
 )
+from tests.examples import share
 
 from tvist_controller.controller import Controller
 from tvist_controller.streaming import TIMEOUT
@@ -376,5 +377,7 @@ TOLD = {"lease_lost", "stream_stopped", "protective_stop"}
 def test_every_reply_and_every_change_is_as_the_table_says(runs):
     run_state_machine_as_test(
         Sessions,
-        settings=settings(max_examples=runs, stateful_step_count=40, deadline=None, derandomize=runs == 100),
+        settings=settings(
+            max_examples=share(runs), stateful_step_count=40, deadline=None, derandomize=runs == 100
+        ),
     )

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
+from tests.examples import share
 
 from tvist_controller.admission import Admitted, admit
 from tvist_controller.controller import Controller
@@ -305,5 +306,7 @@ class Steps(RuleBasedStateMachine):
 def test_time_passes_by_the_steps_of_who_may_and_by_nothing_else(runs):
     run_state_machine_as_test(
         Steps,
-        settings=settings(max_examples=runs, stateful_step_count=30, deadline=None, derandomize=runs == 60),
+        settings=settings(
+            max_examples=share(runs), stateful_step_count=30, deadline=None, derandomize=runs == 60
+        ),
     )

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from tests.examples import examples
 
 from tvist_controller.trajectory import Limits, SetpointStream
 
@@ -253,7 +254,7 @@ def test_the_delay_holds_still_for_a_tick_of_jitter():
     assert stream.late == stream.lost == stream.limited == 0
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(seed=st.integers(0, 2**32 - 1), period=st.sampled_from([H, 0.003, SLOW, 0.05]))
 def test_whatever_comes_stays_finite_and_inside_the_limits(seed, period):
     """Loss, jitter, duplicates, leaps and noise."""

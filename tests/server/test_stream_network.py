@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from tests.examples import examples
 
 from tvist_controller.trajectory import Limits, SetpointStream
 
@@ -105,7 +106,7 @@ def test_the_same_arrivals_make_the_same_reference():
     assert (first == second).all()
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(
     seed=st.integers(0, 2**32 - 1),
     period=st.floats(H, 0.1),

@@ -4,8 +4,9 @@ from math import ceil
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from tests.examples import examples
 
 from tvist_controller.trajectory import JointLine, Limits, Motion, Rest, quickest_motion
 
@@ -54,7 +55,7 @@ def test_joints_are_in_phase(start, target):
     assert (np.diff(share) > -1e-13).all()
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     ends=st.integers(1, 7).flatmap(lambda n: st.lists(st.tuples(angles, angles), min_size=n, max_size=n)),
     velocity=st.floats(0.05, 3.14),

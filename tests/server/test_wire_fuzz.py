@@ -14,6 +14,7 @@ import msgspec
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
+from tests.examples import share
 from tests.protocol.test_fuzz import changed, damaged, fields, keys, values
 
 from tvist_controller.loopback import LoopbackHost
@@ -141,7 +142,7 @@ def server():
 )
 def test_every_message_is_answered_and_a_refused_one_changes_nothing(server, count):
     @settings(
-        max_examples=count // TOGETHER,
+        max_examples=share(count // TOGETHER),
         deadline=None,
         derandomize=count == 5_000,
         phases=[Phase.generate],  # to make a sequence of twenty smaller takes minutes

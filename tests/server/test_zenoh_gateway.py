@@ -3,7 +3,6 @@
 import json
 import queue
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -11,6 +10,7 @@ import threading
 import msgpack
 import pytest
 import zenoh
+from tests.places import free_endpoint
 
 from tvist_protocol.codec import MAX_BYTES
 from tvist_server.gateways.base import GatewayError
@@ -59,12 +59,6 @@ class NotingDesk:
             self.held.append(lambda: reply(data))
         else:
             threading.Thread(target=reply, args=(data,)).start()
-
-
-def free_endpoint():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 def connect(endpoint):

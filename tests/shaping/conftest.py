@@ -2,11 +2,6 @@ import json
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
-
-# The first example of a test may compile a kernel; that is no reason to fail.
-settings.register_profile("compiling", deadline=None)
-settings.load_profile("compiling")
 
 
 @pytest.fixture(scope="session")

@@ -2,9 +2,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
+from tests.examples import examples
 
 from tvist_shaping import SHAPERS, DesignError, ShaperRangeError, band, ei, ei_exact, ei_of, residual
 from tvist_shaping.amplitudes import ripple
@@ -77,7 +78,7 @@ def test_without_damping_they_are_the_shapers_with_closed_forms(name):
     np.testing.assert_allclose(exact.tau, closed.tau, atol=1e-7)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(st.sampled_from(NAMES), st.floats(0.0, 0.98), st.floats(0.5, 50.0))
 def test_every_hump_is_five_percent_high_and_between_them_it_is_zero(name, share, f_d):
     zeta = share * SHAPERS[name].zeta_max
@@ -116,7 +117,7 @@ def test_the_validity_in_the_catalogue_is_where_the_highest_zero_is_at_its_limit
     assert SHAPERS[name].zeta_max == HumpShaper(humps, 0.05).limit()
 
 
-@settings(max_examples=10)
+@examples(10)
 @given(st.integers(1, 4), st.floats(0.005, 0.3))
 def test_any_number_of_humps_of_any_height_can_be_had(humps, V):
     made = ei_of(humps, V, exact=True)

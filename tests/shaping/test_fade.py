@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from tests.examples import examples
 
 import tvist_shaping.fade as module
 from tvist_shaping import SHAPERS, Fade, FilterError, Fixed, Polynomial, ShapingError, TvistFilter, shaper
@@ -73,7 +74,7 @@ def excess(output, alone, order, limit):
     return (own / np.maximum(limit, each.max(axis=1))).max()
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(names, names, seeds, st.floats(0.0, 1.0), st.sampled_from([1.0, 1.0, 0.8, 0.5]))
 def test_a_change_anywhere_in_a_motion_keeps_its_limits_and_ends_at_its_target(
     first, then, seed, when, share
@@ -117,7 +118,7 @@ def test_the_streams_below_keep_their_limits():
             assert np.abs(np.diff(reference, order, axis=0)).max() / H**order < limit * (1.0 + 1e-6)
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(names, names, seeds, st.integers(1, 6))
 def test_in_a_stream_whose_joints_want_different_things_every_one_keeps_its_limits(first, then, seed, joints):
     random = np.random.default_rng(seed)
@@ -143,7 +144,7 @@ def test_a_fade_in_a_stream_that_comes_to_rest_is_over(first, then, joints):
     np.testing.assert_array_equal(output[-1], whole[-1])
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(names, names, seeds)
 def test_whatever_the_reference_does_the_output_is_between_the_two(first, then, seed):
     random = np.random.default_rng(seed)

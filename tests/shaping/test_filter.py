@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from tests.examples import examples
 
 from tvist_shaping import (
     SHAPERS,
@@ -38,7 +39,7 @@ class Jumping(Estimator):
         return self.random.uniform(5.0, 30.0, 2), self.random.uniform(0.0, self.zeta_max, 2)
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(names, st.integers(0, 2**32 - 1), st.lists(st.floats(-7.0, 7.0), min_size=3, max_size=3))
 def test_a_reference_at_rest_passes_bit_for_bit_whatever_the_parameters_do(name, seed, q):
     tvist = TvistFilter(shaper(name), Jumping(seed, name), joints=3)
@@ -47,7 +48,7 @@ def test_a_reference_at_rest_passes_bit_for_bit_whatever_the_parameters_do(name,
         np.testing.assert_array_equal(tvist.filter(q), q)
 
 
-@settings(max_examples=15)
+@examples(15)
 @given(names, st.integers(0, 2**32 - 1))
 def test_the_end_of_a_motion_is_reached_bit_for_bit_whatever_the_parameters_do(name, seed):
     random = np.random.default_rng(seed)
@@ -61,7 +62,7 @@ def test_the_end_of_a_motion_is_reached_bit_for_bit_whatever_the_parameters_do(n
     np.testing.assert_array_equal(last, end)
 
 
-@settings(max_examples=15)
+@examples(15)
 @given(names, st.integers(0, 2**32 - 1), st.floats(0.1, 2.0))
 def test_the_gain_is_one_a_shift_of_the_reference_is_a_shift_of_the_output(name, seed, shift):
     reference = np.random.default_rng(seed).normal(size=(100, 1))

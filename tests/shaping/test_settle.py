@@ -4,8 +4,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from tests.examples import examples
 
 from tvist_shaping import DelayLine, Fixed, TvistFilter, shaper
 from tvist_shaping.estimators.modal import Drivetrain, Modal
@@ -63,7 +64,7 @@ def motion(random):
     return np.concatenate(parts)
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(st.sampled_from(sorted(FILTERS)), st.integers(0, 2**32 - 1))
 def test_a_mode_jumps_only_where_the_output_stays_what_it_is_whatever_the_weights(name, seed):
     """Wherever the frequency jumps, the reference has been one sample for as long as any delay may be."""

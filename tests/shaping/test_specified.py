@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linprog
+from tests.examples import examples
 
 from tvist_shaping import SHAPERS, DesignError, ShaperRangeError, residual, si_of
 from tvist_shaping.specified import specified
@@ -24,7 +25,7 @@ def least_that_a_train_must_leave(low, high, duration):
     return found.fun
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(st.floats(0.01, 1.2), st.sampled_from([0.02, 0.05, 0.1]))
 def test_it_leaves_what_it_may_in_its_band_and_no_shorter_train_does(width, V):
     low, high = 1.0 - width / 2.0, 1.0 + width / 2.0
@@ -54,7 +55,7 @@ def test_a_wider_band_takes_a_longer_train():
     assert (np.diff(durations) > 0.0).all()
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(st.floats(0.55, 0.97), st.floats(1.03, 1.4), st.sampled_from([0.05, 0.1]), st.floats(0.0, 0.999))
 def test_with_damping_it_keeps_its_word_as_far_as_it_says(low, high, V, share):
     made = si_of(low, high, V)

@@ -35,13 +35,3 @@ def live(realtime):
     """A session with the robot in real time."""
     with Wire(realtime.endpoint) as wire:
         yield wire
-
-
-@pytest.fixture
-def measured(request):
-    """Note a figure, `measured(what, value)`, that stands in the report whether the test passes or fails."""
-
-    def note(what, value):
-        request.node.user_properties.append((what, value))
-
-    return note

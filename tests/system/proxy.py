@@ -6,6 +6,8 @@ import threading
 import time
 from queue import SimpleQueue
 
+from tests.places import free_port
+
 CHUNK = 4096
 """Bytes passed on at once."""
 BUFFER = 1 << 14
@@ -27,7 +29,7 @@ class Proxy:
         self._lock = threading.Lock()
         self._sockets = set()
         self._door = None
-        self._port = 0
+        self._port = free_port()
         self.delay = 0.0
         """How long a byte takes each way [s]."""
         self.rate = None
@@ -65,7 +67,6 @@ class Proxy:
         door.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         door.bind(("127.0.0.1", self._port))
         door.listen()
-        self._port = door.getsockname()[1]
         self._door = door
         threading.Thread(target=self._accept, args=(door,), daemon=True).start()
 

@@ -15,6 +15,8 @@ from tests.conformance.wire import STOPPED, Wire
 from tvist_plant.description import load
 from tvist_plant.fingerprint import fingerprint
 
+pytestmark = pytest.mark.realtime
+
 HERE = "0.1,-3.1,0.1,-1.5,0.1,0.1"
 
 
@@ -292,6 +294,7 @@ class TestRecordAndAnalyze:
 
 
 class TestMoveAndWatch:
+    @pytest.mark.quick
     def test_move_says_how_long_it_took(self, realtime):
         said = (
             tvist("move", "0,-3.0,0,-1.5,0,0", "--endpoint", realtime.endpoint, "--json").assert_done().json

@@ -18,6 +18,8 @@ from tvist_lab.mcap_file import read
 
 from .bystander import Bystander
 
+pytestmark = pytest.mark.realtime
+
 CLIENT = Path(__file__).with_name("dying_client.py")
 WITHIN = 0.26
 """From the last set-point to the beginning of the stop [s]."""
@@ -32,6 +34,7 @@ STREAM = ("amplitude=0.4", "rate=2.0")
 """Up to 0.8 rad/s and 1.6 rad/s², within the 1.5 and 2 of such a stream."""
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     "times", [2, pytest.param(100, marks=[pytest.mark.nightly, pytest.mark.timeout(900)])]
 )

@@ -19,6 +19,8 @@ from tvist_lab.replay import replay_file
 FAR = [1.5, -3.0, 0.2, -1.5, 0.1, 0.3]
 
 
+@pytest.mark.quick
+@pytest.mark.realtime
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
 def test_a_signal_in_mid_motion_ends_it_with_the_recording_complete(number, tmp_path):
     path = tmp_path / "run.mcap"
@@ -55,6 +57,7 @@ os.kill(os.getpid(), signal.SIGSTOP)
 """
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("clock", ["realtime", "lockstep"])
 def test_a_client_that_has_stopped_reading_does_not_hold_up_the_end(clock, tmp_path):
     """It stands still until the robot has ended, and the recording is complete."""
@@ -89,6 +92,7 @@ def test_a_client_that_has_stopped_reading_does_not_hold_up_the_end(clock, tmp_p
 ENDS = 200
 
 
+@pytest.mark.realtime
 @pytest.mark.nightly
 @pytest.mark.timeout(1800)
 def test_two_hundred_starts_and_ends_with_clients_attached():
@@ -113,6 +117,7 @@ def _processes():
     ).stdout.splitlines()
 
 
+@pytest.mark.realtime
 def test_a_killed_server_leaves_a_recording_that_can_be_read_and_replays_equal(tmp_path):
     path = tmp_path / "run.mcap"
     with Served("--record", str(path)) as served:
@@ -130,6 +135,7 @@ def test_a_killed_server_leaves_a_recording_that_can_be_read_and_replays_equal(t
     assert replay_file(content).first_difference is None
 
 
+@pytest.mark.realtime
 def test_a_disk_that_is_full_ends_the_recording_and_not_the_robot(tmp_path):
     path = tmp_path / "run.mcap"
     with Served("--record", str(path)) as served:
@@ -145,6 +151,7 @@ def test_a_disk_that_is_full_ends_the_recording_and_not_the_robot(tmp_path):
     assert read(path).states
 
 
+@pytest.mark.realtime
 def test_clients_see_the_robot_go_at_once():
     gone = threading.Event()
 
@@ -161,6 +168,7 @@ def test_clients_see_the_robot_go_at_once():
 
 
 class TestDoesNotBegin:
+    @pytest.mark.realtime
     def test_a_port_in_use_is_one_sentence_and_leaves_no_recording_behind(self, tmp_path):
         path = tmp_path / "run.mcap"
         with Served() as served:
@@ -253,6 +261,7 @@ class TestConfigurationFile:
         assert code == 2
         assert "nope.toml" in said
 
+    @pytest.mark.realtime
     def test_the_command_line_goes_before_it(self, tmp_path):
         path = tmp_path / "robot.toml"
         path.write_text('name = "from_file"\nclock = "lockstep"\nshaper = "none"\n', encoding="utf-8")
@@ -311,6 +320,7 @@ class TestCalibrationFile:
         assert "mine.json" in said
 
 
+@pytest.mark.realtime
 def test_a_controller_that_fails_ends_the_server_with_exit_code_1_and_a_readable_recording(tmp_path):
     """A server that answers but ticks no more would be worse than none."""
     path = tmp_path / "run.mcap"

@@ -14,6 +14,8 @@ from tests.conformance.wire import STOPPED, TICK, Wire
 
 from .bystander import Bystander
 
+pytestmark = pytest.mark.realtime
+
 CLIENT = Path(__file__).with_name("dying_client.py")
 NEVER_READING = """
 import json, sys, threading, zenoh

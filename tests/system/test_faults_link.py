@@ -17,6 +17,8 @@ from tvist_client.blocking import Robot
 from .bystander import Bystander
 from .proxy import Proxy
 
+pytestmark = pytest.mark.realtime
+
 FAR = [2.0, *Q1[1:]]
 DOWN = 1500
 """Ticks for which a link is down: 3 s."""

@@ -13,6 +13,8 @@ from tvist_lab.mcap_file import read
 from .bystander import Bystander
 from .interposed import Interposed
 
+pytestmark = pytest.mark.realtime
+
 
 @pytest.fixture
 def system(tmp_path, monkeypatch):

@@ -20,6 +20,8 @@ from tvist_server.schedule import CATCH_UP
 from .bystander import Bystander
 from .interposed import Interposed
 
+pytestmark = pytest.mark.realtime
+
 FAR = [2.0, *Q1[1:]]
 HOUR = 3600
 

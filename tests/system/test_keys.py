@@ -149,6 +149,7 @@ class TestServing:
             options = ("--config", path)
         failed(tvist("serve", *options), 2, endpoint, "--security DIR", "--insecure")
 
+    @pytest.mark.realtime
     @pytest.mark.parametrize("file", [False, True])
     def test_with_that_word_it_listens_and_says_what_that_means(self, tmp_path, file):
         endpoint = free_endpoint().replace("127.0.0.1", "0.0.0.0")  # noqa: S104  that is the point
@@ -210,6 +211,7 @@ class TestServing:
         failed(ended, 1, f"cannot listen on {endpoint}: the port is in use")
 
 
+@pytest.mark.realtime
 class TestProgram:
     @pytest.fixture(scope="class")
     @classmethod

@@ -14,6 +14,8 @@ from tvist_lab.replay import replay_file
 
 from .keyring import free_tls_endpoint, made, shown
 
+pytestmark = pytest.mark.realtime
+
 FAR = [1.0, *Q1[1:]]
 PLAYING = 2
 

@@ -112,6 +112,7 @@ class TestServed:
             for name in ("zv", "mine"):
                 assert wire.command("set_shaper", token=token, name=name)["type"] == "done"
 
+    @pytest.mark.realtime
     def test_one_that_fails_stops_the_arm_and_leaves_the_server(self, folder, monkeypatch):
         monkeypatch.chdir(folder)
         with Served("--shaper", "mine.py:mine", "--record", "mine.mcap") as served:

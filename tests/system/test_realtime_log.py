@@ -5,7 +5,6 @@ The log has no reference before shaping, and needs none: without a shaper the ta
 
 import asyncio
 import csv
-import os
 import re
 import signal
 import subprocess
@@ -16,6 +15,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from tests.conformance.served import PATIENCE
+from tests.places import own_address
 
 from tvist_lab.mcap_file import read
 from tvist_lab.metrics import Runs, measure, motions, table_2
@@ -112,7 +112,7 @@ def both(tmp_path_factory):
     """
     folder = tmp_path_factory.mktemp("logged")
     log, recorded = folder / "realtime.csv", folder / "run.mcap"
-    host = f"127.22.{os.getpid() % 250}.1"
+    host = own_address(1)
     options = ["--clock", "lockstep", "--ur", "--ur-address", host, "--record", str(recorded)]
     said = asyncio.run(experiment(options, host, str(log)))
     return SimpleNamespace(said=said, log=logged(log), recorded=read(recorded).recording)

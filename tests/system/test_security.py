@@ -16,6 +16,8 @@ from tvist_client.errors import NotConnectedError
 
 from .keyring import forge, free_tls_endpoint, leave_out, made, shown, tvist
 
+pytestmark = pytest.mark.realtime
+
 FAR = [1.0, *Q1[1:]]
 STREAMS = ("state", "event", "telemetry", "truth")
 REMOTE = zenoh.Locality.REMOTE
@@ -110,6 +112,7 @@ def keys_in(heard):
 
 
 class TestOperator:
+    @pytest.mark.quick
     def test_moves_and_sees_it(self, operator):
         with operator.control("anna") as token:
             motion = operator.command("move_j", token=token, q=FAR)["id"]

@@ -12,6 +12,8 @@ from tvist_protocol.codec import MAX_BYTES
 
 from .keyring import free_tls_endpoint, made, shown
 
+pytestmark = pytest.mark.realtime
+
 LONG = {"transport/unicast/open_timeout": 30_000}
 
 

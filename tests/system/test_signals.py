@@ -12,6 +12,8 @@ from tests.conformance.wire import Wire
 
 from tvist_lab.mcap_file import read
 
+pytestmark = pytest.mark.realtime
+
 ENDING = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT]
 
 SIGNALLED = """

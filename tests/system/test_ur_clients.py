@@ -2,7 +2,6 @@
 
 import json
 import math
-import os
 import struct
 import subprocess
 import sys
@@ -14,11 +13,14 @@ import msgspec
 import pytest
 from tests.conformance.served import PATIENCE, Served
 from tests.conformance.wire import Q1, Wire
+from tests.places import own_address
 
 from tvist_controller.instruments.snapshot import Instruments
 from tvist_lab.mcap_file import read
 from tvist_plant.description import load
 from tvist_protocol.io import Io
+
+pytestmark = pytest.mark.realtime
 
 pytest.importorskip("rtde_receive")
 
@@ -81,11 +83,6 @@ MADE_BY_THE_CLIENT = {
     "isProtectiveStopped": lambda of: bool(of.safety_status_bits >> 2 & 1),
 }
 """Getters whose values the client makes of several."""
-
-
-def address(last):
-    """An address of this machine that other runs do not have: the clients know no ports but UR's."""
-    return f"127.21.{os.getpid() % 250}.{last}"
 
 
 def started(program, *arguments):
@@ -165,12 +162,12 @@ def session(tmp_path_factory):
     At half the speed: the client has to read all of a tick before the next one comes.
     """
     path = tmp_path_factory.mktemp("recorded") / "all.mcap"
-    options = ("--ur", "--ur-address", address(1), "--record", str(path), "--speed", "0.5")
+    options = ("--ur", "--ur-address", own_address(1), "--record", str(path), "--speed", "0.5")
     with Served(*options) as served:
         with Wire(served.endpoint) as wire, wire.control() as token:
             wire.listen("io")
             wire.wait("io")
-            with started("ur_reader.py", address(1)) as reader:
+            with started("ur_reader.py", own_address(1)) as reader:
                 assert reader.stdout.readline() == "reading\n"
                 live(wire, token)
                 out, _ = reader.communicate(timeout=PATIENCE)
@@ -249,15 +246,16 @@ def test_a_getter_tells_what_its_variables_say(pairs, getter):
 @pytest.fixture(scope="module")
 def quiet():
     """A robot for clients that set."""
-    with Served("--ur", "--ur-address", address(2), "--quiet") as served:
+    with Served("--ur", "--ur-address", own_address(2), "--quiet") as served:
         yield served
 
 
+@pytest.mark.quick
 def test_everything_that_can_be_set_is_and_zenoh_shows_it(quiet):
     with (
         Wire(quiet.endpoint) as wire,
-        Client("rtde_io", "RTDEIOInterface", address(2)) as setter,
-        Client("rtde_receive", "RTDEReceiveInterface", address(2)) as robot,
+        Client("rtde_io", "RTDEIOInterface", own_address(2)) as setter,
+        Client("rtde_receive", "RTDEReceiveInterface", own_address(2)) as robot,
     ):
         wire.listen("io")
         for call, first, count in (
@@ -292,21 +290,21 @@ def test_everything_that_can_be_set_is_and_zenoh_shows_it(quiet):
 
 
 def test_of_two_clients_the_second_is_told_that_its_variables_are_in_use(quiet):
-    with Client("rtde_io", "RTDEIOInterface", address(2)) as first:
+    with Client("rtde_io", "RTDEIOInterface", own_address(2)) as first:
         assert first.setInputIntRegister(18, 1)
         with (
             pytest.raises(AssertionError, match="already in use"),
-            Client("rtde_io", "RTDEIOInterface", address(2)),
+            Client("rtde_io", "RTDEIOInterface", own_address(2)),
         ):
             pass
         assert first.setInputIntRegister(18, 2)
-    with Client("rtde_io", "RTDEIOInterface", address(2)) as second:
+    with Client("rtde_io", "RTDEIOInterface", own_address(2)) as second:
         assert second.setInputIntRegister(18, 3)
 
 
 @pytest.fixture
 def dashboard(quiet):
-    with Client("dashboard_client", "DashboardClient", address(2)) as dashboard:
+    with Client("dashboard_client", "DashboardClient", own_address(2)) as dashboard:
         dashboard.connect()
         dashboard.brakeRelease()
         until(dashboard.robotmode, "Robotmode: RUNNING")
@@ -367,7 +365,7 @@ def test_the_dashboard_plays_pauses_and_stops_a_program(dashboard):
 def test_a_protective_stop_is_seen_and_unlocked(quiet, dashboard):
     with (
         Wire(quiet.endpoint) as wire,
-        Client("rtde_receive", "RTDEReceiveInterface", address(2)) as robot,
+        Client("rtde_receive", "RTDEReceiveInterface", own_address(2)) as robot,
     ):
         dashboard.disconnect()  # and with it goes its control
         until(lambda: wire.info()["control"], None)

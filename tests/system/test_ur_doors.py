@@ -1,19 +1,15 @@
 """UR's interfaces of served robots, over real sockets and processes."""
 
-import os
 import re
 import socket
 import subprocess
 import sys
-import time
 
 import pytest
 from tests.conformance.served import PATIENCE, Served
+from tests.places import own_address
 
-
-def address(last):
-    """An address of this machine that other runs do not have."""
-    return f"127.20.{os.getpid() % 250}.{last}"
+pytestmark = pytest.mark.realtime
 
 
 def asked(host, *lines, port=29999):
@@ -32,8 +28,8 @@ def asked(host, *lines, port=29999):
 
 
 def test_each_of_several_robots_has_doors_of_its_own():
-    with Served("--robots", "ur5e*2", "--ur", "--ur-address", address(1), name=None) as served:
-        first, second = (asked(address(last), "get serial number", "power off") for last in (1, 2))
+    with Served("--robots", "ur5e*2", "--ur", "--ur-address", own_address(1), name=None) as served:
+        first, second = (asked(own_address(last), "get serial number", "power off") for last in (1, 2))
         assert first[0] != second[0]
         assert first[1] == second[1] == "Powering off"
         assert served.end() == 0
@@ -41,8 +37,8 @@ def test_each_of_several_robots_has_doors_of_its_own():
 
 def test_a_client_at_a_door_does_not_keep_the_robot_from_ending():
     with (
-        Served("--ur", "--ur-address", address(9)) as served,
-        socket.create_connection((address(9), 30003), PATIENCE) as stream,
+        Served("--ur", "--ur-address", own_address(9)) as served,
+        socket.create_connection((own_address(9), 30003), PATIENCE) as stream,
     ):
         assert len(stream.recv(1220, socket.MSG_WAITALL)) == 1220
         assert served.end() == 0
@@ -78,21 +74,19 @@ def test_what_is_wrong_is_said_in_a_sentence(options, code, named):
 
 
 def test_the_console_says_what_became_of_a_program_and_a_flood_of_them_does_not_flood_it():
-    with Served("--ur", "--ur-address", address(17)) as served:
-        with socket.create_connection((address(17), 30002), PATIENCE) as stream:
+    with Served("--ur", "--ur-address", own_address(17)) as served:
+        with socket.create_connection((own_address(17), 30002), PATIENCE) as stream:
             host, port = stream.getsockname()
             stream.sendall(b"def there():\n  movej([0,0,0,0,0,0])\nend\n")
             served.wait_until_said(
                 f'the script "there" of the client {host}:{port} of port 30002 was not run'
             )
             stream.sendall(b"textmsg(1)\n" * 10_000)
-            began = time.monotonic()
             served.wait_until_said("not shown since the last line")
         assert served.end() == 0
-        took = time.monotonic() - began
         lines = [line for line in served.lines if "the script" in line]
-        assert len(lines) <= 3 + took
         left_out = [
             int(count) for line in lines for count in re.findall(r"since the last line: (\d+)\)", line)
         ]
         assert len(lines) + sum(left_out) == 10_001
+        assert len(lines) < sum(left_out)  # one a second: tests/server/ur/test_notices.py

@@ -1,6 +1,5 @@
 """Every UR interface in lockstep: one client holds the clock and steps, and clients of a UR robot live by its steps."""
 
-import os
 import socket
 import struct
 from contextlib import ExitStack, contextmanager
@@ -9,6 +8,7 @@ import msgpack
 import pytest
 from tests.conformance.served import PATIENCE, Served
 from tests.conformance.wire import Wire
+from tests.places import own_address
 from tests.server.ur import decoders, rtde_client
 
 from tvist_controller.programs.built_in import PAPER, built_in
@@ -20,11 +20,6 @@ BOOTED, TICK = 40.0, 0.002
 FAR = [0.6, -2.9, 0.3, -1.4, 0.2, 0.4]
 REALTIME_BYTES = 1220
 READ = ("timestamp", "target_q", "actual_q", "actual_tool_accelerometer", "runtime_state")
-
-
-def address(last):
-    """An address of this machine that other runs do not have: the interfaces keep UR's own ports."""
-    return f"127.22.{os.getpid() % 250}.{last}"
 
 
 def timestamps(ticks):
@@ -111,9 +106,9 @@ def robot_states(door, until):
 @contextmanager
 def lockstep(last, path):
     with Served(
-        "--clock", "lockstep", "--ur", "--ur-address", address(last), "--record", str(path)
+        "--clock", "lockstep", "--ur", "--ur-address", own_address(last), "--record", str(path)
     ) as served:
-        yield served, address(last)
+        yield served, own_address(last)
 
 
 def take_clock(wire):
@@ -300,6 +295,7 @@ def test_the_going_of_the_stepping_client_ends_its_step_and_another_one_s_takes_
     assert next(entry.client for entry in journal if entry.kind == "client_gone") == "stepper"
 
 
+@pytest.mark.quick
 def test_unmodified_clients_of_ur_rtde_live_by_the_steps_of_another_client(tmp_path):
     pytest.importorskip("rtde_receive")
     from tests.system.test_ur_clients import Client, until

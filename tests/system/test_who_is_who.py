@@ -12,6 +12,8 @@ from tests.conformance.wire import Q1, Wire
 
 from tvist_lab.mcap_file import read
 
+pytestmark = pytest.mark.realtime
+
 HOLDER = """
 import sys
 sys.path.insert(0, sys.argv[1])

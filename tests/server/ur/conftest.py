@@ -5,7 +5,6 @@ from collections.abc import Callable
 from types import SimpleNamespace
 
 import pytest
-from hypothesis import settings
 
 from tvist_controller.controller import Controller
 from tvist_controller.instruments.snapshot import Instruments
@@ -18,10 +17,6 @@ from tvist_protocol.values import Payload
 from tvist_server.gateways.ur.doors import UrDoors
 
 from .desks import EVERYWHERE, Desk, until
-
-# On a busy machine any example can take long.
-settings.register_profile("busy", deadline=None)
-settings.load_profile("busy")
 
 UR5E = load("ur5e")
 TOKEN = "the-token"

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tests.examples import share
 
 from tvist_protocol.commands import SetSpeed
 from tvist_protocol.io import SetIo, SetRegisters
@@ -588,7 +589,7 @@ def survive(robot, control, snapshots, stream, cuts):
     assert not robot.inputs._owners
 
 
-@settings(quiet, max_examples=300)
+@settings(quiet, max_examples=share(300))
 @given(st.lists(generated, max_size=12).map(b"".join), st.lists(st.integers(0, 1500), max_size=6))
 def test_whatever_comes_is_survived(robot, control, snapshots, stream, cuts):
     control.commands.clear()

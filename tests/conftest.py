@@ -1,0 +1,59 @@
+"""What all tests share: which of them `make test` runs, which run alone, and figures that they measure."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+import tests.examples  # noqa: F401  registers the profiles
+from hypothesis import settings
+
+SYSTEM = Path(__file__).parent / "system"
+
+settings.load_profile("full")
+
+
+def pytest_collection_modifyitems(items):
+    """Mark what needs no mark of its own: see README.md."""
+    for item in items:
+        if SYSTEM in item.path.parents and not item.get_closest_marker("quick"):
+            item.add_marker(pytest.mark.slow)
+        if "realtime" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.realtime)
+
+
+def pytest_sessionstart(session):
+    """Compile the kernels before tests run side by side: numba's cache is not made for several that write at once."""
+    if getattr(session.config.option, "numprocesses", None):
+        compile_kernels()
+
+
+def compile_kernels():
+    """Have a robot make a shaped motion, whose kernels numba then finds on disk."""
+    from tvist_lab.in_process import free_setup, robot_in_process
+
+    async def move(shaper):
+        async with robot_in_process(free_setup(shaper=shaper)) as robot, robot.control("compiler") as arm:
+            await arm.move_j([0.1, -3.0, 0.1, -1.5, 0.1, 0.1])
+
+    for shaper in ("zv", "auto"):
+        asyncio.run(move(shaper))
+
+
+@pytest.fixture
+def measured(request):
+    """Note a figure, `measured(what, value)`, that `pytest -v` shows whether the test passes or fails."""
+
+    def note(what, value):
+        request.node.user_properties.append((what, str(value)))
+
+    return note
+
+
+def pytest_terminal_summary(terminalreporter):
+    """Show the figures that were measured."""
+    if terminalreporter.verbosity < 1:
+        return
+    for report in (*terminalreporter.getreports("passed"), *terminalreporter.getreports("failed")):
+        if report.when == "call":
+            for what, value in report.user_properties:
+                terminalreporter.write_line(f"{what}: {value}")
