@@ -44,7 +44,7 @@ def test_an_address_that_is_none_is_named(values, named):
 
 
 def test_everywhere_is_no_address_for_several():
-    with pytest.raises(ConfigError, match="address of their own"):
+    with pytest.raises(ConfigError, match="one address each"):
         config(ur_address=EVERYWHERE).doors(1)
 
 
