@@ -208,8 +208,8 @@ class TestARobotThatStands:
         text = (resources.files("tvist_plant") / "robots" / "ur5e.toml").read_text(encoding="utf-8")
         (tmp_path / "soft.toml").write_text(text.replace("27500.0", "9000.0"), encoding="utf-8")
         with Served("--robot", str(tmp_path / "soft.toml")) as served:
-            served.wait_until_said("measured on another arm")
-            assert "measured on another arm" in tvist("check", served.endpoint).assert_done().out
+            served.wait_until_said("was measured on a different arm")
+            assert "was measured on a different arm" in tvist("check", served.endpoint).assert_done().out
 
 
 class TestRecordAndAnalyze:
