@@ -100,7 +100,7 @@ def test_each_tells_its_own_figures(one, two):
 def test_check_says_which_robots_there_are(served):
     found = check(served.endpoint)
     assert (found.ok, found.robot, found.robots) == (True, "ur5e-1", ["ur5e-1", "ur5e-2"])
-    assert found.findings[0].said == f"ur5e-1 at {served.endpoint}, beside ur5e-2"
+    assert found.findings[0].said == f"ur5e-1 at {served.endpoint}; also there: ur5e-2"
     assert check(served.endpoint, "ur5e-2").robot == "ur5e-2"
     missing = check(served.endpoint, "ur5e")
     assert not missing.ok
