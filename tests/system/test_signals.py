@@ -126,7 +126,7 @@ def test_the_end_of_its_terminal_ends_it_with_the_recording_complete(tmp_path):
     os.close(its)
     said = b""
     try:
-        while b"Control+C ends it" not in said:
+        while b"Press Control+C to stop" not in said:
             said += os.read(ours, 4096)
         os.close(ours)
         assert process.wait(PATIENCE) == 0
