@@ -57,7 +57,7 @@ def test_without_the_option_nothing_listens():
         (["--ur-port", "rtde=x"], 2, "DOOR=PORT"),
         (["--ur-port", "rtdee=30004"], 2, "rtdee"),
         (["--ur-address", "192.168.0.1"], 2, "--insecure"),
-        (["--ur-address", "203.0.113.7", "--insecure"], 1, "no such address"),
+        (["--ur-address", "203.0.113.7", "--insecure"], 1, "does not have this address"),
     ],
 )
 def test_what_is_wrong_is_said_in_a_sentence(options, code, named):
