@@ -99,6 +99,7 @@ class Controller:
         self.programs = ProgramPlayer(
             setup.description, self.motion, safety, self._move_by_program, self._emit
         )
+        self._told_program = self.programs.progress
         self.filters = Filters(self.motion, source, setup.payload, self._emit)
         self._payload = DeclaredPayload(setup.payload, self.motion, self.filters, self._emit)
         self.peripherals = Peripherals(self._reporter.set_tcp)
@@ -114,7 +115,7 @@ class Controller:
     def rows(self) -> tuple[Row, ...]:
         """Commands on the whole robot."""
         return (
-            Row(c.SimulationReset, self._reset, changes_io=True),
+            Row(c.SimulationReset, self._reset),
             Row(c.SimulationStep, self._check_step, lease="none"),
         )
 
@@ -211,7 +212,7 @@ class Controller:
     def tick(self) -> tuple[State, list[Event]]:
         """One control period."""
         self._watch_time()
-        self._io_changed |= self.programs.advance()
+        self.programs.advance()
         try:
             sample = self.motion.step()
         except PlantError as error:
@@ -262,9 +263,10 @@ class Controller:
 
     def changed_io(self) -> Io | None:
         """Inputs, outputs and registers where they changed since this was asked last, before a tick; else None."""
-        if not self._io_changed:
+        program = self.programs.progress  # changes by itself, by events and with other commands
+        if not self._io_changed and program == self._told_program:
             return None
-        self._io_changed = False
+        self._io_changed, self._told_program = False, program
         return self.io(wrench=False)
 
     def truth(self) -> Truth:
@@ -281,7 +283,7 @@ class Controller:
         self._events.append(event)
         if kind in {"protective_stop", "safety_stop"}:
             self._stop_reasons.note(event, self.motion.safety_mode)
-        self._io_changed |= self.programs.hear(event)
+        self.programs.hear(event)
 
     def _watch_time(self) -> None:
         """End what is over, and what nobody keeps up."""
@@ -292,7 +294,7 @@ class Controller:
 
     def _interrupt(self, why: str) -> None:
         """End what nobody has control of any longer."""
-        self._io_changed |= self.programs.end()
+        self.programs.end()
         self.motion.interrupt(why)
 
     def _move_by_program(self, command: c.MoveJ) -> int:

@@ -63,22 +63,22 @@ class ProgramPlayer:
         """The line that is carried out, or comes next when it is played on, counted from 1; 0: none."""
         return 0 if self.state == "STOPPED" or self._next >= len(self._lines) else self._next + 1
 
-    def advance(self) -> bool:
-        """Begin the line that comes next, where it is its turn: first thing in every tick.
+    @property
+    def progress(self) -> tuple[str | None, ProgramState, int]:
+        """What `io` tells of the program: its name, what it does, and its line."""
+        return self.name, self.state, self.line
 
-        Returns:
-            Whether the state or the line has changed.
-        """
-        if self.state == "STOPPED":
-            return False
-        lines = self._lines
+    def advance(self) -> None:
+        """Begin the line that comes next, where it is its turn: first thing in every tick."""
         # Between two lines a safeguard stop finds no motion to pause: the next line waits.
-        waits = self.state == "PAUSED" or self._motion.safety.safeguard
-        if waits or self._moving is not None or not lines:
-            return False
+        if self.state != "PLAYING" or self._motion.safety.safeguard:
+            return
+        lines = self._lines
+        if self._moving is not None or not lines:
+            return
         if self._next == len(lines):
             self.end()
-            return True
+            return
         line = lines[self._next]
         try:
             self._moving = self._move(MoveJ(token=_OWN_TOKEN, q=line.q))
@@ -86,34 +86,25 @@ class ProgramPlayer:
             why = f"move to {line.pose} was refused: {refusal.reply.why}"
             self._emit("warning", code=refusal.reply.code, why=why, line=self._next + 1)
             self.end()
-            return True
-        return False
 
-    def hear(self, event: Event) -> bool:
-        """Take note of what has happened to the robot; whether that has changed the state or the line."""
-        before = self.state, self._next
+    def hear(self, event: Event) -> None:
+        """Take note of what has happened to the robot."""
         if event.kind == "protective_stop" and self.state != "STOPPED":
             self.state, self._moving = "PAUSED", None
         elif event.kind == "safety_stop" and event.category != 2:
             self.end()
-        elif event.id is not None and event.id == self._moving:
-            if event.kind == "motion_done":
-                self._moving = None
-                self._next += 1
-            elif (
-                event.kind == "motion_stopped" and event.code != "plant_failure"
-            ):  # a protective stop follows that
-                self.end()
-        return (self.state, self._next) != before
+        elif event.id is None or event.id != self._moving:
+            return
+        elif event.kind == "motion_done":
+            self._moving = None
+            self._next += 1
+        # A protective stop follows a failure of the plant.
+        elif event.kind == "motion_stopped" and event.code != "plant_failure":
+            self.end()
 
-    def end(self) -> bool:
-        """End the program; what moves is left to others.
-
-        Returns:
-            Whether one was playing or paused.
-        """
-        before, self.state, self._next, self._moving = self.state, "STOPPED", 0, None
-        return before != "STOPPED"
+    def end(self) -> None:
+        """End the program; what moves is left to others."""
+        self.state, self._next, self._moving = "STOPPED", 0, None
 
     def stop_moving(self) -> None:
         """End a program that moves the arm, also where its next motion has not begun: none begins after a stop."""
