@@ -91,7 +91,7 @@ class MotionControl:
         return MotionBasis(
             q=cycle.reference,
             speed=self.motions.wanted_speed,
-            slowest=self.motions.reduced_velocity if self.safety.reduced else None,
+            slowest=self.motions.slowest,
             excess=cycle.tvist.excess,
             carried=self.collisions.carried,
             bodies=cycle.inverse_dynamics.bodies,
@@ -217,7 +217,8 @@ class MotionControl:
             RefusalError: The arm is busy, or such a stream may be too fast.
         """
         target = self._check("servo_start")
-        if self.safety.reduced and limits.velocity > (most := self.motions.reduced_velocity):
+        most = self.motions.slowest
+        if most is not None and limits.velocity > most:
             why = f"velocity is {limits.velocity:g} rad/s; safety_mode is REDUCED, which allows {most:.3g}"
             raise RefusalError("limit_velocity", "velocity", why, most)
         self.activity = target

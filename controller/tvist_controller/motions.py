@@ -6,7 +6,7 @@ from tvist_controller.cycle import ControlCycle
 from tvist_controller.events import Emit, Told
 from tvist_controller.moving import Move
 from tvist_controller.planning.move_planner import PlannedMove
-from tvist_controller.safety import REDUCED_SHARE
+from tvist_controller.safety import REDUCED_SHARE, rate_of
 from tvist_controller.safety_system import SafetySystem
 from tvist_protocol.replies import Code
 
@@ -22,8 +22,7 @@ class Motions:
 
     def __init__(self, cycle: ControlCycle, safety: SafetySystem, emit: Emit) -> None:
         self._cycle, self._safety, self._emit = cycle, safety, emit
-        self.reduced_velocity = REDUCED_SHARE * min(cycle.description.limits.velocity)
-        """Largest velocity of a joint where the safety system reduces the speed [rad/s]."""
+        self._reduced_velocity = REDUCED_SHARE * min(cycle.description.limits.velocity)
         self._started = 0
         self._move: Move | None = None
         self.wanted_speed = 1.0
@@ -38,6 +37,11 @@ class Motions:
     def speed(self) -> float:
         """Rate of the running motion's time; without one, that of the next [-]."""
         return self.wanted_speed if self._move is None else self._move.rate
+
+    @property
+    def slowest(self) -> float | None:
+        """Largest velocity of a joint while the safety system reduces the speed [rad/s]; None while it does not."""
+        return self._reduced_velocity if self._safety.reduced else None
 
     def begin(self, planned: PlannedMove) -> int:
         """Start a motion; its number."""
@@ -85,6 +89,4 @@ class Motions:
 
     def _rate(self, move: Move) -> float:
         """Rate for the time of a motion [-]."""
-        if self._safety.reduced:
-            return min(self.wanted_speed, self.reduced_velocity / move.velocity)
-        return self.wanted_speed
+        return rate_of(self.wanted_speed, move.velocity, self.slowest)

@@ -27,6 +27,17 @@ REDUCED_SHARE = 0.25
 """Share of the joints' velocity that is left while the safety system reduces it [-]."""
 
 
+def rate_of(speed: float, velocity: float, slowest: float | None) -> float:
+    """Rate for the time of a motion [-].
+
+    Args:
+        speed: Share of the programmed speed that was set [-].
+        velocity: The motion's velocity limit [rad/s].
+        slowest: Velocity that reduced speed leaves [rad/s]; None where it is not reduced.
+    """
+    return speed if slowest is None else min(speed, slowest / velocity)
+
+
 class TorqueRoom:
     """What the joints' torques, less what gravity and velocities take, leave to a stream's accelerations.
 

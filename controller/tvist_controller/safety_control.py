@@ -27,8 +27,8 @@ class SafetyControl:
             return
         system.reduced = reduced
         motion.motions.keep_rate()
-        stream = motion.streams.stream
-        if reduced and stream is not None and stream.limits.velocity > motion.motions.reduced_velocity:
+        stream, most = motion.streams.stream, motion.motions.slowest
+        if stream is not None and most is not None and stream.limits.velocity > most:
             motion.stop(None, "speed was reduced", "limit_velocity")
         share = f"{100 * REDUCED_SHARE:g} % of the joints' limits" if reduced else "no longer reduced"
         self._emit("warning", why=f"safety_mode is {motion.safety_mode.name}: speed is {share}")

@@ -13,7 +13,7 @@ from tvist_controller.line_filter import LineFilter
 from tvist_controller.planning.basis import MotionBasis
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.refusal import RefusalError
-from tvist_controller.safety import largest_torque, torque_along
+from tvist_controller.safety import largest_torque, rate_of, torque_along
 from tvist_controller.setup import Setup, body
 from tvist_controller.trajectory import JointLine, Limits, Motion, Path, quickest_motion
 from tvist_plant.plant import PERIOD
@@ -73,7 +73,7 @@ class MovePlanner:
             RefusalError: There is no such motion, or something would meet on its way.
         """
         spared = replace(limits, acceleration=limits.acceleration * (1.0 - basis.excess))
-        rate = basis.speed if basis.slowest is None else min(basis.speed, basis.slowest / limits.velocity)
+        rate = rate_of(basis.speed, limits.velocity, basis.slowest)
         try:
             motion = quickest_motion(path, spared, PERIOD, rate)
         except ValueError as error:
