@@ -46,9 +46,7 @@ class Host:
         """Admit and carry out an encoded command."""
         admitted = admit(data, self.standing.lease, self.standing.clock)
         if isinstance(admitted, Refused):
-            self.controller.counters.commands += 1
-            self.controller.counters.refused += 1
-            return admitted
+            return self._turned_away(admitted)
         return self.carry_out(admitted)
 
     def carry_out(self, admitted: Admitted, plan: Plan | None = None, attend: Attend | None = None) -> Reply:
@@ -62,9 +60,7 @@ class Host:
         """
         command = admitted.command
         if self._stepping and isinstance(command, SimulationStep):
-            self.controller.counters.commands += 1
-            self.controller.counters.refused += 1
-            return _BUSY
+            return self._turned_away(_BUSY)
         session = admitted.session
         entry = Entry(tick=self._next, kind="command", message=admitted.content, session=session)
         try:
@@ -142,6 +138,12 @@ class Host:
     @property
     def _next(self) -> int:
         return self.controller.tick_number + 1
+
+    def _turned_away(self, refusal: Refused) -> Refused:
+        """Count a command that the controller never gets."""
+        self.controller.counters.commands += 1
+        self.controller.counters.refused += 1
+        return refusal
 
     def _note(self, entry: Entry) -> None:
         for sink in self._sinks:

@@ -6,8 +6,8 @@ from typing import Self
 import numpy as np
 
 from tvist_controller.control.differentiator import Floats
-from tvist_controller.trajectory import Limits, Posture
-from tvist_shaping.base import Filter
+from tvist_controller.trajectory import Limits
+from tvist_shaping.base import Filter, Posture
 from tvist_shaping.fade import Fade
 
 

@@ -1,13 +1,10 @@
 """The shaped reference: what the filter gave, the joint positions that it stands for, and how both move."""
 
 import copy
-from collections.abc import Callable
 from typing import Self
 
 from tvist_controller.control.differentiator import Differentiator, Floats, Target
-
-Posture = Callable[[Floats], Floats]
-"""From a path's parameter, shape (m,), to joint positions, shape (n,) [rad]."""
+from tvist_shaping.base import Posture
 
 
 class ShapedReference:

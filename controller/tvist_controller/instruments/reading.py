@@ -5,15 +5,13 @@ from typing import Any
 from tvist_controller.instruments.meters import Meters
 from tvist_controller.instruments.ratings import JointRating
 from tvist_controller.instruments.rigid_body import RigidBody
-from tvist_controller.instruments.wrench import ToolWrench
+from tvist_controller.instruments.wrench import RUNNING, ToolWrench
 from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.stream import State
 
 POWERED = frozenset(range(RobotMode.POWER_ON, RobotMode.RUNNING + 1))
 """Robot modes in which the arm has power."""
-RUNNING = int(RobotMode.RUNNING)
-"""The one in which drives hold it: a plain number, since this is asked often."""
 
 
 class Reading:

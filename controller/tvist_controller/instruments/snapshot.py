@@ -5,12 +5,12 @@ from typing import Any
 from tvist_controller.instruments.joints import JointValues
 from tvist_controller.instruments.meters import Meters
 from tvist_controller.instruments.ratings import joint_ratings
-from tvist_controller.instruments.reading import POWERED, RUNNING
+from tvist_controller.instruments.reading import POWERED
 from tvist_controller.instruments.rigid_body import RigidBody
 from tvist_controller.instruments.status import StatusValues
 from tvist_controller.instruments.terminals import TerminalValues
 from tvist_controller.instruments.tool import ToolValues
-from tvist_controller.instruments.wrench import ToolWrench
+from tvist_controller.instruments.wrench import RUNNING, ToolWrench
 from tvist_plant.description import RobotDescription
 from tvist_protocol.io import Io
 from tvist_protocol.stream import State

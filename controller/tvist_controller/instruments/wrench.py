@@ -16,7 +16,7 @@ NEAR_SINGULAR = 0.01
 DAMPING = 0.08
 """λ where the posture is singular [m, or -]."""
 RUNNING = int(RobotMode.RUNNING)
-"""The robot mode in which the drives hold the arm: braked, they feel nothing."""
+"""The robot mode in which the drives hold the arm: a plain number, since it is asked often."""
 
 
 class ToolWrench:

@@ -6,7 +6,7 @@ from tvist_controller.trajectory.double_s import DoubleS
 from tvist_controller.trajectory.known import Known
 from tvist_controller.trajectory.limits import Limits
 from tvist_controller.trajectory.motion import Motion, quickest_motion
-from tvist_controller.trajectory.path import JointLine, Path, Posture, Way
+from tvist_controller.trajectory.path import JointLine, Path, Way
 from tvist_controller.trajectory.path_stop import PathStop
 from tvist_controller.trajectory.stop import Stop
 from tvist_controller.trajectory.stream import SetpointStream
@@ -22,7 +22,6 @@ __all__ = [
     "Motion",
     "Path",
     "PathStop",
-    "Posture",
     "Rest",
     "SetpointStream",
     "Stop",

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tvist_controller.trajectory.limits import Floats, Limits
-
-Posture = Callable[[Floats], Floats]
-"""From a path's parameter, shape (m,), to joint positions, shape (n,) [rad]."""
+from tvist_shaping.base import Posture
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ from typing import Protocol
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_controller.programs.built_in import Move
-from tvist_protocol.commands import Command
 from tvist_protocol.io import Io
 from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramState, ProgramStop
 from tvist_protocol.replies import Refused, Reply
@@ -136,8 +135,7 @@ class Programs:
             control: Control of the client that stops it.
             heard: Called once.
         """
-        command: Command = ProgramStop()
-        control.ask(command, self._changed("STOPPED", heard))
+        control.ask(ProgramStop(), self._changed("STOPPED", heard))
 
     def io(self, io: Io) -> None:
         """The controller says how it stands."""
