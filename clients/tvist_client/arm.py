@@ -12,6 +12,7 @@ from tvist_client.errors import (
     ProtectiveStopError,
     UnexpectedReplyError,
 )
+from tvist_client.granted import granted
 from tvist_client.motion import Motion
 from tvist_client.payload import make_payload
 from tvist_client.servo import Servo
@@ -322,15 +323,12 @@ async def hold_control(
     check_client_name(client)
     seconds = number(lease_s, "lease_s")
     clock = await robot.clock()
-    await transport.announce(client)
-    try:
-        accepted = await robot.request(TakeControl(client=client, lease_s=seconds))
-        if not isinstance(accepted, Accepted) or accepted.token is None:
-            raise UnexpectedReplyError(f"take_control was answered by {accepted}, without a token")
-        arm = robot.arm = Arm(robot, accepted.token)
+    take = TakeControl(client=client, lease_s=seconds)
+    async with granted(robot, transport, take, lambda token: ReleaseControl(token=token)) as grant:
+        arm = robot.arm = Arm(robot, grant.token)
         alive = None
         if clock == "realtime":
-            alive = asyncio.create_task(arm.keep_alive_every((accepted.lease_s or seconds) / 3))
+            alive = asyncio.create_task(arm.keep_alive_every((grant.lease_s or seconds) / 3))
         try:
             yield arm
         finally:
@@ -339,11 +337,6 @@ async def hold_control(
                 await asyncio.wait([alive])
             if robot.arm is arm:
                 robot.arm = None
-            # Control that is lost, or a robot that has gone, needs no release.
-            with contextlib.suppress(RefusedError, ClientError):
-                await robot.request(ReleaseControl(token=arm.token))
-    finally:
-        await transport.withdraw(client)
 
 
 def _modes(values: float | Iterable[float] | None, where: str) -> tuple[float, ...] | None:

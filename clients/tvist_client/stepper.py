@@ -4,13 +4,13 @@ import contextlib
 from collections.abc import AsyncIterator, Sequence
 from typing import TYPE_CHECKING
 
-from tvist_client.errors import ClientError, UnexpectedReplyError
+from tvist_client.errors import UnexpectedReplyError
+from tvist_client.granted import granted
 from tvist_client.transports.base import Transport
 from tvist_client.values import whole
 from tvist_protocol.commands import ReleaseClock, SimulationStep, StepSetpoint, TakeClock
-from tvist_protocol.errors import RefusedError
 from tvist_protocol.keys import check_client_name
-from tvist_protocol.replies import Accepted, Done
+from tvist_protocol.replies import Done
 
 if TYPE_CHECKING:
     from tvist_client.robot import Robot
@@ -64,22 +64,15 @@ async def hold_clock(robot: "Robot", transport: Transport, client: str) -> Async
         client: Name of the client.
     """
     check_client_name(client)
-    await transport.announce(client)
-    try:
-        accepted = await robot.request(TakeClock(client=client))
-        if not isinstance(accepted, Accepted) or accepted.token is None:
-            raise UnexpectedReplyError(f"take_clock was answered by {accepted}, without a token")
-        stepper = robot.stepper = Stepper(robot, accepted.token)
+    async with granted(
+        robot, transport, TakeClock(client=client), lambda token: ReleaseClock(token=token)
+    ) as grant:
+        stepper = robot.stepper = Stepper(robot, grant.token)
         try:
             yield stepper
         finally:
             if robot.stepper is stepper:
                 robot.stepper = None
-            # A clock that is lost, or a robot that has gone, needs no release.
-            with contextlib.suppress(RefusedError, ClientError):
-                await robot.request(ReleaseClock(token=stepper.token))
-    finally:
-        await transport.withdraw(client)
 
 
 async def step(

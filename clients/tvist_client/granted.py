@@ -1,0 +1,54 @@
+"""Rights on a robot, control or the clock, held for as long as a block lasts."""
+
+import contextlib
+from collections.abc import AsyncIterator, Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+from tvist_client.errors import ClientError, UnexpectedReplyError
+from tvist_client.transports.base import Transport
+from tvist_protocol.channels import tag
+from tvist_protocol.commands import Command, TakeClock, TakeControl
+from tvist_protocol.errors import RefusedError
+from tvist_protocol.replies import Accepted
+
+if TYPE_CHECKING:
+    from tvist_client.robot import Robot
+
+
+class Grant(NamedTuple):
+    """A right that the robot has given."""
+
+    token: str
+    lease_s: float | None
+    """How long it lasts without a sign of life [s]; None: it does not run out."""
+
+
+@contextlib.asynccontextmanager
+async def granted(
+    robot: "Robot", transport: Transport, take: TakeControl | TakeClock, release: Callable[[str], Command]
+) -> AsyncIterator[Grant]:
+    """Hold a right for as long as the block lasts.
+
+    Args:
+        robot: Robot that gives it.
+        transport: The robot's; the client is announced there first, so that its going gives the right back.
+        take: Command that asks for the right.
+        release: Makes the command that gives it back, with its token.
+
+    Raises:
+        RefusedError: Another client holds it.
+        UnexpectedReplyError: The answer has no token.
+    """
+    await transport.announce(take.client)
+    try:
+        accepted = await robot.request(take)
+        if not isinstance(accepted, Accepted) or accepted.token is None:
+            raise UnexpectedReplyError(f"{tag(type(take))} was answered by {accepted}, without a token")
+        try:
+            yield Grant(accepted.token, accepted.lease_s)
+        finally:
+            # A right that is lost, or a robot that has gone, needs no release.
+            with contextlib.suppress(RefusedError, ClientError):
+                await robot.request(release(accepted.token))
+    finally:
+        await transport.withdraw(take.client)
