@@ -78,13 +78,13 @@ class Server:
     def _gateways(self, robot: ServedRobot, config: ServeConfig, number: int) -> list[Gateway]:
         name, desk, lockstep = robot.setup.name, robot.reception, config.clock != "realtime"
         gateways: list[Gateway] = [
-            self._network.gateway(name, desk, lockstep=lockstep, truth=robot.setup.truth),
-            ConsoleGateway(self._console, name, partial(config.command_line, name=name)),
+            self._network.gateway(name, desk, lockstep=lockstep, truth=robot.setup.truth)
         ]
         if config.ur:
             doors = _doors(robot, config, number)
             self.ur.append((doors.address, doors.ports))
-            gateways.insert(1, doors)
+            gateways.append(doors)
+        gateways.append(ConsoleGateway(self._console, name, partial(config.command_line, name=name)))
         return gateways
 
     # ------------------------------------------------------------------ life
