@@ -44,7 +44,7 @@ class Motion:
 
     @property
     def ended(self) -> bool:
-        """Whether the motion moves no more."""
+        """True once the motion has ended."""
         return self._motion.ended
 
     def wait(self) -> Self:

@@ -33,7 +33,7 @@ class Motion:
 
     @property
     def ended(self) -> bool:
-        """Whether the motion moves no more, or nothing more will be heard of it."""
+        """True once the motion has ended, or the connection that reports its end is lost."""
         return self._ended.is_set()
 
     async def wait(self) -> "Motion":

@@ -49,7 +49,7 @@ class Simulation(Leased):
     async def step(self, ticks: int, setpoints: Sequence[StepSetpoint] | None = None) -> int:
         """Let 1 to 100000 ticks pass at once, in lockstep and free; `Robot.advance` takes any number.
 
-        Where this client holds the clock, too (`Robot.clock_control`), it steps by that right.
+        If this client also holds the clock (`Robot.clock_control`), the clock's token is used.
 
         Args:
             ticks: Number of control periods.

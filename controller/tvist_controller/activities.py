@@ -35,7 +35,7 @@ def runtime_of(activity: Activity, *, slowing: bool) -> RuntimeState:
 
 
 def at_rest(activity: Activity, *, emergency: bool) -> Activity:
-    """What is left of an activity where the arm was put somewhere at rest.
+    """Activity of a robot whose arm was put at rest somewhere else.
 
     Args:
         activity: Previous activity.

@@ -32,7 +32,7 @@ class Ahead:
         self.references: list[Floats] = [shaped.joints.published.q, shaped.joints.position]
         """The two shaped references played last and those to come, one a tick, each of shape (n,) [rad]."""
         self.rests = False
-        """Whether the last of them rests: then there are no more."""
+        """True once the last of them is at rest: no more will follow."""
 
     def until(self, ticks: int) -> None:
         """Run on until so many references to come are known, or they rest."""

@@ -35,4 +35,4 @@ class Row(NamedTuple):
     lease: Literal["needed", "if named", "none"] = "needed"
     """Whether its token must be that of the lease: always, where it has one, or never: it names something else."""
     changes_io: bool = False
-    """Whether it may change what `io` tells."""
+    """True if the command may change what `io` reports."""

@@ -129,7 +129,7 @@ class ControlCycle:
         return Sample(reference, target, torque, command.torque, measured)
 
     def _guarded(self, guard: LookAhead, reference: Floats, shaped: Floats) -> tuple[Floats, Floats]:
-        """What is played in place of a stream's reference from which no stop would be clear."""
+        """Return the stream's reference, or that of a stop if no collision-free stop would lead on from it."""
         stop = None if self.stopping else guard(self._shaped.joints.after(shaped))
         if stop is None:
             return reference, shaped

@@ -30,7 +30,7 @@ class DeclaredPayload:
         self._description = motion.cycle.description
         self._monitor = PayloadMonitor(self._description, body(payload))
         self._held = False
-        """Whether the brakes have held the arm since the drives were listened to last."""
+        """True if the brakes have held the arm since the last measurement of the drives."""
         self.rows = (Row(SetPayload, self._declare, changes_io=True),)
 
     def watch(self, sample: Sample) -> None:
