@@ -246,11 +246,12 @@ def test_the_dashboard_pauses_resumes_and_stops_within_a_step(tmp_path):
         dashboard(host) as door,
     ):
         clock = take_clock(stepper)
-        other.listen("event")
+        other.listen("state", "event")
         stepper.step(clock, 1)
         running(door)
         assert door.ask(f"load {PAPER}") == f"Loading program: {PAPER}"
         answers = begin_step(stepper, clock, 100_000)
+        other.until(10)  # what is asked now is asked within the step
         assert door.ask("play") == "Starting program"
         other.wait("event", lambda event: event["kind"] == "motion_started")
         assert door.ask("pause") == "Pausing program"
