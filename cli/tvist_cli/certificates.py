@@ -71,7 +71,7 @@ class Pair:
         write_new(certificate, self.certificate.public_bytes(serialization.Encoding.PEM), 0o644)
 
 
-class Authority(Pair):
+class CertificateAuthority(Pair):
     """A certificate authority, which signs certificates."""
 
     @classmethod

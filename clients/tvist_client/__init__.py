@@ -18,7 +18,7 @@ from tvist_client.robot import Robot
 from tvist_client.servo import Servo
 from tvist_client.stepper import Stepper
 from tvist_client.stream import Stream
-from tvist_client.transports import LoopbackHost, LoopbackTransport, Transport, ZenohTransport
+from tvist_client.transports import InProcessRobot, LoopbackTransport, Transport, ZenohTransport
 from tvist_protocol.errors import ProtocolError, RefusedError, TvistError
 from tvist_protocol.info import Info
 from tvist_protocol.stream import Event, State, Telemetry, Truth
@@ -30,8 +30,8 @@ __all__ = [
     "Arm",
     "ClientError",
     "Event",
+    "InProcessRobot",
     "Info",
-    "LoopbackHost",
     "LoopbackTransport",
     "MisuseError",
     "Motion",

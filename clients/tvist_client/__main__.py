@@ -5,7 +5,7 @@ import sys
 
 import msgspec
 
-from tvist_client.check import Report, check
+from tvist_client.check import CheckReport, check
 from tvist_client.robot import ENDPOINT, NAME
 
 
@@ -39,7 +39,7 @@ def main(arguments: list[str] | None = None) -> int:
     return 0 if report.ok else 1
 
 
-def describe(report: Report) -> str:
+def describe(report: CheckReport) -> str:
     """Format a report for people, one line per step."""
     lines = [f"{'ok  ' if step.ok else 'FAIL'}  {step.what:<8} {step.said}" for step in report.findings]
     return "\n".join(lines)

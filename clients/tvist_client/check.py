@@ -32,7 +32,7 @@ class Finding(msgspec.Struct, frozen=True):
     """Result of the step, for people."""
 
 
-class Report(msgspec.Struct, frozen=True):
+class CheckReport(msgspec.Struct, frozen=True):
     """What a check found."""
 
     ok: bool
@@ -66,7 +66,7 @@ def check(
     *,
     alive: bool = False,
     security: Folder | None = None,
-) -> Report:
+) -> CheckReport:
     """Shake hands with a robot, see a state, have a command refused, and ask whether it may be moved.
 
     It changes nothing.
@@ -90,7 +90,7 @@ class _Check:
         self.rate: float | None = None
         self.findings: list[Finding] = []
 
-    async def run(self) -> Report:
+    async def run(self) -> CheckReport:
         step = "connect"
         try:
             if self.name is not None:
@@ -107,7 +107,7 @@ class _Check:
         except TvistError as error:
             self.findings.append(Finding(step, ok=False, said=str(error)))
         found = self.readiness
-        return Report(
+        return CheckReport(
             ok=all(finding.ok for finding in self.findings),
             endpoint=self.endpoint,
             robot=self.name or "",

@@ -76,7 +76,7 @@ class Motion:
             self._ended.set()
 
 
-class Motions:
+class MotionsByNumber:
     """The motions of one robot by number, known by their answer or by an event, whichever comes first.
 
     Args:

@@ -8,7 +8,7 @@ from typing import Self, TypeVar
 from tvist_client.arm import Arm, hold_control
 from tvist_client.errors import MisuseError, NotConnectedError, UnexpectedReplyError
 from tvist_client.feed import Feed
-from tvist_client.motion import Motion, Motions
+from tvist_client.motion import Motion, MotionsByNumber
 from tvist_client.stepper import MAX_STEP, Stepper, hold_clock
 from tvist_client.stream import Stream
 from tvist_client.transports.base import Transport
@@ -65,7 +65,7 @@ class Robot:
         self._telemetries: Feed[Telemetry] = Feed(transport, "telemetry", decode_telemetry, once_a_tick=False)
         self._ios: Feed[Io] = Feed(transport, "io", decode_io, once_a_tick=False)
         self._feeds = (self._states, self._events, self._truths, self._telemetries, self._ios)
-        self.motions = Motions(self._until_ended)
+        self.motions = MotionsByNumber(self._until_ended)
         # Before any command is sent, since an event may come before the answer.
         self._events.listen(self.motions.on_event)
         transport.on_lost(self._on_lost)

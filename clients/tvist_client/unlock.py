@@ -22,7 +22,7 @@ _WHAT_IT_FOUND: dict[str | None, str] = {
 _ALLOW_POWER = {mode.name for mode in (SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.SAFEGUARD_STOP)}
 
 
-class Report(msgspec.Struct, frozen=True):
+class UnlockReport(msgspec.Struct, frozen=True):
     """What was done, and what remains."""
 
     ok: bool
@@ -50,7 +50,7 @@ def unlock(
     *,
     power_on: bool = False,
     security: Folder | None = None,
-) -> Report:
+) -> UnlockReport:
     """Take control, release what a client can release, and look whether it holds.
 
     A robot that is ready already is left alone. In lockstep time passes by some hundred ticks.
@@ -112,7 +112,9 @@ async def _rest(robot: Robot) -> None:
         await robot.rest()
 
 
-async def _unlock(endpoint: str, name: str | None, security: Folder | None, *, power_on: bool) -> Report:
+async def _unlock(
+    endpoint: str, name: str | None, security: Folder | None, *, power_on: bool
+) -> UnlockReport:
     name = name or await only_robot(endpoint, NAME, security)
     command = unlock_command(endpoint, name, security)
     async with await Robot.connect(endpoint, name, security=security) as robot:
@@ -121,7 +123,7 @@ async def _unlock(endpoint: str, name: str | None, security: Folder | None, *, p
             async with robot.control(CLIENT) as arm:
                 done = await make_ready(robot, arm, power_on=power_on)
             found = await look(robot, command)
-    return Report(
+    return UnlockReport(
         ok=found.ready,
         endpoint=endpoint,
         robot=name,

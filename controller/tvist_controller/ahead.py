@@ -10,7 +10,7 @@ from tvist_controller.cycle import STILL, rests
 from tvist_controller.line_filter import LineFilter
 from tvist_controller.trajectory import Trajectory
 
-MOST_AHEAD = 4000
+MAX_AHEAD = 4000
 """Ticks that a motion is run ahead at most to see how it will end."""
 
 

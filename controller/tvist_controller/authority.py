@@ -6,7 +6,7 @@ from tvist_controller.command_row import Call, Row
 from tvist_controller.events import Emit
 from tvist_controller.refusal import RefusalError
 from tvist_controller.session import Session
-from tvist_controller.stepping import Stepping, check_step
+from tvist_controller.stepping import ClockLease, check_step
 from tvist_protocol.commands import (
     HandOver,
     KeepAlive,
@@ -33,7 +33,7 @@ class Authority:
     def __init__(
         self, session: Session, interrupt: Callable[[str], None], emit: Emit, *, steppable: bool
     ) -> None:
-        self.session, self.stepping = session, Stepping()
+        self.session, self.stepping = session, ClockLease()
         self._steppable = steppable
         self._interrupt, self._emit = interrupt, emit
         self.rows = (

@@ -21,7 +21,7 @@ from tvist_controller.instruments.wrench import ToolWrench
 from tvist_controller.motion import MotionControl
 from tvist_controller.motion_commands import MotionCommands
 from tvist_controller.peripherals import Peripherals
-from tvist_controller.planning.basis import Basis
+from tvist_controller.planning.basis import PlanBasis
 from tvist_controller.planning.filter_planner import PlannedFilter
 from tvist_controller.planning.planner import Plan, Planner
 from tvist_controller.programs.player import ProgramPlayer
@@ -142,10 +142,10 @@ class Controller:
     # ------------------------------------------------------------------ what comes in
 
     @property
-    def basis(self) -> Basis:
+    def basis(self) -> PlanBasis:
         """What plans for commands depend on, as it is now."""
         on = self.filters.basis
-        return Basis(on, self.motion.basis(on))
+        return PlanBasis(on, self.motion.basis(on))
 
     def receive(self, command: c.Command, plan: Plan | None = None, session: str | None = None) -> Reply:
         """Carry out a command between two ticks. A refused one changes nothing.

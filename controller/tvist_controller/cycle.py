@@ -11,14 +11,14 @@ from tvist_controller.control.joint_controllers import JointControllers
 from tvist_controller.control.shaped_reference import ShapedReference
 from tvist_controller.line_filter import LineFilter
 from tvist_controller.look_ahead import LookAhead
-from tvist_controller.safety import TorqueRoom
+from tvist_controller.safety import StreamTorqueRoom
 from tvist_controller.trajectory import (
     JointLine,
-    Limits,
-    Motion,
+    JointStop,
+    MotionLimits,
+    PlannedMotion,
     Rest,
     SetpointStream,
-    Stop,
     Trajectory,
     quickest_motion,
 )
@@ -77,7 +77,7 @@ class ControlCycle:
     ) -> None:
         self.description = description
         limits = description.limits
-        most = Limits(min(limits.velocity), min(limits.acceleration), min(limits.jerk))
+        most = MotionLimits(min(limits.velocity), min(limits.acceleration), min(limits.jerk))
         self.line_filter = LineFilter(tvist, most)
         self._plant: Plant = FlexibleArm(description, carried) if plant is None else plant
         self.inverse_dynamics = InverseDynamics(description, declared)
@@ -170,7 +170,7 @@ class ControlCycle:
         """Position of the shaped reference, shape (n,) [rad]."""
         return self._shaped.joints.position
 
-    def plan(self, target: Floats, limits: Limits, speed: float = 1.0) -> Motion:
+    def plan(self, target: Floats, limits: MotionLimits, speed: float = 1.0) -> PlannedMotion:
         """A point-to-point motion from where the reference is; the arm must be at rest.
 
         Args:
@@ -183,11 +183,11 @@ class ControlCycle:
         """
         return quickest_motion(JointLine(self.reference, target), limits, PERIOD, speed)
 
-    def stream(self, stream_period: float, limits: Limits) -> SetpointStream:
+    def stream(self, stream_period: float, limits: MotionLimits) -> SetpointStream:
         """Start to follow set-points; the arm must be at rest."""
         self.tvist.aim(None)
         reach = np.array(self.description.limits.position)
-        torque = TorqueRoom(self.description, self.inverse_dynamics)
+        torque = StreamTorqueRoom(self.description, self.inverse_dynamics)
         return self.start(
             SetpointStream(self.reference, stream_period, limits, PERIOD, reach=reach, torque=torque)
         )
@@ -203,10 +203,10 @@ class ControlCycle:
         self.trajectory, self.at_rest = trajectory, False
         return trajectory
 
-    def end_of(self, stream: SetpointStream) -> Stop:
+    def end_of(self, stream: SetpointStream) -> JointStop:
         """How a stream comes to rest inside its own limits, through the filter."""
         limits = stream.limits
-        return Stop(*stream.state, acceleration=limits.acceleration, jerk=limits.jerk, period=PERIOD)
+        return JointStop(*stream.state, acceleration=limits.acceleration, jerk=limits.jerk, period=PERIOD)
 
     @property
     def newest(self) -> Target:

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 
 from tvist_controller.control.differentiator import Floats
-from tvist_controller.trajectory import Limits
+from tvist_controller.trajectory import MotionLimits
 from tvist_shaping.base import Filter, Posture
 from tvist_shaping.fade import Fade
 
@@ -19,7 +19,7 @@ class LineFilter:
         limits: Limits of the motion that is shaped.
     """
 
-    def __init__(self, tvist: Filter, limits: Limits) -> None:
+    def __init__(self, tvist: Filter, limits: MotionLimits) -> None:
         self.tvist = tvist
         """The filter chosen last: in force, or about to be."""
         self.limits = limits

@@ -7,9 +7,9 @@ import numpy as np
 
 from tvist_controller.collision import CollisionModel, Meeting
 from tvist_controller.control.differentiator import Floats, Target
-from tvist_controller.safety import GENTLEST_STOP, TorqueRoom
+from tvist_controller.safety import GENTLEST_STOP, StreamTorqueRoom
 from tvist_controller.stops import StopPlanner
-from tvist_controller.trajectory import Stop, Way
+from tvist_controller.trajectory import JointStop, Way
 
 MARGIN = 0.8
 """Share of the acceleration that the torque leaves where a stop begins, with which it is made: what it leaves changes
@@ -33,12 +33,12 @@ class LookAhead:
         room: What torque leaves.
     """
 
-    def __init__(self, collisions: CollisionModel, stops: StopPlanner, room: TorqueRoom) -> None:
+    def __init__(self, collisions: CollisionModel, stops: StopPlanner, room: StreamTorqueRoom) -> None:
         self._collisions, self._stops, self._torque = collisions, stops, room
         self._centre: Floats | None = None
         self._room = 0.0
         self._carried = collisions.carried
-        self._before: tuple[Target, Callable[[], Stop]] | None = None
+        self._before: tuple[Target, Callable[[], JointStop]] | None = None
         self._acceleration, self._age = GENTLEST_STOP, FRESH
         self.met: Meeting | None = None
         """What the reference that was refused last would have led to."""
@@ -48,7 +48,7 @@ class LookAhead:
         self._before, self.met = (state, self._within(state, GENTLEST_STOP)), None
         self._acceleration, self._age = GENTLEST_STOP, FRESH
 
-    def __call__(self, state: Target) -> Stop | None:
+    def __call__(self, state: Target) -> JointStop | None:
         """Whether a reference may be played.
 
         Args:
@@ -63,16 +63,16 @@ class LookAhead:
         self._before = state, found
         return None
 
-    def take(self, state: Target, stop: Stop) -> None:
+    def take(self, state: Target, stop: JointStop) -> None:
         """From now on this is the stop that is known to be clear, from the state of the newest reference."""
         self._before = state, lambda: stop
 
-    def fallback(self) -> Stop:
+    def fallback(self) -> JointStop:
         """The stop from the state of motion of the reference that was played last, which is known to be clear."""
         assert self._before is not None, "begin comes first"
         return self._before[1]()
 
-    def clear(self, stop: Stop) -> bool:
+    def clear(self, stop: JointStop) -> bool:
         """Whether nothing meets on the whole way of a stop."""
         q, qd, qdd = stop.at(0.0)
         if self.is_spacious(q, self.turned(qd, qdd, stop.acceleration)):
@@ -80,7 +80,7 @@ class LookAhead:
         self.met = self.meeting(stop)
         return self.met is None
 
-    def meeting(self, stop: Stop) -> Meeting | None:
+    def meeting(self, stop: JointStop) -> Meeting | None:
         """The first pair that meets on the way of a stop."""
         _, qd, qdd = stop.at(0.0)
         turned = _fastest(qd, qdd, stop.jerk) * stop.duration
@@ -89,11 +89,11 @@ class LookAhead:
         found = self._collisions.on_way(way, before=before)
         return None if found is None else found[1]
 
-    def _within(self, state: Target, acceleration: float) -> Callable[[], Stop]:
+    def _within(self, state: Target, acceleration: float) -> Callable[[], JointStop]:
         """Makes a stop, once it is wanted."""
         return partial(self._stops.stop, state, acceleration)
 
-    def _permitted(self, state: Target) -> Callable[[], Stop] | None:
+    def _permitted(self, state: Target) -> Callable[[], JointStop] | None:
         """Gives a stop that is clear; None where there is none."""
         self._age += 1
         if self._age <= FRESH and self._is_spacious_for(state):

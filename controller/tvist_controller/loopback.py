@@ -31,7 +31,7 @@ class LoopbackHost(Sink):
         self._host = Host(self.controller, self)
         self._callbacks: dict[Topic, list[Callable[[bytes], object]]] = {}
 
-    def request(self, client: str, data: bytes) -> bytes:  # noqa: ARG002  a network's door knows no client either
+    def request(self, client: str, data: bytes) -> bytes:  # noqa: ARG002  the network does not name its clients either
         """Carry out a command; its encoded reply."""
         return encode(self._host.request(data))
 

@@ -21,7 +21,7 @@ from tvist_controller.refusal import RefusalError, out_of_turn
 from tvist_controller.safety_system import SafetySystem
 from tvist_controller.stops import StopPlan
 from tvist_controller.streaming import Streaming
-from tvist_controller.trajectory import Limits
+from tvist_controller.trajectory import MotionLimits
 from tvist_controller.way_ahead import WayAhead
 from tvist_plant.plant import PERIOD, PlantError
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
@@ -210,7 +210,7 @@ class MotionControl:
     def _go(self, trigger: str) -> None:
         self.activity = self._check(trigger)
 
-    def follow(self, period: float, limits: Limits, now: float) -> None:
+    def follow(self, period: float, limits: MotionLimits, now: float) -> None:
         """Start to follow set-points.
 
         Raises:

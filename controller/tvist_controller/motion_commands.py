@@ -5,7 +5,7 @@ from tvist_controller.motion import MotionControl
 from tvist_controller.programs.player import ProgramPlayer
 from tvist_controller.refusal import check_content, check_motion
 from tvist_controller.safety_control import SafetyControl
-from tvist_controller.trajectory import Limits
+from tvist_controller.trajectory import MotionLimits
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Reply
 
@@ -44,7 +44,7 @@ class MotionCommands:
     def _servo_start(self, call: Call[c.ServoStart]) -> None:
         command = call.command
         check_motion(command.velocity, command.acceleration, command.jerk, self._description)
-        limits = Limits(command.velocity, command.acceleration, command.jerk)
+        limits = MotionLimits(command.velocity, command.acceleration, command.jerk)
         self._motion.follow(command.period, limits, call.now)
 
     def _stop(self, call: Call[c.Stop]) -> None:

@@ -4,7 +4,7 @@ from typing import Unpack
 
 from tvist_controller.cycle import ControlCycle
 from tvist_controller.events import Emit, Told
-from tvist_controller.moving import Move
+from tvist_controller.moving import RunningMove
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.safety import REDUCED_SHARE, rate_of
 from tvist_controller.safety_system import SafetySystem
@@ -24,7 +24,7 @@ class Motions:
         self._cycle, self._safety, self._emit = cycle, safety, emit
         self._reduced_velocity = REDUCED_SHARE * min(cycle.description.limits.velocity)
         self._started = 0
-        self._move: Move | None = None
+        self._move: RunningMove | None = None
         self.wanted_speed = 1.0
         """What the speed was set to [-]."""
 
@@ -49,7 +49,7 @@ class Motions:
         self._cycle.start(trajectory)
         self._cycle.tvist.aim(trajectory.path.end)
         self._started += 1
-        move = self._move = Move(self._started, trajectory, planned.velocity, self._cycle)
+        move = self._move = RunningMove(self._started, trajectory, planned.velocity, self._cycle)
         self._emit("motion_started", id=move.number)
         if planned.excess_of_torque is not None:
             self._emit("warning", id=move.number, code="limit_torque", why=planned.excess_of_torque)
@@ -87,6 +87,6 @@ class Motions:
             self._emit("motion_stopped", id=self._move.number, code=code, why=why, **told)
             self._move = None
 
-    def _rate(self, move: Move) -> float:
+    def _rate(self, move: RunningMove) -> float:
         """Rate for the time of a motion [-]."""
         return rate_of(self.wanted_speed, move.velocity, self.slowest)

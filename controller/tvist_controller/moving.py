@@ -4,7 +4,7 @@ import numpy as np
 
 from tvist_controller.cycle import STILL, ControlCycle
 from tvist_controller.safety import acceleration_on_way
-from tvist_controller.trajectory import Motion
+from tvist_controller.trajectory import PlannedMotion
 
 PAUSE_SHARE = 0.95
 """Share of the acceleration that torque leaves on the way that a pause uses: the filter may add a little [-]."""
@@ -12,7 +12,7 @@ LEAST_PAUSE = 0.2
 """Share of a motion's acceleration that torque must leave to a pause; otherwise the motion runs to its end [-]."""
 
 
-class Move:
+class RunningMove:
     """One motion.
 
     Args:
@@ -22,7 +22,7 @@ class Move:
         cycle: The control line.
     """
 
-    def __init__(self, number: int, trajectory: Motion, velocity: float, cycle: ControlCycle) -> None:
+    def __init__(self, number: int, trajectory: PlannedMotion, velocity: float, cycle: ControlCycle) -> None:
         self.number, self.velocity = number, velocity
         self._trajectory, self._cycle = trajectory, cycle
         self._held = False
@@ -38,7 +38,7 @@ class Move:
             self._trajectory.speed = rate
 
     def hold(self) -> None:
-        """Slow down to a standstill within the torque, where that ends it sooner; see `Motion.hold`."""
+        """Slow down to a standstill within the torque, where that ends it sooner; see `PlannedMotion.hold`."""
         if self._held:
             return
         trajectory, cycle = self._trajectory, self._cycle

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from tvist_controller.ahead import MOST_AHEAD, Ahead
+from tvist_controller.ahead import MAX_AHEAD, Ahead
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.cycle import ControlCycle
 from tvist_controller.stops import StopPlan, StopPlanner
-from tvist_controller.trajectory import Forecast, PathStop, Stop, Trajectory
+from tvist_controller.trajectory import Forecast, JointStop, PathStop, Trajectory
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
@@ -17,7 +17,7 @@ EVEN = 1e-12
 """Differences of steps below this are rounding [rad]."""
 
 
-def _anywhere(_: Stop) -> bool:
+def _anywhere(_: JointStop) -> bool:
     return True
 
 
@@ -43,10 +43,10 @@ class Outlook:
 
         Returns:
             The two shaped references played last and those to come until they rest, one a tick, shape (k, n) [rad];
-            None where that takes more than `MOST_AHEAD` ticks.
+            None where that takes more than `MAX_AHEAD` ticks.
         """
         ahead = self._ahead(tvist, trajectory)
-        ahead.until(MOST_AHEAD)
+        ahead.until(MAX_AHEAD)
         return np.array(ahead.references) if ahead.rests else None
 
     def _ahead(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Ahead:
@@ -113,10 +113,10 @@ class Outlook:
         if stop is None:
             ahead = self._ahead()
             # What goes no way back need be run ahead no further than a stop lasts.
-            ahead.until(MOST_AHEAD if forecast.turns else 0)
+            ahead.until(MAX_AHEAD if forecast.turns else 0)
             stop = self.stops.under(ahead, state, forecast, deceleration)
         if stop is None and ahead is not None:
-            ahead.until(MOST_AHEAD)
+            ahead.until(MAX_AHEAD)
             if not ahead.rests:  # it lasts for so long that any stop is sooner
                 stop = self.stops.on_path(state, newest, forecast, deceleration, certain=False)
             else:
@@ -128,7 +128,7 @@ class Outlook:
         return None if cycle.stopping else lets_run_out
 
     def _plan(
-        self, stop: Stop | PathStop | None, wanted: float | None, duration: float, end: Floats
+        self, stop: JointStop | PathStop | None, wanted: float | None, duration: float, end: Floats
     ) -> StopPlan:
         kept = None if stop is None else stop.acceleration
         way = float(np.abs(end - self._cycle.position).max())

@@ -3,8 +3,7 @@
 from tvist_controller.control.kinematics import ForwardKinematics, rotation_vector
 from tvist_controller.cycle import Sample
 from tvist_plant.description import RobotDescription
-from tvist_plant.plant import PERIOD, Modal, Plant
-from tvist_plant.plant import Truth as PlantTruth
+from tvist_plant.plant import PERIOD, ModalPlant, Plant, PlantTruth
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.stream import State, Truth
 from tvist_shaping.base import Filter
@@ -80,7 +79,7 @@ class Reporter:
             ValueError: The plant does not know the truth.
         """
         if not self._true_modes or tick % TRUE_MODES_EVERY == 0:
-            modes = plant.modes() if isinstance(plant, Modal) else None
+            modes = plant.modes() if isinstance(plant, ModalPlant) else None
             self._true_modes = {
                 name: [] if modes is None else getattr(modes, name)[: self._joints].tolist()
                 for name in ("f_d", "zeta", "participation")

@@ -7,7 +7,7 @@ import numpy as np
 
 from tvist_controller.control.differentiator import Floats, Target, central_differences
 from tvist_controller.control.inverse_dynamics import InverseDynamics
-from tvist_controller.trajectory import Path, PathStop, Stop
+from tvist_controller.trajectory import JointStop, Path, PathStop
 from tvist_plant.description import RobotDescription
 
 TORQUE_SHARE = 0.9
@@ -38,7 +38,7 @@ def rate_of(speed: float, velocity: float, slowest: float | None) -> float:
     return speed if slowest is None else min(speed, slowest / velocity)
 
 
-class TorqueRoom:
+class StreamTorqueRoom:
     """What the joints' torques, less what gravity and velocities take, leave to a stream's accelerations.
 
     Args:
@@ -87,7 +87,7 @@ class StopTorque:
         self._share, self._most = np.maximum(TORQUE_SHARE * limits, asked), np.maximum(limits, asked)
         self._before = dynamics.torque(state.q, state.qd, state.qdd) - dynamics.gravity(state.q)
 
-    def holds(self, stop: Stop | PathStop, *, rebound: bool = True) -> bool:
+    def holds(self, stop: JointStop | PathStop, *, rebound: bool = True) -> bool:
         """Whether a stop keeps to it.
 
         The very start is what the motion already asks for: only what follows is the stop's own doing. Thirty-two
@@ -106,7 +106,7 @@ class StopTorque:
             stop, times, rebound=rebound
         )
 
-    def _holds(self, stop: Stop | PathStop, times: Floats, *, rebound: bool) -> bool:
+    def _holds(self, stop: JointStop | PathStop, times: Floats, *, rebound: bool) -> bool:
         dynamics = self._dynamics
         q, qd, qdd = stop.states(times)
         torque = dynamics.torques(q, qd, qdd)

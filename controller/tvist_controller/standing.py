@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from tvist_controller.planning.basis import Basis
+from tvist_controller.planning.basis import PlanBasis
 from tvist_controller.session import Lease
 from tvist_controller.stepping import ClockHold
 
@@ -12,7 +12,7 @@ class Standing(NamedTuple):
 
     lease: Lease | None
     """Lease of the client that has control."""
-    basis: Basis
+    basis: PlanBasis
     """What plans for commands depend on."""
     clock: ClockHold | None
     """Hold of the client that has the clock."""

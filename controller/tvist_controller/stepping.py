@@ -85,7 +85,7 @@ def check_step(hold: ClockHold | None, lease: Lease | None, step: SimulationStep
     return client
 
 
-class Stepping:
+class ClockLease:
     """One holder of the clock at a time. Nothing here runs out: where a client lets time pass nothing does."""
 
     def __init__(self) -> None:

@@ -11,10 +11,10 @@ import numpy as np
 from tvist_controller.control.differentiator import Floats, Target
 from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.safety import GENTLEST_STOP, StopTorque, torque_along
-from tvist_controller.trajectory import Forecast, Limits, PathStop, Stop
+from tvist_controller.trajectory import Forecast, JointStop, MotionLimits, PathStop
 from tvist_plant.description import RobotDescription
 
-S = TypeVar("S", Stop, PathStop)
+S = TypeVar("S", JointStop, PathStop)
 
 STEP = 0.8
 """From one deceleration that is tried to the next [-]."""
@@ -52,7 +52,7 @@ class References(Protocol):
 class StopPlan:
     """A stop and what limits it."""
 
-    trajectory: Stop | PathStop | None
+    trajectory: JointStop | PathStop | None
     """None: what is under way runs out by itself."""
     acceleration: float | None
     """Limit it keeps [rad/s^2]; None: the motion's own."""
@@ -162,7 +162,9 @@ class StopPlanner:
         """
         return torque_along(self._dynamics, ahead, self.period)
 
-    def by_joints(self, state: Target, wanted: float | None, clear: Callable[[Stop], bool]) -> Stop | None:
+    def by_joints(
+        self, state: Target, wanted: float | None, clear: Callable[[JointStop], bool]
+    ) -> JointStop | None:
         """The quickest stop of every joint by itself that is clear all along and keeps the torque.
 
         Args:
@@ -179,9 +181,9 @@ class StopPlanner:
         fits = cache(clear)
         return _first(within, lambda stop, rebound: torque.holds(stop, rebound=rebound) and fits(stop))
 
-    def stop(self, state: Target, acceleration: float) -> Stop:
+    def stop(self, state: Target, acceleration: float) -> JointStop:
         """A stop of every joint by itself within an acceleration [rad/s^2], whatever it asks for."""
-        return Stop(
+        return JointStop(
             state.q, state.qd, state.qdd, acceleration=acceleration, jerk=self.jerk, period=self.period
         )
 
@@ -208,14 +210,14 @@ class StopPlanner:
         )  # fmt: skip
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
 
-    def _keeping(self, state: Target, forecast: Forecast, acceleration: float) -> Limits | None:
+    def _keeping(self, state: Target, forecast: Forecast, acceleration: float) -> MotionLimits | None:
         """Limits of a stop's parameter with which no joint passes an acceleration [rad/s^2], nor the jerk of any stop.
 
         The velocity is the highest that the stop may have, while it takes the present acceleration back.
         """
         speed, rise = abs(forecast.path.forwards(state.qd)), abs(forecast.path.forwards(state.qdd))
         fastest = speed + self.period * rise + rise * rise / self.jerk
-        return forecast.path.keeping(Limits(fastest, acceleration, self.jerk), fastest)
+        return forecast.path.keeping(MotionLimits(fastest, acceleration, self.jerk), fastest)
 
     def _ladder(self, wanted: float | None) -> Iterator[float]:
         """Decelerations in the order in which they are tried: down from the wanted one, then up from it."""

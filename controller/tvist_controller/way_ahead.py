@@ -9,9 +9,9 @@ from tvist_controller.cycle import ControlCycle
 from tvist_controller.look_ahead import LookAhead
 from tvist_controller.outlook import Outlook
 from tvist_controller.refusal import RefusalError
-from tvist_controller.safety import TorqueRoom
+from tvist_controller.safety import StreamTorqueRoom
 from tvist_controller.stops import StopPlan
-from tvist_controller.trajectory import Stop, Way
+from tvist_controller.trajectory import JointStop, Way
 from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
@@ -29,7 +29,7 @@ class WayAhead:
     def __init__(self, cycle: ControlCycle, outlook: Outlook, collisions: CollisionModel) -> None:
         self._cycle, self._collisions = cycle, collisions
         self._outlook = outlook
-        room = TorqueRoom(cycle.description, cycle.inverse_dynamics)
+        room = StreamTorqueRoom(cycle.description, cycle.inverse_dynamics)
         self._guard = LookAhead(collisions, outlook.stops, room)
 
     @property
@@ -59,7 +59,7 @@ class WayAhead:
         last = resting_after(ahead)
         return max(last - 1, 0) * PERIOD, float(np.abs(ahead[-1] - ahead[1]).max())
 
-    def after_stream(self, end: Stop) -> Meeting | None:
+    def after_stream(self, end: JointStop) -> Meeting | None:
         """What would meet while a stream comes to rest through the filter.
 
         Args:
@@ -125,7 +125,7 @@ class WayAhead:
         if met is not None:
             raise RefusalError("collision", "name", f"{met} on the rest of the way", CLEARANCE)
 
-    def _tail_is_spacious(self, end: Stop) -> bool:
+    def _tail_is_spacious(self, end: JointStop) -> bool:
         """Whether there is room for whatever a filter makes of the references that it may still read."""
         cycle = self._cycle
         if cycle.tvist.peak > 1.0:

@@ -5,7 +5,7 @@ import math
 from tvist_lab.second_opinion import SecondOpinion
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import Measurement, PlantError, Truth
+from tvist_plant.plant import Measurement, PlantError, PlantTruth
 
 TIMESTEP = 0.00025
 """Time step of MuJoCo at which it agrees with `FlexibleArm` [s]."""
@@ -58,10 +58,10 @@ class MujocoArm:
         self._force, self._rotation = arm.flange()
         return Measurement(q=arm.q, qd=arm.qd, moment=arm.moment(), accelerometer=self._force.copy())
 
-    def truth(self) -> Truth:
+    def truth(self) -> PlantTruth:
         """What no robot can know, at the present state."""
         arm = self._arm
-        return Truth(
+        return PlantTruth(
             motor_q=arm.motor_q,
             motor_qd=arm.motor_qd,
             gear_deflection=arm.q - arm.motor_q,

@@ -13,7 +13,7 @@ from tvist_shaping.failures import ROUNDING
 from tvist_shaping.impulses import Impulses
 from tvist_shaping.steady import Design
 
-MOST_TAPS = 500
+MAX_TAPS = 500
 """Taps of the longest filter: one second at 500 Hz."""
 
 
@@ -48,8 +48,8 @@ class FirShaper:
     period: float = 0.002
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.taps, int) and 1 <= self.taps <= MOST_TAPS):
-            raise DesignError("taps", self.taps, f"a whole number from 1 to {MOST_TAPS}")
+        if not (isinstance(self.taps, int) and 1 <= self.taps <= MAX_TAPS):
+            raise DesignError("taps", self.taps, f"a whole number from 1 to {MAX_TAPS}")
         if not (isinstance(self.modes, int) and 1 <= self.modes <= 8):
             raise DesignError("modes", self.modes, "a whole number from 1 to 8")
         if not 1.0 <= self.peak < np.inf:

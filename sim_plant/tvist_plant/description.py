@@ -39,7 +39,7 @@ class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One table of the file; unknown keys are refused."""
 
 
-class Robot(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class RobotNames(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Names."""
 
     name: str
@@ -70,7 +70,7 @@ class Links(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """About the centres of mass [kg m^2]."""
 
 
-class Limits(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class ArmLimits(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What the controller allows, one entry a joint where it is a tuple."""
 
     position: tuple[Positive, ...]
@@ -183,10 +183,10 @@ class Collision(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Everything a robot file holds."""
 
-    robot: Robot
+    robot: RobotNames
     kinematics: Kinematics
     links: Links
-    limits: Limits
+    limits: ArmLimits
     payload: Payload
     drives: Drives
     link_flexibility: LinkFlexibility = LinkFlexibility()

@@ -15,7 +15,7 @@ from tvist_plant.joint_parameters import packed
 from tvist_plant.model import FlexibleModel, Floats, flexible_model
 from tvist_plant.modes import Modes, modes
 from tvist_plant.outside import Outside
-from tvist_plant.plant import PERIOD, Measurement, PlantError, Truth
+from tvist_plant.plant import PERIOD, Measurement, PlantError, PlantTruth
 from tvist_plant.sensors import Accelerometer, Encoders, gear_phases
 
 SUBSTEPS = 4
@@ -225,11 +225,11 @@ class FlexibleArm:
         acceleration = pin.getFrameClassicalAcceleration(model, data, flange, pin.LOCAL).linear
         return np.asarray(acceleration - self._gravity.dot(placement.rotation))
 
-    def truth(self) -> Truth:
+    def truth(self) -> PlantTruth:
         """What no robot can know, at the present state."""
         placement = self._data.oMf[self._flexible.flange]
         joints = self._flexible.joints
-        return Truth(
+        return PlantTruth(
             motor_q=self._motor.copy(),
             motor_qd=self._speed.copy(),
             gear_deflection=self._q[joints] - self._motor,

@@ -55,7 +55,7 @@ def solve(L: Floats, x: Floats) -> None:
         x[i] = value / L[i, i]
 
 
-class State(NamedTuple):
+class ArmState(NamedTuple):
     """What moves, N links and n motors."""
 
     y: Floats
@@ -71,9 +71,9 @@ class State(NamedTuple):
 
 
 @compiled
-def parts(state: Floats, n: int) -> State:
+def parts(state: Floats, n: int) -> ArmState:
     """Give the rows of a state, shape (5, N+n), their names; they stay views of it."""
-    return State(state[0], state[1], state[2], state[3, :n], state[4, :n])
+    return ArmState(state[0], state[1], state[2], state[3, :n], state[4, :n])
 
 
 @compiled
@@ -148,7 +148,7 @@ def advance(  # noqa: C901 - one kernel: its branches are the loops over rows an
     """Move the state by one period, in place; what was the present tick's is the last one's then.
 
     Args:
-        state: Rows of `State`, shape (5, N+n).
+        state: Rows of `ArmState`, shape (5, N+n).
         commands: Rows q_r, q̇_r, τ_ff of the last command and of this one, shape (2, 3, n); LAST becomes this one.
         dynamics: Mass matrix, upper triangle [kg m^2], and below it a row of the bias [N m]: Coriolis, centrifugal and
             gravity torques less what pushes from outside; one period earlier and at the start, shape (2, N+1, N);

@@ -1,7 +1,7 @@
 """What a controller moves: drive commands in, measurements out, one control period at a time.
 
 `Plant` is all that a controller asks for. What only some plants can do has an interface of its own, which a plant
-offers by having the method: `Pushable`, `Breakable`, `Modal`.
+offers by having the method: `Pushable`, `Breakable`, `ModalPlant`.
 """
 
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ class Measurement:
 
 
 @dataclass(frozen=True)
-class Truth:
+class PlantTruth:
     """What no robot can know of itself, and a simulation can."""
 
     motor_q: Floats
@@ -103,7 +103,7 @@ class Plant(Protocol):
             PlantError: The state is no longer finite. The controller makes a protective stop and resets the plant.
         """
 
-    def truth(self) -> Truth | None:
+    def truth(self) -> PlantTruth | None:
         """What no robot can know, after the last step or reset; None where nobody knows it, as on a real robot."""
 
 
@@ -128,7 +128,7 @@ class Breakable(Protocol):
 
 
 @runtime_checkable
-class Modal(Protocol):
+class ModalPlant(Protocol):
     """A plant that knows its vibration modes."""
 
     def modes(self, q: Floats | None = None) -> Modes:

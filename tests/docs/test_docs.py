@@ -145,7 +145,7 @@ def realtime():
 
 
 @pytest.fixture(scope="module")
-def doors():
+def interfaces():
     """Address of a robot whose UR interfaces are open."""
     pytest.importorskip("rtde_receive")
     address = own_address(1)
@@ -228,7 +228,7 @@ class TestSnippets:
             endpoint = request.getfixturevalue("realtime").endpoint
             text = text.replace("Robot.connect()", f'Robot.connect("{endpoint}")').replace(ENDPOINT, endpoint)
         if '"127.0.0.1"' in text:
-            text = text.replace("127.0.0.1", request.getfixturevalue("doors"))
+            text = text.replace("127.0.0.1", request.getfixturevalue("interfaces"))
         if "mine.py" in text:
             pytest.skip("test_own_shaper.py runs it beside its file")
         if "first.mcap" in text:

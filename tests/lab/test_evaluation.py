@@ -12,7 +12,7 @@ from tvist_controller.cycle import ControlCycle
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import body, paper_payload
 from tvist_lab.evaluation.baselines import EQUAL_DURATION, baselines
-from tvist_lab.evaluation.evaluate import WORTH, Job, Judged, Made, evaluate, interval, judge, report
+from tvist_lab.evaluation.evaluate import WORTH, JudgedMove, Made, MoveJob, evaluate, interval, judge, report
 from tvist_lab.evaluation.line import (
     PAPER,
     control_line,
@@ -198,12 +198,12 @@ class TestRecipes:
 class TestReport:
     @staticmethod
     def judged(unshaped, shaped):
-        return Judged(Made(unshaped, 1.0, 1.2, 1.0, 0.9), Made(shaped, 1.1, None, 1.01, 1.0))
+        return JudgedMove(Made(unshaped, 1.0, 1.2, 1.0, 0.9), Made(shaped, 1.1, None, 1.01, 1.0))
 
     def test_percentages_leave_out_what_did_not_vibrate_and_list_it(self, ur5e, paper, move):
         peaks = [(1.0, 0.1), (2.0, 0.5), (0.5 * WORTH, 0.1 * WORTH)]
         judged = [self.judged(*pair) for pair in peaks]
-        told = report([Job(ur5e, move, Recipe("zv", paper))] * 3, judged)
+        told = report([MoveJob(ur5e, move, Recipe("zv", paper))] * 3, judged)
         assert [row["reduction_percent"] for row in told["moves"]] == [
             pytest.approx(90.0),
             pytest.approx(75.0),
@@ -218,7 +218,7 @@ class TestReport:
         assert told["peak_m_s2"] == pytest.approx({"median": 0.3, "p95": 0.48, "max": 0.5})
 
     def test_nothing_but_moves_without_vibration_is_no_percentage(self, ur5e, paper, move):
-        told = report([Job(ur5e, move, Recipe("zv", paper))], [self.judged(0.1, 0.05)])
+        told = report([MoveJob(ur5e, move, Recipe("zv", paper))], [self.judged(0.1, 0.05)])
         assert told["reduction_percent"] == {"median": None, "p5": None, "min": None}
         assert told["reduction_percent_interval"] == {"median": None, "p5": None}
 
@@ -234,7 +234,7 @@ class TestMoves:
     @pytest.mark.slow
     def test_the_papers_motion_is_what_the_paper_page_says(self, ur5e, paper, move):
         recipe = Recipe("zv", paper)
-        job = Job(ur5e, move, recipe, baselines(recipe, ur5e, (5.0, 5.0)))
+        job = MoveJob(ur5e, move, recipe, baselines(recipe, ur5e, (5.0, 5.0)))
         one = judge(job)
         assert one.counts
         assert one.reduction(one.shaped) > 80.0
@@ -256,7 +256,7 @@ class TestMoves:
     @pytest.mark.slow
     def test_other_processes_give_the_same_figures(self, ur5e, paper):
         jobs = [
-            Job(ur5e, move, Recipe("zv", paper), seed=number)
+            MoveJob(ur5e, move, Recipe("zv", paper), seed=number)
             for number, move in enumerate(draw_moves(ur5e, 9, 2, (5.0, 5.0)).moves)
         ]
         assert list(evaluate(jobs)) == [judge(job) for job in jobs]

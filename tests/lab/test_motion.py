@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_lab.metrics import Motion, motions
+from tvist_lab.metrics import MotionRows, motions
 
 TICKS = 1500
 
@@ -15,7 +15,7 @@ def steps(*spans):
 
 
 def test_a_motion_shows_in_the_reference_from_its_last_tick_at_rest_to_its_last_tick_that_moves(one_motion):
-    assert motions(one_motion()) == [Motion(100, 500, 501, 1500)]
+    assert motions(one_motion()) == [MotionRows(100, 500, 501, 1500)]
 
 
 def test_durations_are_those_of_each_signal_and_the_published_tick_is_no_delay(one_motion):
@@ -98,7 +98,7 @@ def test_a_simulation_put_elsewhere_is_no_motion_and_ends_the_one_before(make_re
     reference = steps((100, 500))
     reference[1000:] -= 0.7
     (motion,) = motions(make_recording(reference, np.roll(reference, 1)))
-    assert motion == Motion(100, 500, 501, 1000)
+    assert motion == MotionRows(100, 500, 501, 1000)
 
 
 def test_times_hold_where_ticks_are_missing(one_motion):

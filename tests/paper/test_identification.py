@@ -8,13 +8,13 @@ import pytest
 
 from tvist_controller.calibrations import estimator_of
 from tvist_lab.identification.fit import FitError, fit_polynomials
-from tvist_lab.identification.identify import Plan, identify
+from tvist_lab.identification.identify import MeasurementPlan, identify
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_lab.paper.published import pose
 from tvist_protocol.calibration import calibration_from_json, calibration_to_json
 
 
-def measured(plan: Plan):
+def measured(plan: MeasurementPlan):
     async def run():
         setup = free_setup(calibration="none", seed=plan.seed)
         async with robot_in_process(setup) as robot, robot.control("test") as arm:
@@ -25,7 +25,7 @@ def measured(plan: Plan):
 
 @pytest.mark.slow
 def test_a_small_identification_with_another_seed_is_already_near_the_truth():
-    plan = Plan(configurations=45, anchors=(pose("Q1"), pose("Q3")), repeats=2, seed=11)
+    plan = MeasurementPlan(configurations=45, anchors=(pose("Q1"), pose("Q3")), repeats=2, seed=11)
     done = measured(plan)
     assert done.true_f_d is not None
     assert done.error_f_d.median < 8.0
@@ -41,7 +41,7 @@ def test_a_small_identification_with_another_seed_is_already_near_the_truth():
 
 def test_too_few_configurations_are_refused_before_the_arm_moves():
     with pytest.raises(FitError, match="at least 38 are needed"):
-        measured(Plan(configurations=10))
+        measured(MeasurementPlan(configurations=10))
 
 
 def test_polynomials_that_are_in_the_basis_are_found_exactly():

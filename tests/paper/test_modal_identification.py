@@ -15,7 +15,7 @@ from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.modal import ModalPlan, calibrate, free_configurations, identify_modal
 from tvist_lab.identification.modal_fit import describe, fit_from_many, own_poles
 from tvist_lab.identification.ring_downs import Jog
-from tvist_lab.identification.unknowns import Arm
+from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_plant.description import load
 from tvist_protocol.calibration import calibration_from_json, calibration_to_json
@@ -45,7 +45,7 @@ def done():
 @pytest.fixture(scope="module")
 def synthetic():
     """Ring-downs of the arm as guessed, with the noise of the accelerometer."""
-    arm = Arm(ROBOT, PAYLOADS)
+    arm = ArmModes(ROBOT, PAYLOADS)
     plan = ModalPlan(8, PAYLOADS, seed=5)
     candidates = free_configurations(ROBOT, PAYLOADS, 16, plan)
     rng = np.random.default_rng(6)
@@ -103,7 +103,7 @@ def test_a_ring_down_with_another_payload_than_declared_is_named(done, wrong):
         for number, ring in enumerate(found.ringings)
     ]
     with pytest.raises(IdentificationError, match="contradict") as error:
-        calibrate(Arm(ROBOT, PAYLOADS), mislabelled, info, ModalPlan(), 0, name="x", command="x")
+        calibrate(ArmModes(ROBOT, PAYLOADS), mislabelled, info, ModalPlan(), 0, name="x", command="x")
     assert any(f"number {number + 1} " in str(error.value) for number in wrong)
 
 

@@ -6,7 +6,7 @@ from tvist_controller.collision import CollisionModel
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.move_planner import MovePlanner
 from tvist_controller.setup import body, paper_payload
-from tvist_controller.trajectory import Limits
+from tvist_controller.trajectory import MotionLimits
 from tvist_lab.safety.stops import SHAPERS
 from tvist_lab.safety.subject import Subject
 from tvist_protocol import commands as c
@@ -39,7 +39,7 @@ def curve_of(seed: int):
             return curve
 
 
-def moving(curve, shaper: str, limits: Limits, speed: float = 1.0) -> Subject:
+def moving(curve, shaper: str, limits: MotionLimits, speed: float = 1.0) -> Subject:
     """A robot that has just begun a motion along a curve."""
     robot = Subject(UR5E, curve.posture(curve.start), DISC, shaper=shaper)
     robot.send(c.SetSpeed, fraction=speed)
@@ -47,7 +47,7 @@ def moving(curve, shaper: str, limits: Limits, speed: float = 1.0) -> Subject:
     return robot
 
 
-def start(robot: Subject, curve, limits: Limits = PAPER) -> None:
+def start(robot: Subject, curve, limits: MotionLimits = PAPER) -> None:
     """Begin a motion along a curve, as a command for it would."""
     own = setup(payload=DISC)
     basis = robot.controller.basis.motion
@@ -62,8 +62,8 @@ def played(robot: Subject, ticks: int = 200) -> np.ndarray:
     return np.array(robot.references)
 
 
-def random_limits(random) -> Limits:
-    return Limits(
+def random_limits(random) -> MotionLimits:
+    return MotionLimits(
         float(random.uniform(0.5, 3.14)),
         float(random.uniform(1.0, 8.0)),
         float(random.choice([100.0, 500.0, 2000.0])),

@@ -7,7 +7,7 @@ from tvist_controller.controller import Controller
 from tvist_controller.cycle import ControlCycle
 from tvist_controller.outlook import Outlook
 from tvist_controller.setup import Setup, body, paper_payload
-from tvist_controller.trajectory import Limits
+from tvist_controller.trajectory import MotionLimits
 from tvist_plant.description import RobotDescription, load
 from tvist_plant.plant import PERIOD, Measurement, Plant
 from tvist_protocol import commands as c
@@ -18,7 +18,7 @@ from tvist_shaping.filter import TvistFilter
 
 UR5E = load("ur5e")
 Q1, Q2, Q3 = (np.array(UR5E.poses[name]) for name in ("Q1", "Q2", "Q3"))
-PAPER = Limits(1.5, 2.0, 100.0)
+PAPER = MotionLimits(1.5, 2.0, 100.0)
 H = PERIOD
 ROUNDING = 1e-8
 """What rounding makes of a second difference: 4 ε·2π/h² = 1.4e-9 [rad/s^2]."""

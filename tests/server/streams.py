@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tvist_controller.trajectory import JointLine, Limits, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 
 from .robots import H
 
@@ -50,7 +50,7 @@ def peaks(out, limits):
     return np.array([np.abs(np.diff(out, order, axis=0)).max() / H**order / limit for order, limit in orders])
 
 
-def there_and_back(limits: Limits, way=(1.4, -1.0, 0.8, -0.5, 0.3, 2.0), dwell=0.3):
+def there_and_back(limits: MotionLimits, way=(1.4, -1.0, 0.8, -0.5, 0.3, 2.0), dwell=0.3):
     """A double-S there, a rest, and one back, again and again; positions by times."""
     target, start = np.array(way), np.zeros(len(way))
     go, back = (

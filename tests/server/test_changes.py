@@ -10,7 +10,7 @@ from tvist_controller.cycle import STILL
 from tvist_controller.outlook import Outlook
 from tvist_controller.safety import TORQUE_SHARE
 from tvist_controller.setup import body, paper_payload
-from tvist_controller.trajectory import Limits
+from tvist_controller.trajectory import MotionLimits
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Done
 from tvist_shaping.catalogue import shaper
@@ -101,7 +101,7 @@ def test_a_motion_keeps_its_limits_and_its_target_through_changes_of_the_filter(
     random = np.random.default_rng(seed)
     first = a_filter(random)
     line = a_line(first)
-    limits = PAPER if seed % 2 else Limits(*random.uniform((0.5, 1.0, 50.0), (3.0, 8.0, 1000.0)))
+    limits = PAPER if seed % 2 else MotionLimits(*random.uniform((0.5, 1.0, 50.0), (3.0, 8.0, 1000.0)))
     target = Q1 + random.uniform(-1.0, 1.0, 6) * random.uniform(0.1, 2.0)
     duration = line.start(line.plan(target, limits)).duration
     ticks = np.sort(random.integers(0, int(duration / H), 3))
@@ -255,7 +255,7 @@ def test_a_stop_while_the_payload_changes_is_safe_with_either(masses):
     line = without_arm()
     line.declare(body(paper_payload(UR5E, masses[0])))
     line.reset(Q1)
-    line.start(line.plan(Q2 + np.array([0.0, 0.4, 0.0, 0.0, 0.0, 0.0]), Limits(2.5, 6.0, 500.0)))
+    line.start(line.plan(Q2 + np.array([0.0, 0.4, 0.0, 0.0, 0.0, 0.0]), MotionLimits(2.5, 6.0, 500.0)))
     for tick in range(200):
         if tick == 150:
             line.declare(body(paper_payload(UR5E, masses[1])))

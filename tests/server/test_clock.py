@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from tvist_server.clock import PRIORITY, Driven, Lockstep, Realtime
+from tvist_server.clock import PRIORITY, Lockstep, Mailbox, Realtime
 
 pytestmark = pytest.mark.realtime
 
@@ -46,7 +46,7 @@ def served(robots, **options):
 
 @pytest.mark.parametrize("number", [1, 2, 7])
 def test_one_thread_ticks_all_robots_and_says_how_late_each_was(number):
-    robots = [Driven(FakeHost()) for _ in range(number)]
+    robots = [Mailbox(FakeHost()) for _ in range(number)]
     clock, calls = served(robots)
     assert calls
     assert {name for robot in robots for name in robot.host.threads} == {"tvist-tick"}
@@ -56,7 +56,7 @@ def test_one_thread_ticks_all_robots_and_says_how_late_each_was(number):
 
 
 def test_jobs_are_done_in_order_before_the_next_tick_and_all_before_the_end():
-    robot, seen = Driven(FakeHost()), []
+    robot, seen = Mailbox(FakeHost()), []
     for number in range(100):
         robot.post(lambda number=number: seen.append((number, robot.host.ticks)))
     clock = Realtime([robot], lambda: None, PERIOD)
@@ -68,7 +68,7 @@ def test_jobs_are_done_in_order_before_the_next_tick_and_all_before_the_end():
 
 
 def test_a_job_that_posts_another_does_not_keep_the_tick_waiting():
-    robot = Driven(FakeHost())
+    robot = Mailbox(FakeHost())
 
     def again():
         robot.post(again)
@@ -83,7 +83,7 @@ def test_a_tick_that_fails_ends_all_robots_of_the_thread_and_says_so(caplog, err
         def tick(self):
             raise error("on purpose")
 
-    robots = [Driven(FakeHost()), Driven(Failing())]
+    robots = [Mailbox(FakeHost()), Mailbox(Failing())]
     clock = Realtime(robots, lambda: None, PERIOD)
     clock.start()
     clock._thread.join(WAIT)
@@ -98,11 +98,11 @@ def test_real_time_priority_is_asked_for_by_the_tick_thread_itself(monkeypatch):
         "sched_setscheduler",
         lambda *arguments: asked.append((threading.current_thread().name, *arguments)),
     )
-    served([Driven(FakeHost())], priority=True)
+    served([Mailbox(FakeHost())], priority=True)
     ((thread, which, policy, parameter),) = asked
     assert (thread, which, policy) == ("tvist-tick", 0, os.SCHED_FIFO)
     assert parameter.sched_priority == PRIORITY
-    served([Driven(FakeHost())])
+    served([Mailbox(FakeHost())])
     assert len(asked) == 1
 
 
@@ -111,7 +111,7 @@ def test_where_it_is_not_permitted_that_is_one_sentence_and_ticks_go_on(monkeypa
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
-    robot = Driven(FakeHost())
+    robot = Mailbox(FakeHost())
     served([robot], priority=True)
     (record,) = caplog.records
     assert record.levelname == "WARNING"
@@ -121,7 +121,7 @@ def test_where_it_is_not_permitted_that_is_one_sentence_and_ticks_go_on(monkeypa
 
 
 def test_in_lockstep_no_tick_comes_by_itself_and_jobs_are_done():
-    robot, done = Driven(FakeHost()), threading.Event()
+    robot, done = Mailbox(FakeHost()), threading.Event()
     clock = Lockstep(robot, lambda: None)
     clock.start()
     robot.post(done.set)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_controller.trajectory import Bends, JointLine, Limits, quickest_motion
+from tvist_controller.trajectory import Bends, JointLine, MotionLimits, quickest_motion
 from tvist_lab.safety.stops import SHAPERS
 from tvist_lab.safety.subject import Subject, torques
 from tvist_protocol import commands as c
@@ -150,7 +150,7 @@ def test_the_torque_that_a_curve_will_take_is_told_when_it_starts():
     stretched = np.array([0.0, -0.9, 0.0, -1.57, 0.0, 0.0])
     curve = Arc(stretched, np.array([0.3, 0.0, 0, 0, 0, 0]), np.array([0.0, 1.0, 0, 0, 0, 0]), 0.7, 0.9)
     robot = Subject(UR5E, stretched, DISC, shaper="none")
-    start(robot, curve, Limits(3.0, 16.0, 2000.0))
+    start(robot, curve, MotionLimits(3.0, 16.0, 2000.0))
     told = [event for event in robot.controller.tick()[1] if event.code == "limit_torque"]
     q = played(robot)
     most = np.abs(torques(UR5E, DISC, q)).max(axis=0)

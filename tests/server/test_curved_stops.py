@@ -8,7 +8,7 @@ from tvist_controller.collision import CollisionModel
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety import TORQUE_SHARE
 from tvist_controller.setup import body, paper_payload
-from tvist_controller.trajectory import JointLine, Limits, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_lab.safety import sequences
 from tvist_lab.safety.sequences import Sequence
 from tvist_lab.safety.stops import KINDS, PAUSES, SHAPERS
@@ -74,7 +74,7 @@ def test_a_stop_keeps_every_joint_within_the_deceleration_that_it_tells(wanted):
     hardest = []
     for seed in (1, 2, 3, 5, 6, 7):
         curve = curve_of(seed)
-        robot = moving(curve, "none", Limits(3.14, 8.0, 2000.0))
+        robot = moving(curve, "none", MotionLimits(3.14, 8.0, 2000.0))
         cycle = robot.controller.cycle
         while cycle.trajectory.share < 0.5:
             robot.tick()
@@ -104,7 +104,7 @@ class OnCurves(Sequence):
             if (np.abs(curve.posture(curve.end)) < np.array(UR5E.limits.position)).all():
                 break
         try:
-            start(self.robot, curve, Limits(**self._limits()))
+            start(self.robot, curve, MotionLimits(**self._limits()))
         except RefusalError as refusal:
             return refusal.reply
         self.curve = curve
@@ -183,7 +183,7 @@ def test_a_payload_that_would_meet_something_on_the_rest_of_the_curve_is_refused
 
 def test_brakes_leave_the_curve_and_the_next_motion_begins_where_they_held():
     curve = curve_of(2)
-    robot = moving(curve, "zv", Limits(3.0, 8.0, 2000.0))
+    robot = moving(curve, "zv", MotionLimits(3.0, 8.0, 2000.0))
     robot.tick(200)
     robot.send(c.SimulationInject, fault="power_loss")
     q = played(robot)

@@ -6,7 +6,7 @@ import pytest
 from tvist_controller.control.inverse_dynamics import SLEW
 from tvist_controller.cycle import STILL
 from tvist_controller.setup import body, paper_payload
-from tvist_controller.trajectory import Limits
+from tvist_controller.trajectory import MotionLimits
 from tvist_shaping.estimators.fixed import Fixed
 
 from .robots import FITTING, PAPER, Q1, Q2, Q3, UR5E, H, cycle, without_arm
@@ -158,7 +158,7 @@ def test_a_reset_in_mid_motion_makes_it_as_new():
     used.reset(Q3, seed=3)
     assert used.at_rest
     for line in (used, fresh):
-        line.start(line.plan(Q1, Limits(1.0, 1.0, 50.0)))
+        line.start(line.plan(Q1, MotionLimits(1.0, 1.0, 50.0)))
     for _ in range(200):
         a, b = used.step(), fresh.step()
         assert (a.target.q == b.target.q).all()

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
-from tvist_controller.trajectory import Limits
+from tvist_controller.trajectory import MotionLimits
 from tvist_controller.trajectory.limiter import Limiter
 
 from .robots import PAPER, ROUNDING, H
@@ -26,7 +26,7 @@ def followed(limiter: Limiter, points) -> np.ndarray:
     return np.array(out)
 
 
-def assert_within(out: np.ndarray, limits: Limits) -> None:
+def assert_within(out: np.ndarray, limits: MotionLimits) -> None:
     """Velocity, acceleration and jerk by differences of the positions alone.
 
     Differences are means of the derivatives around a tick, so limits hold to rounding and to the limiter's own
@@ -45,7 +45,7 @@ def assert_within(out: np.ndarray, limits: Limits) -> None:
     joints=st.integers(1, 7),
     roughness=st.sampled_from([1e-7, 3e-6, 1e-5, 1e-4, 3e-3, 0.1]),
     limits=st.builds(
-        Limits,
+        MotionLimits,
         velocity=st.floats(0.1, 3.14),
         acceleration=st.floats(0.5, 40.0),
         jerk=st.floats(10.0, 2000.0),
@@ -142,7 +142,7 @@ def test_the_state_it_tells_is_one_that_a_motion_can_go_on_from():
     def cubic(time):
         return 0.9 * time**2 + 10.0 * time**3
 
-    limiter = Limiter(np.zeros(1), Limits(1.5, 20.0, 2000.0), H)
+    limiter = Limiter(np.zeros(1), MotionLimits(1.5, 20.0, 2000.0), H)
     followed(limiter, [np.array([cubic(k * H)]) for k in range(1, 50)])
     q, qd, qdd = limiter.state
     time = 49 * H
@@ -152,7 +152,8 @@ def test_the_state_it_tells_is_one_that_a_motion_can_go_on_from():
 
 
 @pytest.mark.parametrize(
-    "limits", [PAPER, Limits(3.0, 40.0, 2000.0), Limits(0.2, 2.0, 40.0), Limits(1.5, 4.0, 9.0)]
+    "limits",
+    [PAPER, MotionLimits(3.0, 40.0, 2000.0), MotionLimits(0.2, 2.0, 40.0), MotionLimits(1.5, 4.0, 9.0)],
 )
 def test_a_motion_made_at_the_very_limits_passes_to_the_bit(limits):
     motion = there_and_back(limits)
@@ -168,7 +169,7 @@ def test_a_trapezoid_of_velocity_is_rounded_to_the_jerk_limit(jerk):
     time = np.arange(2500) * H
     velocity = np.interp(time, [0.1, 0.6, 1.1, 1.6], [0.0, 0.8, 0.8, 0.0])
     walk = np.cumsum(velocity * H)[:, None]
-    limits = Limits(1.5, 2.0, jerk)
+    limits = MotionLimits(1.5, 2.0, jerk)
     out = followed(Limiter(np.zeros(1), limits, H), walk)
     assert_within(out, limits)
     assert (out[-200:] == walk[-1]).all()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.about import info_of
-from tvist_controller.ahead import MOST_AHEAD, resting_after
+from tvist_controller.ahead import MAX_AHEAD, resting_after
 from tvist_controller.collision import CLEARANCE, CollisionModel
 from tvist_controller.cycle import STILL
 from tvist_controller.outlook import Outlook
@@ -57,7 +57,7 @@ def test_what_lasts_too_long_is_not_foreseen():
     line = without_arm()
     line.start(line.plan(Q3, type(PAPER)(0.01, 0.1, 1.0)))
     line.step()
-    assert MOST_AHEAD * H < 100.0
+    assert MAX_AHEAD * H < 100.0
     assert Outlook(line).foresee() is None
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_controller.trajectory import JointLine, Limits, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RuntimeState
 from tvist_protocol.replies import Accepted, Done
@@ -112,7 +112,7 @@ def test_a_stop_ends_a_paused_motion_and_the_next_one_is_not_paused():
 
 
 def test_slow_limits_do_not_make_the_pause_impossible():
-    q, rates = played(lambda tick: 0.0 if 2000 < tick < 6000 else 1.0, Limits(0.2, 0.05, 1.0))
+    q, rates = played(lambda tick: 0.0 if 2000 < tick < 6000 else 1.0, MotionLimits(0.2, 0.05, 1.0))
     assert rates[5900] == 0.0
     assert np.array_equal(q[-1], Q3)
     assert accelerations(q) <= 0.05 * 1.01

@@ -7,7 +7,7 @@ from tvist_controller.collision import CollisionModel
 from tvist_controller.cycle import ControlCycle
 from tvist_controller.payload_monitor import TOLERATED, PayloadMonitor
 from tvist_controller.setup import body, paper_payload
-from tvist_controller.trajectory import Limits
+from tvist_controller.trajectory import MotionLimits
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_plant.description import load
 from tvist_shaping.catalogue import shaper
@@ -15,7 +15,7 @@ from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.filter import TvistFilter
 
 ROBOT = load("ur5e")
-LIMITS = Limits(1.5, 2.0, 100.0)
+LIMITS = MotionLimits(1.5, 2.0, 100.0)
 PAPER = [np.array(ROBOT.poses[name]) for name in ("Q1", "Q2", "Q1", "Q3")]
 
 
@@ -70,7 +70,7 @@ class Watched:
 
 
 def limits_of(rng):
-    return Limits(*[(0.5, 1.0, 50.0), (1.5, 2.0, 100.0), (3.0, 8.0, 500.0)][rng.integers(3)])
+    return MotionLimits(*[(0.5, 1.0, 50.0), (1.5, 2.0, 100.0), (3.0, 8.0, 500.0)][rng.integers(3)])
 
 
 def test_two_kilograms_declared_and_five_carried_are_told_on_the_paper_s_way():

@@ -14,7 +14,7 @@ from tvist_protocol.codec import encode
 from tvist_protocol.programs import ProgramStop
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.values import Payload
-from tvist_server.plan_ahead import MOST_WAITING, PlanAhead
+from tvist_server.plan_ahead import MAX_WAITING, PlanAhead
 from tvist_server.reception import Reception
 
 from .robots import Q2, Q3, Robot, calibration, setup
@@ -200,12 +200,12 @@ def test_refusals_are_told_in_their_turn(served):
 
 
 def test_who_sends_more_than_can_be_planned_is_told_so(served):
-    for _ in range(3 * MOST_WAITING):
+    for _ in range(3 * MAX_WAITING):
         served.send(served.of(c.SetShaper, name="zv"))
-    served.serve(1 + 3 * MOST_WAITING)
+    served.serve(1 + 3 * MAX_WAITING)
     busy = [reply for reply in served.replies[1:] if isinstance(reply, Refused)]
     assert {reply.code for reply in busy} == {"busy"}
-    assert 0 < len(busy) <= 2 * MOST_WAITING
+    assert 0 < len(busy) <= 2 * MAX_WAITING
     assert served.ask(served.of(c.KeepAlive)) == Done()
 
 
@@ -274,7 +274,7 @@ def test_a_plan_that_fails_is_a_refusal_and_the_next_one_is_made(served, monkeyp
 def test_a_stop_is_made_however_many_commands_wait(served, stop):
     served.ask(served.of(c.MoveJ, q=tuple(Q2.tolist())))
     served.tick(100)
-    for _ in range(MOST_WAITING):
+    for _ in range(MAX_WAITING):
         served.send(served.of(c.SetShaper, name="auto"))
     replies = []
     served.reception.request(encode(stop), replies.append)

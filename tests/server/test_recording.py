@@ -16,7 +16,7 @@ from tvist_protocol import Event, Info, Setpoint, State, Truth
 from tvist_protocol.generate import FOLDER
 from tvist_protocol.journal import Entry, entry_of
 from tvist_protocol.recorded import JsonReader
-from tvist_server.recording import Recorder, RecordingError
+from tvist_server.recording import Recorder, RecorderError
 from tvist_server.recording import recorder as recorder_module
 from tvist_server.recording.whereabouts import whereabouts
 from tvist_server.recording.writer import RecordingWriter
@@ -162,7 +162,7 @@ def test_what_comes_after_closing_is_counted(path):
 
 def test_a_file_that_exists_is_replaced_only_when_asked(path):
     path.write_bytes(b"precious")
-    with pytest.raises(RecordingError, match=r"run\.mcap exists"):
+    with pytest.raises(RecorderError, match=r"run\.mcap exists"):
         Recorder(path, INFO, {})
     assert path.read_bytes() == b"precious"
     with Recorder(path, INFO, {}, overwrite=True) as recorder:
@@ -173,7 +173,7 @@ def test_a_file_that_exists_is_replaced_only_when_asked(path):
 @pytest.mark.parametrize("start", [{"x": float("nan")}, {"x": object()}])
 def test_a_start_that_cannot_be_written_costs_no_file(path, start):
     path.write_bytes(b"precious")
-    with pytest.raises(RecordingError, match="cannot be started"):
+    with pytest.raises(RecorderError, match="cannot be started"):
         Recorder(path, INFO, start, overwrite=True)
     assert path.read_bytes() == b"precious"
 
@@ -189,19 +189,19 @@ def test_a_start_that_cannot_be_written_costs_no_file(path, start):
 def test_a_place_that_cannot_be_written_is_refused_before_anything_runs(tmp_path, where, says):
     (tmp_path / "file").touch()
     before = threading.active_count()
-    with pytest.raises(RecordingError, match=says) as caught:
+    with pytest.raises(RecorderError, match=says) as caught:
         Recorder(tmp_path / where, INFO, {}, overwrite=True)
     assert "\n" not in str(caught.value)
     assert threading.active_count() == before
 
 
 def test_a_full_disk_is_refused_before_anything_runs():
-    with pytest.raises(RecordingError, match="No space left on device"):
+    with pytest.raises(RecorderError, match="No space left on device"):
         Recorder("/dev/full", INFO, {}, overwrite=True)
 
 
 def test_a_queue_without_room_is_refused(path):
-    with pytest.raises(RecordingError, match="queue_size is 0"):
+    with pytest.raises(RecorderError, match="queue_size is 0"):
         Recorder(path, INFO, {}, queue_size=0)
     assert not path.exists()
 

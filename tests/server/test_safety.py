@@ -14,7 +14,7 @@ from tvist_controller.safety import (
     largest_torque,
 )
 from tvist_controller.stops import STEP, StopPlanner
-from tvist_controller.trajectory import JointLine, Limits, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c
 
@@ -151,7 +151,7 @@ def test_at_rest_there_is_nothing_to_stop():
 def test_no_motion_takes_more_torque_than_the_bound_of_its_way(seed):
     random = np.random.default_rng(seed)
     start, target = random.uniform(-2, 2, (2, 6))
-    limits = Limits(random.uniform(0.5, 3.1), random.uniform(1.0, 8.0), 2000.0)
+    limits = MotionLimits(random.uniform(0.5, 3.1), random.uniform(1.0, 8.0), 2000.0)
     dynamics = InverseDynamics(UR5E, DISC)
     bound = largest_torque(dynamics, JointLine(start, target), limits.velocity, limits.acceleration)
     motion, q = quickest_motion(JointLine(start, target), limits, H), [start, start]

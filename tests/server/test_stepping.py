@@ -10,7 +10,7 @@ from tvist_controller.controller import Controller
 from tvist_controller.host import Host
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.session import Lease, NoControlError
-from tvist_controller.stepping import ClockHold, Stepping, check_step_token, may_step
+from tvist_controller.stepping import ClockHold, ClockLease, check_step_token, may_step
 from tvist_lab.in_process import free_setup
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_reply, encode
@@ -55,7 +55,7 @@ class Network:
 
 
 def test_one_client_holds_the_clock_and_another_is_told_which():
-    stepping = Stepping()
+    stepping = ClockLease()
     hold = stepping.take("bert")
     with pytest.raises(NoControlError, match="'bert'") as caught:
         stepping.take("anna")

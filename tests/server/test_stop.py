@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_controller.trajectory import JointLine, Limits, PathStop, Stop, quickest_motion
+from tvist_controller.trajectory import JointLine, JointStop, MotionLimits, PathStop, quickest_motion
 from tvist_lab.safety.stops import draw, judge
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted
@@ -142,7 +142,7 @@ def test_a_repeated_stop_changes_nothing():
 
 
 def test_the_trajectory_ends_at_rest_and_every_joint_as_soon_as_it_can():
-    stop = Stop(
+    stop = JointStop(
         np.array([0.0, 1.0]), np.array([1.0, -0.1]), np.zeros(2), acceleration=10.0, jerk=1000.0, period=H
     )
     q, qd, qdd = stop.at(stop.duration)
@@ -159,7 +159,7 @@ def test_the_trajectory_ends_at_rest_and_every_joint_as_soon_as_it_can():
 
 
 def test_a_stop_at_rest_is_over_at_once():
-    stop = Stop(Q1, np.zeros(6), np.zeros(6), acceleration=1.0, jerk=100.0, period=H)
+    stop = JointStop(Q1, np.zeros(6), np.zeros(6), acceleration=1.0, jerk=100.0, period=H)
     assert stop.finished
     assert (stop.next() == Q1).all()
 
@@ -168,7 +168,7 @@ def test_a_stop_at_rest_is_over_at_once():
 def test_a_stop_on_a_line_is_at_no_moment_ahead_of_any_motion_within_its_limits(seed):
     """Against the rest of a double S with lower limits, from a random moment of it."""
     random = np.random.default_rng(seed)
-    limits = Limits(random.uniform(0.5, 3.0), random.uniform(1.0, 8.0), random.uniform(50.0, 2000.0))
+    limits = MotionLimits(random.uniform(0.5, 3.0), random.uniform(1.0, 8.0), random.uniform(50.0, 2000.0))
     motion, q = quickest_motion(JointLine(Q1, Q3), limits, H), [Q1, Q1]
     while not motion.finished:
         q.append(motion.next())

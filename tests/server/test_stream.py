@@ -6,13 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
-from tvist_controller.trajectory import Limits, SetpointStream
+from tvist_controller.trajectory import MotionLimits, SetpointStream
 
 from .robots import PAPER, ROUNDING, H
 from .streams import network, peaks, there_and_back
 
 SLOW = 0.008
-WIDE = Limits(3.0, 40.0, 2000.0)
+WIDE = MotionLimits(3.0, 40.0, 2000.0)
 
 
 def play(stream, arrivals, ticks, *, first=0):
@@ -127,7 +127,7 @@ def test_duplicates_and_latecomers_are_dropped_and_counted():
 def test_a_gap_is_bridged_by_the_parabola_and_counted():
     arrivals = regular(lambda t: 0.5 * np.maximum(t - 0.02, 0.0) ** 2, 300)
     del arrivals[150]
-    stream = start(limits=Limits(1.5, 2.0, 2000.0))
+    stream = start(limits=MotionLimits(1.5, 2.0, 2000.0))
     out = play(stream, arrivals, 300)[:, 0]
     assert out == pytest.approx(0.5 * np.maximum(np.arange(300) * H - 0.02, 0.0) ** 2, abs=1e-12)
     assert (stream.late, stream.lost) == (0, 1)
@@ -178,7 +178,7 @@ def test_a_step_of_half_a_radian_stays_within_the_limits(period):
 @pytest.mark.parametrize("jerk", [0.1, 100.0])
 def test_coming_to_rest_is_no_journey_however_low_the_jerk_limit(jerk):
     """A stream may have any acceleration; taking 40 rad/s² back at 0.1 rad/s³ would last 400 s."""
-    stream = start(limits=Limits(3.0, 40.0, jerk))
+    stream = start(limits=MotionLimits(3.0, 40.0, jerk))
     play(stream, regular(lambda t: 0.5 * 39.0 * t * t, 20), 20)
     out = play(stream, {}, 2000, first=20)
     assert np.ptp(out[-100:]) < 1e-12

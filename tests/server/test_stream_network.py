@@ -6,13 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
-from tvist_controller.trajectory import Limits, SetpointStream
+from tvist_controller.trajectory import MotionLimits, SetpointStream
 
 from .robots import PAPER, H
 from .streams import minimum_jerk, network, peaks, played, swinging, there_and_back
 
 TICKS = 2000
-NEARLY = Limits(0.95 * PAPER.velocity, 0.95 * PAPER.acceleration, 0.95 * PAPER.jerk)
+NEARLY = MotionLimits(0.95 * PAPER.velocity, 0.95 * PAPER.acceleration, 0.95 * PAPER.jerk)
 MOTIONS = {
     "double-S": there_and_back(NEARLY),
     "sine": swinging([0.07, -0.05, 0.03]),
@@ -111,7 +111,7 @@ def test_the_same_arrivals_make_the_same_reference():
     seed=st.integers(0, 2**32 - 1),
     period=st.floats(H, 0.1),
     limits=st.builds(
-        Limits,
+        MotionLimits,
         velocity=st.floats(1e-3, 3.14),
         acceleration=st.floats(1e-2, 40.0),
         jerk=st.floats(0.1, 2000.0),

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from tvist_controller.control.inverse_dynamics import InverseDynamics
-from tvist_controller.safety import GENTLEST_STOP, TORQUE_SHARE, TorqueRoom
+from tvist_controller.safety import GENTLEST_STOP, TORQUE_SHARE, StreamTorqueRoom
 from tvist_controller.setup import body, paper_payload
-from tvist_controller.trajectory import Limits
+from tvist_controller.trajectory import MotionLimits
 
 from .robots import PAPER, Q1, Q3, UR5E, H, without_arm
 from .streams import swinging
 
 DYNAMICS = InverseDynamics(UR5E, body(paper_payload(UR5E)))
 MOST = np.array(UR5E.limits.torque)
-ROOM = TorqueRoom(UR5E, DYNAMICS)
+ROOM = StreamTorqueRoom(UR5E, DYNAMICS)
 STILL = np.zeros(6)
 
 
@@ -42,7 +42,7 @@ def test_little_is_left_where_gravity_takes_most_and_much_where_it_does_not():
 def test_the_shaped_torque_stays_within_its_share_whatever_the_stream_asks_for(start, frequency):
     """Two per thousand for what lies between a reference and its shaped one."""
     line = without_arm(q=start)
-    stream = line.stream(H, Limits(3.0, 40.0, 2000.0))
+    stream = line.stream(H, MotionLimits(3.0, 40.0, 2000.0))
     motion = swinging([0.05, 0.1, 0.1, 0.1, 0.1, 0.1], frequency, 0.4)
     samples = []
     for k, q in enumerate(motion(np.arange(900) * H)):

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
-from tvist_controller.trajectory import JointLine, Limits, Motion, Rest, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Rest, quickest_motion
 
 from .robots import PAPER, Q1, Q2, Q3, H
 
@@ -16,7 +16,7 @@ MOTIONS = [(Q1, Q2, 1.8172), (Q1, Q3, 2.5153), (Q3, Q1, 2.5153)]
 angles = st.floats(-6.28, 6.28)
 
 
-def played(motion: Motion, start) -> np.ndarray:
+def played(motion: PlannedMotion, start) -> np.ndarray:
     """All references, the start first and the target for some ticks at the end."""
     points = [start]
     while not motion.finished:
@@ -69,7 +69,7 @@ def test_limits_hold_by_differences_and_the_end_is_exact(ends, velocity, acceler
     of ruckig's own polynomials is some ten times more.
     """
     start, target = np.array(ends).T
-    motion = quickest_motion(JointLine(start, target), Limits(velocity, acceleration, jerk), H)
+    motion = quickest_motion(JointLine(start, target), MotionLimits(velocity, acceleration, jerk), H)
     assert motion.duration < 300.0
     points = played(motion, start)
     assert (points[-1] == target).all()
@@ -88,7 +88,7 @@ def test_a_way_of_zero_length_is_over_at_once():
 
 def test_a_motion_of_hours_is_an_error_with_the_limits_in_it():
     with pytest.raises(ValueError, match="velocity 1e-05, acceleration 2, jerk 100"):
-        quickest_motion(JointLine(Q1, Q2), Limits(1e-5, 2.0, 100.0), H)
+        quickest_motion(JointLine(Q1, Q2), MotionLimits(1e-5, 2.0, 100.0), H)
 
 
 def test_rest_stays():

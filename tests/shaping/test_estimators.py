@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tvist_shaping import EstimatorError, Fixed, Polynomial, terms
-from tvist_shaping.estimators.basis import Basis
+from tvist_shaping.estimators.basis import BasisFunctions
 from tvist_shaping.estimators.polynomial import MARGIN, evaluate, saturate
 
 WIDE = {"f_d_range": (1e-3, 1e3), "zeta_range": (0.0, 0.99)}
@@ -16,7 +16,7 @@ configurations = st.lists(st.floats(-6.3, 6.3), min_size=6, max_size=6)
 def polynomial(basis="trigonometric", degree=2, joints=(1, 2, 3), seed=0, **changes):
     """Random coefficients around 100 Hz and 0.5, well inside wide ranges."""
     random = np.random.default_rng(seed)
-    n = len(Basis(joints, basis, degree))
+    n = len(BasisFunctions(joints, basis, degree))
     parameters = {
         "joints": joints,
         "basis": basis,
@@ -100,7 +100,7 @@ def test_no_two_terms_are_the_same_function():
         for joints in ((1,), (1, 2), (1, 2, 3)):
             for degree in range(5):
                 made = terms(q, joints=joints, basis=basis, degree=degree)
-                assert made.shape[1] == len(Basis(joints, basis, degree))
+                assert made.shape[1] == len(BasisFunctions(joints, basis, degree))
                 assert np.linalg.matrix_rank(made) == made.shape[1]
 
 
@@ -223,7 +223,7 @@ def test_a_configuration_with_too_few_joints_is_refused():
 @given(configurations, st.sampled_from(["trigonometric", "angles"]))
 def test_the_compiled_kernels_equal_their_python_source(q, basis):
     random = np.random.default_rng(5)
-    b = Basis((1, 2, 3), basis, 3)
+    b = BasisFunctions((1, 2, 3), basis, 3)
     arguments = (
         np.array(q),
         np.array(b.joints),

@@ -28,7 +28,7 @@ class Proxy:
         self._flowing.set()
         self._lock = threading.Lock()
         self._sockets = set()
-        self._door = None
+        self._interface = None
         self._port = free_port()
         self.delay = 0.0
         """How long a byte takes each way [s]."""
@@ -53,9 +53,9 @@ class Proxy:
     def cut(self):
         """Break every connection, and refuse new ones."""
         with self._lock:
-            door, self._door = self._door, None
+            interface, self._interface = self._interface, None
             sockets, self._sockets = self._sockets, set()
-        for each in (*sockets, *([door] if door else [])):
+        for each in (*sockets, *([interface] if interface else [])):
             with contextlib.suppress(OSError):
                 each.shutdown(socket.SHUT_RDWR)
             each.close()
@@ -63,12 +63,12 @@ class Proxy:
 
     def restore(self):
         """Take connections again, at the same place."""
-        door = socket.socket()
-        door.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        door.bind(("127.0.0.1", self._port))
-        door.listen()
-        self._door = door
-        threading.Thread(target=self._accept, args=(door,), daemon=True).start()
+        interface = socket.socket()
+        interface.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        interface.bind(("127.0.0.1", self._port))
+        interface.listen()
+        self._interface = interface
+        threading.Thread(target=self._accept, args=(interface,), daemon=True).start()
 
     def hold(self):
         """Let nothing pass, as when a cable is pulled: the connections stay."""
@@ -80,10 +80,10 @@ class Proxy:
 
     # ---------------------------------------------------------------- threads
 
-    def _accept(self, door):
+    def _accept(self, interface):
         while True:
             try:
-                near, _ = door.accept()
+                near, _ = interface.accept()
             except OSError:
                 return
             far = socket.socket()
@@ -94,7 +94,7 @@ class Proxy:
             with contextlib.suppress(OSError):
                 far.connect(self._target)
             with self._lock:
-                if self._door is not door:
+                if self._interface is not interface:
                     near.close()
                     far.close()
                     return

@@ -26,7 +26,7 @@ def timestamps(ticks):
     return [BOOTED + tick * TICK for tick in ticks]
 
 
-class Door:
+class Connection:
     """A connection to one of a robot's ports."""
 
     def __init__(self, host, port):
@@ -68,34 +68,34 @@ class Door:
 
 
 def dashboard(host):
-    door = Door(host, 29999)
-    assert door.line().startswith("Connected")
-    return door
+    interface = Connection(host, 29999)
+    assert interface.line().startswith("Connected")
+    return interface
 
 
 def rtde(host):
     """A client of RTDE that has started its outputs at 500 Hz."""
-    door = Door(host, 30004)
+    interface = Connection(host, 30004)
     for request, letter in (
         (rtde_client.version(), "V"),
         (rtde_client.outputs(READ), "O"),
         (rtde_client.package("S"), "S"),
     ):
-        door.send(request)
-        ((answered, payload),) = rtde_client.packages(door.package(">H"))
+        interface.send(request)
+        ((answered, payload),) = rtde_client.packages(interface.package(">H"))
         assert (answered, payload[:1]) == (letter, b"\x01")
-    return door
+    return interface
 
 
-def samples(door, count):
-    return [rtde_client.decoded(door.package(">H"), READ) for _ in range(count)]
+def samples(interface, count):
+    return [rtde_client.decoded(interface.package(">H"), READ) for _ in range(count)]
 
 
-def robot_states(door, until):
+def robot_states(interface, until):
     """Time [s] and measured angles of the robot states, to the first one at a time or after it."""
     found = []
     while not found or found[-1][0] < until:
-        ((kind, body),) = decoders.split(door.package(">i"))
+        ((kind, body),) = decoders.split(interface.package(">i"))
         if kind == 16:
             of = dict(decoders.parts(body))
             (time,) = struct.unpack_from(">Q", of[0])
@@ -124,9 +124,9 @@ def begin_step(wire, token, ticks):
     return wire.session.get(wire.key("command"), payload=payload, timeout=PATIENCE)
 
 
-def running(door):
+def running(interface):
     """Wait until the interface knows that the arm may move: the first state is on its way to it."""
-    while door.ask("robotmode") != "Robotmode: RUNNING":
+    while interface.ask("robotmode") != "Robotmode: RUNNING":
         pass
 
 
@@ -145,8 +145,8 @@ def test_rtde_and_the_real_time_interface_have_every_tick_once_in_order_as_zenoh
             Wire(served.endpoint) as stepper,
             Wire(served.endpoint) as mover,
             rtde(host) as receive,
-            Door(host, 30003) as realtime,
-            Door(host, 30013) as read_only,
+            Connection(host, 30003) as realtime,
+            Connection(host, 30013) as read_only,
         ):
             clock = take_clock(stepper)
             token = mover.command("take_control", client="mover")["token"]
@@ -161,10 +161,10 @@ def test_rtde_and_the_real_time_interface_have_every_tick_once_in_order_as_zenoh
             for tick, sample in enumerate(received, 1):
                 for name in READ[1:]:
                     assert sample[name] == states[tick][name], (tick, name)
-            for door in (realtime, read_only):
+            for interface in (realtime, read_only):
                 times = []
                 while not times or times[-1] < timestamps([ticks])[0]:
-                    package = struct.unpack(">i152d", door.take(REALTIME_BYTES))
+                    package = struct.unpack(">i152d", interface.take(REALTIME_BYTES))
                     # While no time passes the last tick is told again, once a second.
                     if not times or package[1] != times[-1]:
                         times.append(package[1])
@@ -177,12 +177,12 @@ def test_rtde_and_the_real_time_interface_have_every_tick_once_in_order_as_zenoh
 @pytest.mark.parametrize("port", [30001, 30002, 30011, 30012])
 def test_primary_and_secondary_tell_the_time_of_the_ticks_ten_times_a_second(port, ur_lockstep):
     wire, clock, host, first = ur_lockstep
-    with Door(host, port) as door:
-        assert decoders.message(door.package(">i")).values["name"] == "URControl"
+    with Connection(host, port) as interface:
+        assert decoders.message(interface.package(">i")).values["name"] == "URControl"
         wire.step(clock, 1000)
         last = wire.received["state"][-1]["tick"]
         of = {round(state["timestamp"], 3): state for state in wire.received["state"]}
-        found = robot_states(door, BOOTED + last // 50 * 50 * TICK)
+        found = robot_states(interface, BOOTED + last // 50 * 50 * TICK)
         times = [round(time - BOOTED, 3) for time, _ in found]
         # At once where the last tick is told again while no time passes, then at every fiftieth tick.
         begun = round(times[0] / TICK)
@@ -209,22 +209,22 @@ def test_a_program_of_the_dashboard_reaches_its_end_within_one_step_of_another_c
     with (
         lockstep(3, tmp_path / "run.mcap") as (served, host),
         Wire(served.endpoint) as stepper,
-        dashboard(host) as door,
+        dashboard(host) as interface,
     ):
         clock = take_clock(stepper)
         stepper.listen("event")
-        assert door.ask("robotmode") == "Robotmode: NO_CONTROLLER"
+        assert interface.ask("robotmode") == "Robotmode: NO_CONTROLLER"
         stepper.step(clock, 1)
-        running(door)
-        assert door.ask(f"load {PAPER}") == f"Loading program: {PAPER}"
-        assert door.ask("play") == "Starting program"
+        running(interface)
+        assert interface.ask(f"load {PAPER}") == f"Loading program: {PAPER}"
+        assert interface.ask("play") == "Starting program"
         assert stepper.info()["control"].startswith("ur-")
         begin_step(stepper, clock, 100_000)
         done = 0
         for _ in range(lines):
             event = stepper.wait("event", lambda event: event["kind"] == "motion_done", since=done)
             done = stepper.received["event"].index(event) + 1
-        while door.ask("running") != "Program running: false":
+        while interface.ask("running") != "Program running: false":
             pass
         assert served.end() == 0
     told = [entry for entry in replayed(tmp_path / "run.mcap").journal if entry.kind == "command"]
@@ -243,23 +243,23 @@ def test_the_dashboard_pauses_resumes_and_stops_within_a_step(tmp_path):
         lockstep(4, tmp_path / "run.mcap") as (served, host),
         Wire(served.endpoint) as stepper,
         Wire(served.endpoint) as other,
-        dashboard(host) as door,
+        dashboard(host) as interface,
     ):
         clock = take_clock(stepper)
         other.listen("state", "event")
         stepper.step(clock, 1)
-        running(door)
-        assert door.ask(f"load {PAPER}") == f"Loading program: {PAPER}"
+        running(interface)
+        assert interface.ask(f"load {PAPER}") == f"Loading program: {PAPER}"
         answers = begin_step(stepper, clock, 100_000)
         other.until(10)  # what is asked now is asked within the step
-        assert door.ask("play") == "Starting program"
+        assert interface.ask("play") == "Starting program"
         other.wait("event", lambda event: event["kind"] == "motion_started")
-        assert door.ask("pause") == "Pausing program"
-        assert door.ask("programState") == f"PAUSED {PAPER}"
-        assert door.ask("play") == "Starting program"
-        assert door.ask("programState") == f"PLAYING {PAPER}"
-        assert door.ask("stop") == "Stopped"
-        assert door.ask("programState") == f"STOPPED {PAPER}"
+        assert interface.ask("pause") == "Pausing program"
+        assert interface.ask("programState") == f"PAUSED {PAPER}"
+        assert interface.ask("play") == "Starting program"
+        assert interface.ask("programState") == f"PLAYING {PAPER}"
+        assert interface.ask("stop") == "Stopped"
+        assert interface.ask("programState") == f"STOPPED {PAPER}"
         assert answers.try_recv() is None
         assert served.end() == 0
     content = replayed(tmp_path / "run.mcap")
@@ -274,14 +274,14 @@ def test_the_going_of_the_stepping_client_ends_its_step_and_another_one_s_takes_
     tmp_path,
 ):
     with lockstep(5, tmp_path / "run.mcap") as (served, host):
-        with Wire(served.endpoint) as other, dashboard(host) as door:
+        with Wire(served.endpoint) as other, dashboard(host) as interface:
             other.listen("state", "event")
             with Wire(served.endpoint) as stepper:
                 clock = take_clock(stepper)
                 stepper.step(clock, 1)
-                running(door)
-                assert door.ask("load Q2.urp") == "Loading program: Q2.urp"
-                assert door.ask("play") == "Starting program"
+                running(interface)
+                assert interface.ask("load Q2.urp") == "Loading program: Q2.urp"
+                assert interface.ask("play") == "Starting program"
                 begin_step(stepper, clock, 100_000)
                 other.until(100)
             while (info := other.info())["stepper"] is not None:
@@ -309,14 +309,14 @@ def test_unmodified_clients_of_ur_rtde_live_by_the_steps_of_another_client(tmp_p
         with (
             Client("rtde_receive", "RTDEReceiveInterface", host) as receive,
             Client("rtde_io", "RTDEIOInterface", host) as setter,
-            Client("dashboard_client", "DashboardClient", host) as door,
+            Client("dashboard_client", "DashboardClient", host) as interface,
         ):
-            door.connect()
-            door.loadURP(PAPER)
-            door.play()
-            assert door.running()
-            door.stop()
-            until(door.programState, f"STOPPED {PAPER}")
+            interface.connect()
+            interface.loadURP(PAPER)
+            interface.play()
+            assert interface.running()
+            interface.stop()
+            until(interface.programState, f"STOPPED {PAPER}")
             assert setter.setStandardDigitalOut(1, True)
             until(lambda: receive.getDigitalOutState(1), wanted=True)
             assert receive.isConnected()

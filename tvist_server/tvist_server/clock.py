@@ -31,7 +31,7 @@ PRIORITY = 50
 """Real-time priority of the tick thread: the middle of the range 1 to 99."""
 
 
-class Driven:
+class Mailbox:
     """A robot as a clock drives it: its host, and what waits to be done between two of its ticks.
 
     Args:
@@ -67,7 +67,7 @@ class Clock(ABC):
         robots: Robots to tick.
     """
 
-    def __init__(self, robots: Sequence[Driven]) -> None:
+    def __init__(self, robots: Sequence[Mailbox]) -> None:
         self._robots = robots
         self._running = True
         self._thread = threading.Thread(target=self._guarded, name="tvist-tick", daemon=True)
@@ -86,7 +86,7 @@ class Clock(ABC):
             self._thread.join()
 
     @abstractmethod
-    def punctuality(self, robot: Driven) -> Punctuality | None:
+    def punctuality(self, robot: Mailbox) -> Punctuality | None:
         """Lateness of a robot's ticks since the last look; None where time does not pass by itself."""
 
     def _guarded(self) -> None:
@@ -113,12 +113,12 @@ class Lockstep(Clock):
         repeat: Tells its last state again.
     """
 
-    def __init__(self, robot: Driven, repeat: Do) -> None:
+    def __init__(self, robot: Mailbox, repeat: Do) -> None:
         super().__init__([robot])
         self._jobs = robot.jobs
         self._repeat = repeat
 
-    def punctuality(self, robot: Driven) -> None:
+    def punctuality(self, robot: Mailbox) -> None:
         """There is none: a client lets time pass."""
 
     def _run(self) -> None:
@@ -140,7 +140,7 @@ class Realtime(Clock):
 
     def __init__(
         self,
-        robots: Sequence[Driven],
+        robots: Sequence[Mailbox],
         hand_on: Do,
         period: float,
         speed: float = 1.0,
@@ -152,7 +152,7 @@ class Realtime(Clock):
         self._period = period / speed
         self._priority = priority
 
-    def punctuality(self, robot: Driven) -> Punctuality:
+    def punctuality(self, robot: Mailbox) -> Punctuality:
         """Lateness since the last look."""
         return robot.lateness.look()
 

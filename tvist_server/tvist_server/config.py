@@ -19,7 +19,7 @@ from tvist_protocol.info import Clock
 from tvist_protocol.values import RobotName, Seed
 from tvist_server.fleet import members
 from tvist_server.initial import read_state, shaped_by
-from tvist_server.ur_ports import Door, UrPorts
+from tvist_server.ur_ports import InterfaceName, UrPorts
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 DEFAULT_NAME = "ur5e"
@@ -107,7 +107,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             for index, member in enumerate(found)
         ]
 
-    def doors(self, number: int) -> tuple[str, dict[Door, int]]:
+    def interfaces(self, number: int) -> tuple[str, dict[InterfaceName, int]]:
         """Return the address of a robot's UR interfaces, and the port of each.
 
         Args:

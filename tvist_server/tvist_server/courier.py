@@ -1,4 +1,4 @@
-"""The thread that hands on what waits in outlets."""
+"""The thread that hands on what waits in publishers."""
 
 import threading
 from collections.abc import Callable, Sequence
@@ -19,7 +19,7 @@ class Courier:
         self._hand_on = hand_on
         self._running = True
         self._calls: SimpleQueue[None] = SimpleQueue()
-        self._thread = threading.Thread(target=self._run, name="tvist-outlet", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="tvist-publisher", daemon=True)
 
     def start(self) -> None:
         """Begin."""

@@ -16,7 +16,7 @@ from tvist_server.gateways.base import Answer
 
 log = logging.getLogger(__name__)
 
-MOST_WAITING = 16
+MAX_WAITING = 16
 """Commands that may wait to be planned, and behind one that is."""
 TRIES = 10
 """Plans that may be overtaken by what changes meanwhile, before one is made in the controller's thread."""
@@ -29,9 +29,9 @@ STOPPING = (Stop, PowerOff, ProgramStop)
 _BUSY = Refused(
     code="busy",
     where="",
-    why=f"{MOST_WAITING} commands are waiting to be planned, or the server is shutting down: "
+    why=f"{MAX_WAITING} commands are waiting to be planned, or the server is shutting down: "
     "send the next one after an answer",
-    limit=MOST_WAITING,
+    limit=MAX_WAITING,
 )
 _FAILED = Refused(
     code="wrong_mode",
@@ -96,7 +96,7 @@ class PlanAhead:
         stops = isinstance(admitted.command, STOPPING)
         with self._lock:
             waits = self._count > 0 or isinstance(admitted.command, PLANNED)
-            full = self._count >= MOST_WAITING or self._closing
+            full = self._count >= MAX_WAITING or self._closing
             if waits and not full:
                 self._count += 1
                 self._queue.put(_Waiting(admitted, _nobody if stops else answer))

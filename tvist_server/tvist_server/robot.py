@@ -10,11 +10,11 @@ from tvist_controller.host import Host
 from tvist_controller.planning.planner import Planner
 from tvist_controller.setup import Setup
 from tvist_protocol.stream import Telemetry
-from tvist_server.clock import Clock, Driven
+from tvist_server.clock import Clock, Mailbox
 from tvist_server.gateways.base import Answer, Gateway
 from tvist_server.lateness import Punctuality
-from tvist_server.outlet import Outlet
 from tvist_server.plan_ahead import PlanAhead
+from tvist_server.publisher import Publisher
 from tvist_server.reception import Reception
 from tvist_server.recording.black_box import BlackBox
 from tvist_server.recording.recorder import Recorder
@@ -49,15 +49,15 @@ class ServedRobot:
                 on_moved=self._warn,
             )
         black_box = BlackBox(dump, lambda: info_of(self.controller), setup.to_builtins())
-        self._outlet = Outlet(lossless=lockstep)
+        self._publisher = Publisher(lossless=lockstep)
         recorded = () if self.recorder is None else (self.recorder,)
-        self._host = Host(self.controller, *recorded, black_box, self._outlet)
-        self.driven = Driven(self._host)
+        self._host = Host(self.controller, *recorded, black_box, self._publisher)
+        self.driven = Mailbox(self._host)
         """For the clock."""
         # Where a client lets time pass nothing is late, and plans are made where they are used.
         self._plan_ahead = None if lockstep else PlanAhead(self._host, Planner(setup), self.driven.post)
         carry_out = self._carry_out if self._plan_ahead is None else self._plan_ahead.submit
-        self.reception = Reception(self._host, self.driven.post, carry_out, self._outlet.answer)
+        self.reception = Reception(self._host, self.driven.post, carry_out, self._publisher.answer)
         """Reception that gateways pass messages to."""
         self._gateways: Sequence[Gateway] = ()
 
@@ -69,15 +69,15 @@ class ServedRobot:
             wake: Called with every message, where nobody hands them on by himself.
         """
         self._gateways = gateways
-        self._outlet.open(gateways, wake)
+        self._publisher.open(gateways, wake)
 
     def hand_on(self) -> None:
         """Hand on what waits for the gateways."""
-        self._outlet.hand_on()
+        self._publisher.hand_on()
 
     def repeat(self) -> None:
         """Tell how the robot stands, while no time passes, for those who come late; in the controller's thread."""
-        self._outlet.repeat(self.controller.latest, self.controller.io())
+        self._publisher.repeat(self.controller.latest, self.controller.io())
 
     def _carry_out(self, admitted: Admitted, answer: Answer) -> None:
         client = admitted.client
@@ -106,7 +106,7 @@ class ServedRobot:
 
     def hurry(self) -> None:
         """Plan nothing more and wait for no client: it is about to end."""
-        self._outlet.hurry()
+        self._publisher.hurry()
         if self._plan_ahead is not None:
             self._plan_ahead.end()
 
@@ -131,7 +131,7 @@ class ServedRobot:
 
         def tell() -> None:
             # As io is now, and not as it was told last: a program may have been played since, before the next tick.
-            self._outlet.telemetry(self._telemetry(punctuality), self.controller.io())
+            self._publisher.telemetry(self._telemetry(punctuality), self.controller.io())
 
         self.driven.post(tell)
 
@@ -148,7 +148,7 @@ class ServedRobot:
             late_p99_us=on_time.p99_us,
             late_max_us=on_time.max_us,
             missed_ticks=counters.missed_ticks,
-            dropped_states=self._outlet.dropped + sum(gateway.dropped for gateway in gateways),
+            dropped_states=self._publisher.dropped + sum(gateway.dropped for gateway in gateways),
             recorder_dropped=self.recorder.dropped if self.recorder is not None else 0,
             setpoints_received=counters.setpoints_received + refused,
             setpoints_refused=counters.setpoints_refused + refused,

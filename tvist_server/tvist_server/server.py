@@ -18,11 +18,11 @@ from tvist_server.ending import Ending
 from tvist_server.fleet import recording_of
 from tvist_server.gateways.base import Gateway
 from tvist_server.gateways.console import Console, ConsoleGateway
-from tvist_server.gateways.exposure import ExposureError, guarded, guarded_doors
+from tvist_server.gateways.exposure import ExposureError, guarded, guarded_interfaces
 from tvist_server.gateways.network import Network
-from tvist_server.gateways.ur.doors import UrDoors
+from tvist_server.gateways.ur.interfaces import UrInterfaces
 from tvist_server.robot import ServedRobot
-from tvist_server.ur_ports import Door
+from tvist_server.ur_ports import InterfaceName
 
 LEAVE = 0.6
 """Longest time that clients have at shutdown to read pending messages [s]."""
@@ -62,7 +62,7 @@ class Server:
             lockstep = config.clock != "realtime"
             self._network = Network(listen, guard, lockstep=lockstep)
             self._console = Console()
-            self.ur: list[tuple[str, dict[Door, int]]] = []
+            self.ur: list[tuple[str, dict[InterfaceName, int]]] = []
             """Address and ports of each robot's UR interfaces; empty if they are not open."""
             for number, robot in enumerate(self.robots):
                 # In real time the clock wakes the courier; in lockstep each message does.
@@ -81,9 +81,9 @@ class Server:
             self._network.gateway(name, desk, lockstep=lockstep, truth=robot.setup.truth)
         ]
         if config.ur:
-            doors = _doors(robot, config, number)
-            self.ur.append((doors.address, doors.ports))
-            gateways.append(doors)
+            interfaces = _interfaces(robot, config, number)
+            self.ur.append((interfaces.address, interfaces.ports))
+            gateways.append(interfaces)
         gateways.append(ConsoleGateway(self._console, name, partial(config.command_line, name=name)))
         return gateways
 
@@ -177,14 +177,14 @@ def _robot(setup: Setup, config: ServeConfig, *, several: bool) -> ServedRobot:
         raise ConfigError(str(error)) from error
 
 
-def _doors(robot: ServedRobot, config: ServeConfig, number: int) -> UrDoors:
-    address, ports = config.doors(number)
+def _interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> UrInterfaces:
+    address, ports = config.interfaces(number)
     try:
-        guarded_doors(address, insecure=config.insecure)
+        guarded_interfaces(address, insecure=config.insecure)
     except ExposureError as error:
         raise ConfigError(str(error)) from error
     setup, lockstep = robot.setup, config.clock != "realtime"
-    return UrDoors(robot.reception, setup.description, setup.name, address, ports, lockstep=lockstep)
+    return UrInterfaces(robot.reception, setup.description, setup.name, address, ports, lockstep=lockstep)
 
 
 def _drivers(config: ServeConfig, robots: Sequence[ServedRobot]) -> tuple[list[Courier], list[Clock]]:

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta, Struct
 
-Door = Literal[
+InterfaceName = Literal[
     "dashboard", "primary", "secondary", "realtime", "rtde",
     "primary_read_only", "secondary_read_only", "realtime_read_only",
 ]  # fmt: skip
@@ -25,6 +25,6 @@ class UrPorts(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     secondary_read_only: Port = 30012
     realtime_read_only: Port = 30013
 
-    def open(self) -> dict[Door, int]:
+    def open(self) -> dict[InterfaceName, int]:
         """Return the port of each interface that is open."""
-        return {door: port for door, port in msgspec.structs.asdict(self).items() if port}  # type: ignore[misc]
+        return {interface: port for interface, port in msgspec.structs.asdict(self).items() if port}  # type: ignore[misc]

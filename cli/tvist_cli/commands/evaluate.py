@@ -12,7 +12,7 @@ from tvist_cli.shapers_of import loaded
 
 if TYPE_CHECKING:
     from tvist_controller.own_shapers import OwnShaper
-    from tvist_lab.evaluation.evaluate import Job, Judged
+    from tvist_lab.evaluation.evaluate import JudgedMove, MoveJob
     from tvist_lab.evaluation.moves import Move
     from tvist_plant.description import RobotDescription
     from tvist_protocol.calibration import Calibration
@@ -69,7 +69,7 @@ def evaluate(
         figures: Folder to write figures to.
         json: Print one JSON object.
     """
-    from tvist_lab.evaluation.evaluate import Job, report
+    from tvist_lab.evaluation.evaluate import MoveJob, report
     from tvist_lab.evaluation.evaluate import evaluate as run
     from tvist_lab.evaluation.running import ShaperFaultError
     from tvist_plant.description import DescriptionError, load
@@ -84,9 +84,9 @@ def evaluate(
     plant, kept = _disturbed(description, disturbances, clean=clean)
     recipe, others = _recipe(shaper, own, modes, known, plant, frequency_error, masses, baselines=baselines)
     jobs = [
-        Job(plant, move, recipe, others, seed=_arm_seed(seed, place)) for place, move in enumerate(chosen)
+        MoveJob(plant, move, recipe, others, seed=_arm_seed(seed, place)) for place, move in enumerate(chosen)
     ]
-    judged: list[Judged] = []
+    judged: list[JudgedMove] = []
     with told(OSError):
         if save_moves is not None:
             from tvist_lab.evaluation.moves import write_moves
@@ -257,7 +257,7 @@ def _arm_seed(seed: int, place: int) -> int:
     return (1_000_003 * seed + place) % 2**63
 
 
-def _draw(jobs: list["Job"], judged: list["Judged"], folder: Path) -> None:
+def _draw(jobs: list["MoveJob"], judged: list["JudgedMove"], folder: Path) -> None:
     from tvist_lab.evaluation.evaluate import record
     from tvist_lab.figures import residual_by_move_figure, save, vibration_figure
 

@@ -162,11 +162,13 @@ def _polynomial(
     json: bool,
 ) -> None:
     from tvist_lab.identification.fit import FitError
-    from tvist_lab.identification.identify import Plan
+    from tvist_lab.identification.identify import MeasurementPlan
     from tvist_lab.identification.identify import identify as run
     from tvist_protocol.calibration import calibration_to_json
 
-    plan = Plan(configurations=configurations, anchors=tuple(anchors), repeats=repeats, seed=place.seed)
+    plan = MeasurementPlan(
+        configurations=configurations, anchors=tuple(anchors), repeats=repeats, seed=place.seed
+    )
     command = f"tvist identify --configurations {configurations} --repeats {repeats} --seed {place.seed}"
     if place.mass is not None:
         command += f" --payload {place.mass:g}"

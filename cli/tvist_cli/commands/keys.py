@@ -10,7 +10,7 @@ from tvist_cli.failure import Failure, told
 from tvist_cli.output import out, print_json
 
 if TYPE_CHECKING:
-    from tvist_cli.certificates import Authority, Host
+    from tvist_cli.certificates import CertificateAuthority, Host
     from tvist_server.gateways.access import Role
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
@@ -143,19 +143,19 @@ class _KeyRing:
         for name, role in asked.items():
             self._client(authority, name, role)
 
-    def _authority(self) -> "Authority":
-        from tvist_cli.certificates import Authority
+    def _authority(self) -> "CertificateAuthority":
+        from tvist_cli.certificates import CertificateAuthority
         from tvist_server.gateways.exposure import AUTHORITY
 
         certificate, key = self.folder / AUTHORITY, self.folder / AUTHORITY_KEY
         if certificate.exists():
-            return Authority.read(certificate, key)
-        authority = Authority.make()
+            return CertificateAuthority.read(certificate, key)
+        authority = CertificateAuthority.make()
         authority.write(certificate, key)
         self.made.append(f"{certificate}: authority, until {authority.until:%Y-%m-%d}")
         return authority
 
-    def _client(self, authority: "Authority", name: str, role: "Role") -> None:
+    def _client(self, authority: "CertificateAuthority", name: str, role: "Role") -> None:
         from tvist_cli.certificates import write_new
         from tvist_client.transports.certificates import AUTHORITY, CERTIFICATE, KEY
         from tvist_server.gateways import exposure

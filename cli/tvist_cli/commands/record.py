@@ -32,7 +32,7 @@ def record(
         raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
     from tvist_client.robot import Robot
     from tvist_server.ending import Ending
-    from tvist_server.recording import Recorder, RecordingError
+    from tvist_server.recording import Recorder, RecorderError
 
     ending = Ending()
 
@@ -61,7 +61,7 @@ def record(
             missing = ticks[-1] - ticks[0] + 1 - len(ticks) if ticks else 0
             return recorder.place, len(ticks), missing + recorder.dropped
 
-    with told(RecordingError):
+    with told(RecorderError):
         place, states, lost = asyncio.run(run())
     ending.close()
     if json:

@@ -22,10 +22,10 @@ def replay(
     from tvist_lab.mcap_file import read
     from tvist_lab.recordings import RecordingError
     from tvist_lab.replay import ReplayError, replay_file
-    from tvist_server.recording import RecordingError as WritingError
+    from tvist_server.recording import RecorderError
 
     own = [load_given(place) for place in shaper or []]
-    with told(RecordingError, ReplayError, WritingError, ValueError):
+    with told(RecordingError, ReplayError, RecorderError, ValueError):
         content = read(file)
         again = replay_file(content, output, own)
     for note in again.notes:

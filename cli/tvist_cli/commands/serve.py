@@ -94,7 +94,7 @@ def serve(
     from tvist_server.config import ConfigError, from_mapping, read_toml
     from tvist_server.ending import Ending
     from tvist_server.gateways.base import GatewayError
-    from tvist_server.recording import RecordingError
+    from tvist_server.recording import RecorderError
     from tvist_server.server import Server
 
     with told(ConfigError, code=2):
@@ -103,7 +103,7 @@ def serve(
         checked = from_mapping(content, "configuration" if config is None else f"configuration {config}")
         ending = Ending()
         # Now there is something to clean up, which an exception sees to.
-        with told(GatewayError, RecordingError), ending.at_once():
+        with told(GatewayError, RecorderError), ending.at_once():
             server = Server(checked)
 
     def ready() -> None:
@@ -114,7 +114,7 @@ def serve(
         )
 
     for address, ports in server.ur:
-        listed = ", ".join(f"{door} {port}" for door, port in ports.items())
+        listed = ", ".join(f"{interface} {port}" for interface, port in ports.items())
         say(f"UR's interfaces are open on {address}: {listed}")
     whom = "this robot" if len(server.robots) == 1 else "these robots"
     for endpoint in checked.listen if checked.insecure else ():
@@ -137,11 +137,11 @@ def serve(
 
 
 def _ur_port(text: str) -> tuple[str, int]:
-    """Split DOOR=PORT; the configuration checks whether there is such a door."""
-    door, equals, port = text.partition("=")
+    """Split INTERFACE=PORT; the configuration checks whether there is such an interface."""
+    interface, equals, port = text.partition("=")
     if not equals or not (port == "off" or (port.isascii() and port.isdigit() and len(port) < 9)):
-        raise Failure(f"ur-port is {text!r}: must be DOOR=PORT such as rtde=31004, or DOOR=off", code=2)
-    return door, 0 if port == "off" else int(port)
+        raise Failure(f"ur-port is {text!r}: must be INTERFACE=PORT such as rtde=31004, or DOOR=off", code=2)
+    return interface, 0 if port == "off" else int(port)
 
 
 def _introduction(setups: Sequence["Setup"]) -> str:

@@ -8,7 +8,7 @@ from tvist_client.errors import NotConnectedError
 from tvist_client.transports.base import Topic, Transport
 
 
-class LoopbackHost(Protocol):
+class InProcessRobot(Protocol):
     """What a robot in process offers. A `simulation.step` ticks it, and callbacks run, before it returns."""
 
     def request(self, client: str, data: bytes) -> bytes:
@@ -32,7 +32,7 @@ class LoopbackTransport(Transport):
         client: Name under which the host knows this client.
     """
 
-    def __init__(self, host: LoopbackHost, client: str = "client") -> None:
+    def __init__(self, host: InProcessRobot, client: str = "client") -> None:
         self._host = host
         self._client = client
         self._unsubscribe: list[Callable[[], None]] = []

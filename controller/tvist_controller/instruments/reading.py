@@ -28,7 +28,7 @@ class Reading:
         ratings: Ratings of the joints.
         current: Currents of the motors [A].
         meters: Temperatures and energies at this tick.
-        kept: Values that doors keep from tick to tick.
+        kept: Values that interfaces keep from tick to tick.
     """
 
     def __init__(
@@ -47,9 +47,9 @@ class Reading:
         self.io = io
         """Terminals and registers as they were told."""
         self.shared: dict[str, Any] = {}
-        """What doors made of this tick, so that all their clients share it."""
+        """What interfaces made of this tick, so that all their clients share it."""
         self.kept = kept
-        """What doors keep from tick to tick."""
+        """What interfaces keep from tick to tick."""
         self._current = current
         self._temperatures = meters.temperatures
         self._power, self._consumed, self._dissipated = meters.power, meters.consumed, meters.dissipated

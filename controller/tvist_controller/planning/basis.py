@@ -53,7 +53,7 @@ class MotionBasis(Struct, frozen=True, eq=False, gc=False):
         )
 
 
-class Basis(NamedTuple):
+class PlanBasis(NamedTuple):
     """What any plan depends on."""
 
     filter: FilterBasis

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tvist_controller.ahead import MOST_AHEAD, Ahead
+from tvist_controller.ahead import MAX_AHEAD, Ahead
 from tvist_controller.collision import CLEARANCE, CollisionModel
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.control.inverse_dynamics import InverseDynamics
@@ -15,7 +15,7 @@ from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety import largest_torque, rate_of, torque_along
 from tvist_controller.setup import Setup, body
-from tvist_controller.trajectory import JointLine, Limits, Motion, Path, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits, Path, PlannedMotion, quickest_motion
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
 
@@ -29,7 +29,7 @@ BLUNTED = 1.05
 class PlannedMove:
     """A motion that may begin."""
 
-    trajectory: Motion
+    trajectory: PlannedMotion
     """Its reference."""
     velocity: float
     """Limit that was asked for [rad/s]."""
@@ -58,10 +58,10 @@ class MovePlanner:
         Raises:
             RefusalError: There is no such motion, or something would meet on its way.
         """
-        limits = Limits(command.velocity, command.acceleration, command.jerk)
+        limits = MotionLimits(command.velocity, command.acceleration, command.jerk)
         return self.along(JointLine(basis.q, np.array(command.q, dtype=float)), limits, basis)
 
-    def along(self, path: Path, limits: Limits, basis: MotionBasis) -> PlannedMove:
+    def along(self, path: Path, limits: MotionLimits, basis: MotionBasis) -> PlannedMove:
         """Plan a motion along a path, from rest to rest.
 
         Args:
@@ -81,7 +81,7 @@ class MovePlanner:
         self._check_clear(motion, basis)
         return PlannedMove(motion, limits.velocity, self._excess_of_torque(motion, basis))
 
-    def _check_clear(self, motion: Motion, basis: MotionBasis) -> None:
+    def _check_clear(self, motion: PlannedMotion, basis: MotionBasis) -> None:
         if self._collisions.carried is not basis.carried:
             self._collisions.carry(basis.carried)
         found = self._collisions.on_way(motion.path.whole)
@@ -90,7 +90,7 @@ class MovePlanner:
             time = motion.time_at(share)
             raise RefusalError("collision", "q", f"{meeting} {time:.2f} s after the start", CLEARANCE)
 
-    def _excess_of_torque(self, motion: Motion, basis: MotionBasis) -> str | None:
+    def _excess_of_torque(self, motion: PlannedMotion, basis: MotionBasis) -> str | None:
         dynamics, allowed, limits = self._dynamics, self._torque, motion.limits
         dynamics.believe(basis.bodies)
         bound = largest_torque(dynamics, motion.path, limits.velocity, limits.acceleration)
@@ -109,12 +109,12 @@ class MovePlanner:
             f"limit of {limit:g}: ask for less acceleration"
         )
 
-    def _before_shaping(self, motion: Motion) -> Floats:
+    def _before_shaping(self, motion: PlannedMotion) -> Floats:
         """Largest torques that the motion would take without a filter, shape (n,) [N m]."""
         most: Floats = np.max([self._dynamics.effort(*state) for state in motion.states(LOOKS)], axis=0)
         return most
 
-    def _shaped(self, motion: Motion, basis: MotionBasis) -> Floats | None:
+    def _shaped(self, motion: PlannedMotion, basis: MotionBasis) -> Floats | None:
         """References of the shaped motion, shape (k, n) [rad]; None where it lasts for too long to know."""
         tvist = self._filters.present(basis.filter)
         path, shaped = motion.path, ShapedReference(basis.q, PERIOD)
@@ -123,5 +123,5 @@ class MovePlanner:
         line_filter.begin(tvist, path.start, path.posture_of)
         tvist.aim(path.end)
         ahead = Ahead(motion.fork(), line_filter, shaped)
-        ahead.until(MOST_AHEAD)
+        ahead.until(MAX_AHEAD)
         return np.array(ahead.references) if ahead.rests else None

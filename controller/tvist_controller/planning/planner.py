@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tvist_controller.planning.basis import Basis, FilterBasis, MotionBasis
+from tvist_controller.planning.basis import FilterBasis, MotionBasis, PlanBasis
 from tvist_controller.planning.filter_planner import FilterPlanner, PlannedFilter
 from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
 from tvist_controller.refusal import RefusalError, check_content, payload_of
@@ -23,7 +23,7 @@ class Plan:
     found: PlannedMove | PlannedFilter | Filter | RefusalError | None
     """What was planned, or why it cannot be; None where there is nothing to change."""
 
-    def holds(self, now: Basis) -> bool:
+    def holds(self, now: PlanBasis) -> bool:
         """Whether what it was planned on is so now."""
         match self.basis:
             case None:
@@ -46,7 +46,7 @@ class Planner:
         self.filters = FilterPlanner(setup)
         self._moves = MovePlanner(setup, self.filters)
 
-    def plan(self, command: c.Command, basis: Basis) -> Plan:
+    def plan(self, command: c.Command, basis: PlanBasis) -> Plan:
         """Plan a command; that it is refused is a plan, too."""
         on = basis.motion if isinstance(command, c.MoveJ) else basis.filter
         try:
@@ -54,7 +54,7 @@ class Planner:
         except RefusalError as refusal:
             return Plan(on, refusal)
 
-    def _find(self, command: c.Command, basis: Basis) -> PlannedMove | PlannedFilter | Filter | None:
+    def _find(self, command: c.Command, basis: PlanBasis) -> PlannedMove | PlannedFilter | Filter | None:
         check_content(command, self._description)
         on, filters = basis.filter, self.filters
         match command:

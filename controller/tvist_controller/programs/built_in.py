@@ -12,7 +12,7 @@ PAPER: Final = "paper.urp"
 
 
 @dataclass(frozen=True)
-class Move:
+class ProgramLine:
     """One line of a program."""
 
     pose: str
@@ -21,10 +21,10 @@ class Move:
     """[rad]."""
 
 
-def built_in(description: RobotDescription) -> dict[str, tuple[Move, ...]]:
+def built_in(description: RobotDescription) -> dict[str, tuple[ProgramLine, ...]]:
     """Programs by the names of their files; one without moves waits until it is stopped."""
-    moves = [Move(name, tuple(q)) for name, q in description.poses.items()]
-    programs: dict[str, tuple[Move, ...]] = {WAIT: ()}
+    moves = [ProgramLine(name, tuple(q)) for name, q in description.poses.items()]
+    programs: dict[str, tuple[ProgramLine, ...]] = {WAIT: ()}
     if moves:
         programs[PAPER] = (*moves, *moves[-2::-1])
     return programs | {f"{move.pose}.urp": (move,) for move in moves}

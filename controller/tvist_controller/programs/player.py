@@ -5,7 +5,7 @@ from collections.abc import Callable
 from tvist_controller.command_row import Call, Row
 from tvist_controller.events import Emit
 from tvist_controller.motion import MotionControl
-from tvist_controller.programs.built_in import Move, built_in
+from tvist_controller.programs.built_in import ProgramLine, built_in
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety_control import SafetyControl
 from tvist_plant.description import RobotDescription
@@ -112,7 +112,7 @@ class ProgramPlayer:
             self.end()
 
     @property
-    def _lines(self) -> tuple[Move, ...]:
+    def _lines(self) -> tuple[ProgramLine, ...]:
         return self.known.get(self.name or "", ())
 
     def _load(self, call: Call[ProgramLoad]) -> None:

@@ -4,11 +4,11 @@ from tvist_controller.trajectory.base import Forecast, Rest, Trajectory
 from tvist_controller.trajectory.curve import Bends, Curve
 from tvist_controller.trajectory.double_s import DoubleS
 from tvist_controller.trajectory.known import Known
-from tvist_controller.trajectory.limits import Limits
-from tvist_controller.trajectory.motion import Motion, quickest_motion
+from tvist_controller.trajectory.limits import MotionLimits
+from tvist_controller.trajectory.motion import PlannedMotion, quickest_motion
 from tvist_controller.trajectory.path import JointLine, Path, Way
 from tvist_controller.trajectory.path_stop import PathStop
-from tvist_controller.trajectory.stop import Stop
+from tvist_controller.trajectory.stop import JointStop
 from tvist_controller.trajectory.stream import SetpointStream
 
 __all__ = [
@@ -17,14 +17,14 @@ __all__ = [
     "DoubleS",
     "Forecast",
     "JointLine",
+    "JointStop",
     "Known",
-    "Limits",
-    "Motion",
+    "MotionLimits",
     "Path",
     "PathStop",
+    "PlannedMotion",
     "Rest",
     "SetpointStream",
-    "Stop",
     "Trajectory",
     "Way",
     "quickest_motion",

@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Self
 
-from tvist_controller.trajectory.limits import Floats, Limits
+from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.path import Path
 
 
@@ -35,7 +35,7 @@ class Trajectory(ABC):
 
     path: Path | None = None
     """The path that it goes along; None where every joint goes by itself: in streams, and stops of every joint."""
-    limits: Limits | None = None
+    limits: MotionLimits | None = None
     """What its samples keep; None: it bypasses the filter, or rests."""
     acceleration: float = 0.0
     """Limit that every joint keeps in a stop [rad/s^2]; 0 for other trajectories."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.trajectory.limits import Floats, Limits
+from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.path import Path, Way
 
 CURVED_SHARE = 0.5
@@ -81,7 +81,7 @@ class Curve(Path):
         qd, qdd = slope * xd, slope * xdd + second * xd**2
         return (q[0], qd[0], qdd[0]) if x.ndim == 1 else (q, qd, qdd)
 
-    def planned(self, limits: Limits) -> Limits:
+    def planned(self, limits: MotionLimits) -> MotionLimits:
         """One velocity for the whole curve, at which its tightest bend takes no more than a share of the limits."""
         second, third = max(self.bends.second, 1e-12), max(self.bends.third, 1e-12)
         velocity = min(
@@ -94,7 +94,7 @@ class Curve(Path):
         assert kept is not None, "this velocity leaves room for acceleration and jerk"
         return kept
 
-    def keeping(self, limits: Limits, velocity: float) -> Limits | None:
+    def keeping(self, limits: MotionLimits, velocity: float) -> MotionLimits | None:
         """What the curve leaves at this velocity; no more acceleration than leaves a share of the jerk."""
         second, third = self.bends.second, self.bends.third
         acceleration = limits.acceleration - second * velocity**2
@@ -104,7 +104,7 @@ class Curve(Path):
         if acceleration <= 0.0:
             return None
         jerk = limits.jerk - third * velocity**3 - 3.0 * second * velocity * acceleration
-        return Limits(velocity, acceleration, jerk)
+        return MotionLimits(velocity, acceleration, jerk)
 
     def way(self, start: Floats, end: Floats) -> Way:
         """The part of the curve between two of its places."""

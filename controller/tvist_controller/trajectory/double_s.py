@@ -3,7 +3,7 @@
 import numpy as np
 import ruckig
 
-from tvist_controller.trajectory.limits import Floats, Limits
+from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 
 class DoubleS:
@@ -21,7 +21,7 @@ class DoubleS:
         ValueError: There is no such motion within these limits, or it would last for hours.
     """
 
-    def __init__(self, start: Floats, end: Floats, limits: Limits) -> None:
+    def __init__(self, start: Floats, end: Floats, limits: MotionLimits) -> None:
         m = len(start)
         request = ruckig.InputParameter(m)
         request.current_position, request.target_position = start.tolist(), end.tolist()

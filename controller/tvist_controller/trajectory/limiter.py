@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import ruckig
 
-from tvist_controller.trajectory.limits import Floats, Limits
+from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 Bools = npt.NDArray[np.bool_]
 
@@ -57,7 +57,7 @@ class Limiter:
     def __init__(
         self,
         q: Floats,
-        limits: Limits,
+        limits: MotionLimits,
         period: float,
         *,
         reach: Floats | None = None,

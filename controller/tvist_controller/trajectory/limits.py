@@ -9,7 +9,7 @@ Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Limits:
+class MotionLimits:
     """One number each, for every joint or for a path's parameter."""
 
     velocity: float

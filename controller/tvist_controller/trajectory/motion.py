@@ -8,7 +8,7 @@ import numpy as np
 
 from tvist_controller.trajectory.base import Forecast, Trajectory
 from tvist_controller.trajectory.double_s import DoubleS
-from tvist_controller.trajectory.limits import Floats, Limits
+from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.pace import Pace
 from tvist_controller.trajectory.path import Path
 
@@ -27,7 +27,7 @@ SURELY = 0.12
 class TimeLaw(Protocol):
     """How the parameter of a path goes in time, from rest at its start to rest at its end; it never turns back."""
 
-    limits: Limits
+    limits: MotionLimits
     """What every entry of the parameter keeps."""
     duration: float
     """From rest to rest [s]."""
@@ -38,7 +38,7 @@ class TimeLaw(Protocol):
         """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], m numbers each."""
 
 
-class Motion(Trajectory):
+class PlannedMotion(Trajectory):
     """A planned motion from rest to rest.
 
     Its samples are the path's parameter: of a straight joint line the joint positions.
@@ -51,7 +51,7 @@ class Motion(Trajectory):
     """
 
     path: Path
-    limits: Limits
+    limits: MotionLimits
 
     def __init__(self, path: Path, law: TimeLaw, period: float, speed: float = 1.0) -> None:
         self.path, self._law, self._period = path, law, period
@@ -183,7 +183,7 @@ class Motion(Trajectory):
         return self.time >= self.duration
 
 
-def quickest_motion(path: Path, limits: Limits, period: float, speed: float = 1.0) -> Motion:
+def quickest_motion(path: Path, limits: MotionLimits, period: float, speed: float = 1.0) -> PlannedMotion:
     """The motion along a path from rest to rest that a double S makes of limits.
 
     Args:
@@ -195,10 +195,10 @@ def quickest_motion(path: Path, limits: Limits, period: float, speed: float = 1.
     Raises:
         ValueError: There is no such motion within these limits, or it would last for hours.
     """
-    return Motion(path, DoubleS(path.start, path.end, path.planned(limits)), period, speed)
+    return PlannedMotion(path, DoubleS(path.start, path.end, path.planned(limits)), period, speed)
 
 
-def _stands_sooner(paused: Motion, free: Motion) -> bool:
+def _stands_sooner(paused: PlannedMotion, free: PlannedMotion) -> bool:
     """Whether the one stands noticeably sooner than the other, and is at no tick further on its way."""
     for _ in range(LONGEST_LOOK):
         if paused.standing or free.standing:

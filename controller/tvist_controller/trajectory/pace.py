@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 import ruckig
 
-from tvist_controller.trajectory.limits import Floats, Limits
+from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 QUICKEST = 20.0
 """Largest change of the rate in a second [1/s]: from standstill to full speed in a twentieth."""
@@ -26,7 +26,7 @@ class Pace:
         rate: To start with [-].
     """
 
-    def __init__(self, limits: Limits, period: float, rate: float) -> None:
+    def __init__(self, limits: MotionLimits, period: float, rate: float) -> None:
         self._limits, self._period = limits, period
         self.acceleration = limits.acceleration
         """Limit for every joint [rad/s^2]: the motion's, or less."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.trajectory.limits import Floats, Limits
+from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_shaping.base import Posture
 
 
@@ -60,11 +60,11 @@ class Path(ABC):
         """
 
     @abstractmethod
-    def planned(self, limits: Limits) -> Limits:
+    def planned(self, limits: MotionLimits) -> MotionLimits:
         """Limits for the parameter of a motion, with which every joint keeps its own on the whole path."""
 
     @abstractmethod
-    def keeping(self, limits: Limits, velocity: float) -> Limits | None:
+    def keeping(self, limits: MotionLimits, velocity: float) -> MotionLimits | None:
         """Limits for the parameter's acceleration and jerk while its velocity is no more than this [rad/s].
 
         Args:
@@ -114,11 +114,11 @@ class JointLine(Path):
         """Return the states of the parameter unchanged."""
         return x, xd, xdd
 
-    def planned(self, limits: Limits) -> Limits:
+    def planned(self, limits: MotionLimits) -> MotionLimits:
         """Return the limits of the joints unchanged."""
         return limits
 
-    def keeping(self, limits: Limits, velocity: float) -> Limits:  # noqa: ARG002  a straight line takes nothing
+    def keeping(self, limits: MotionLimits, velocity: float) -> MotionLimits:  # noqa: ARG002  a straight line takes nothing
         """Return the limits of the joints unchanged."""
         return limits
 

@@ -3,11 +3,11 @@
 import math
 from collections import deque
 
-from tvist_controller.trajectory.limits import Limits
+from tvist_controller.trajectory.limits import MotionLimits
 
 WINDOW = 128
 """Set-points over which lateness is remembered, in four parts."""
-MOST_PERIODS, MOST_SECONDS = 2.0, 0.02
+MAX_PERIODS, MAX_SECONDS = 2.0, 0.02
 """Longest wait for set-points later than the earliest: the larger of the two."""
 SPARE = 1
 """Periods that a stream slower than the tick is waited for in any case, so that it may begin with jitter [-]."""
@@ -41,10 +41,12 @@ class PlayOut:
         period: Tick [s].
     """
 
-    def __init__(self, first: int, look_ahead: int, ticks: float, limits: Limits, period: float) -> None:
+    def __init__(
+        self, first: int, look_ahead: int, ticks: float, limits: MotionLimits, period: float
+    ) -> None:
         self._limits, self._period, self._ticks = limits, period, ticks
         self._base = (look_ahead + SPARE * (ticks > 1.0)) * ticks - 1.0
-        self._most = max(MOST_PERIODS * ticks, MOST_SECONDS / period)
+        self._most = max(MAX_PERIODS * ticks, MAX_SECONDS / period)
         self._origin, self._now = first, 0
         self._parts: deque[tuple[float, float]] = deque(maxlen=4)
         self._part, self._count = (0.0, 0.0), 0

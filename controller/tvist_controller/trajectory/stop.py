@@ -7,7 +7,7 @@ from tvist_controller.trajectory.base import Trajectory
 from tvist_controller.trajectory.limits import Floats
 
 
-class Stop(Trajectory):
+class JointStop(Trajectory):
     """Shortest stop inside limits of acceleration and jerk; every joint stops as soon as it can.
 
     Args:

@@ -8,9 +8,9 @@ import numpy as np
 from tvist_controller.trajectory.b_spline import cubic, linear
 from tvist_controller.trajectory.base import Trajectory
 from tvist_controller.trajectory.limiter import Limiter, TorqueRoom
-from tvist_controller.trajectory.limits import Floats, Limits
+from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.play_out import PlayOut
-from tvist_controller.trajectory.stop import Stop
+from tvist_controller.trajectory.stop import JointStop
 
 BRIDGED = 2
 """Set-points in a row that are made up where none came."""
@@ -36,14 +36,14 @@ class SetpointStream(Trajectory):
         torque: What torque leaves to acceleration; None for enough.
     """
 
-    limits: Limits
+    limits: MotionLimits
     foreseeable = False
 
     def __init__(
         self,
         q: Floats,
         stream_period: float,
-        limits: Limits,
+        limits: MotionLimits,
         period: float,
         *,
         reach: Floats | None = None,
@@ -67,7 +67,7 @@ class SetpointStream(Trajectory):
         # The last three set-points that really came, with their numbers.
         self._real: deque[tuple[int, Floats]] = deque(maxlen=3)
         self._speed = 0.0
-        self._pause: Stop | None = None
+        self._pause: JointStop | None = None
         self.sequence: int | None = None
         """Newest set-point that was taken in; the reference gets there by the delay later."""
         self.late = 0
@@ -212,7 +212,7 @@ class SetpointStream(Trajectory):
         """Come to rest and stay until the stream goes on."""
         if self._pause is None:
             limits = self.limits
-            self._pause = Stop(
+            self._pause = JointStop(
                 *self.state, acceleration=limits.acceleration, jerk=limits.jerk, period=self._period
             )
         return self._pause.next(), self._pause.velocity

@@ -10,7 +10,7 @@ from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.cycle import ControlCycle
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.setup import Setup, body
-from tvist_controller.trajectory import JointLine, Limits, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_lab.in_process import free_setup
 from tvist_lab.paper.published import pose
 from tvist_lab.second_opinion import SecondOpinion
@@ -57,7 +57,7 @@ def parts(tell: Callable[[str], None]) -> dict[str, float]:
 
 def _motion(setup: Setup) -> list[np.ndarray[Any, Any]]:
     trajectory = quickest_motion(
-        JointLine(np.array(pose("Q1")), np.array(pose("Q3"))), Limits(1.5, 2.0, 100.0), PERIOD
+        JointLine(np.array(pose("Q1")), np.array(pose("Q3"))), MotionLimits(1.5, 2.0, 100.0), PERIOD
     )
     return [np.array(setup.q), *(trajectory.next() for _ in range(TICKS))]
 
@@ -107,7 +107,7 @@ def _cycle(setup: Setup) -> float:
 
     def batch() -> int:
         cycle.reset(start)
-        cycle.start(cycle.plan(target, Limits(1.5, 2.0, 100.0)))
+        cycle.start(cycle.plan(target, MotionLimits(1.5, 2.0, 100.0)))
         for _ in range(TICKS):
             cycle.step()
         return TICKS

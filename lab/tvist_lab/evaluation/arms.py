@@ -19,7 +19,7 @@ SCATTER = 0.15
 
 
 @dataclass(frozen=True)
-class Arm:
+class ArmVariant:
     """One of them; the controller goes by the description all the same."""
 
     name: str
@@ -78,20 +78,20 @@ def _mujoco(description: RobotDescription, carried: Payload, seed: int) -> Mujoc
 
 
 ARMS = (
-    Arm("calibrated", "as described", _calibrated),
-    Arm("coulomb", "friction that changes sign within a fifth of the speed", _coulomb),
-    Arm("stribeck", "friction half as high again at breakaway", _stribeck),
-    Arm(
+    ArmVariant("calibrated", "as described", _calibrated),
+    ArmVariant("coulomb", "friction that changes sign within a fifth of the speed", _coulomb),
+    ArmVariant("stribeck", "friction half as high again at breakaway", _stribeck),
+    ArmVariant(
         "hysteresis",
         "gears with hysteresis: 30 % stiffer when turning back, 2 % of the torque lost",
         _hysteretic,
     ),
-    Arm("piecewise", "gears 25 % softer below a tenth of the torque", _piecewise),
-    Arm(
+    ArmVariant("piecewise", "gears 25 % softer below a tenth of the torque", _piecewise),
+    ArmVariant(
         "scattered",
         "stiffness and gains of every joint and link off by 15 %, up or down by chance",
         _scattered,
     ),
-    Arm("base", "a base that yields, 150 kN m/rad about two axes", _on_base),
-    Arm("mujoco", "built in MuJoCo alone, no gear error", _mujoco),
+    ArmVariant("base", "a base that yields, 150 kN m/rad about two axes", _on_base),
+    ArmVariant("mujoco", "built in MuJoCo alone, no gear error", _mujoco),
 )

@@ -10,7 +10,7 @@ from tvist_lab.evaluation.baselines import Baseline
 from tvist_lab.evaluation.line import PAPER, lengthened
 from tvist_lab.evaluation.moves import Move
 from tvist_lab.evaluation.recipes import Recipe
-from tvist_lab.evaluation.running import Shaped, Stepper, run, sound
+from tvist_lab.evaluation.running import RunningShaper, Shaped, run, sound
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
@@ -45,7 +45,7 @@ class Candidate(ABC):
         return False
 
     @abstractmethod
-    def stepper(self, task: Task) -> Stepper | None:
+    def stepper(self, task: Task) -> RunningShaper | None:
         """At rest at the start; None for what plans the whole motion instead of shaping a reference."""
 
     def shaped(self, task: Task) -> Shaped:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from tvist_lab.evaluation.candidates import Candidate, Task
-from tvist_lab.evaluation.running import ShaperFaultError, Stepper
+from tvist_lab.evaluation.running import RunningShaper, ShaperFaultError
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
 
@@ -49,7 +49,7 @@ def check_causal(candidate: Candidate, task: Task) -> None:
 
 
 def _outputs(candidate: Candidate, task: Task) -> Floats | None:
-    stepper: Stepper | None = candidate.stepper(task)
+    stepper: RunningShaper | None = candidate.stepper(task)
     return None if stepper is None else np.array([stepper.step(sample) for sample in task.reference])
 
 

@@ -34,7 +34,7 @@ AT_ONCE = 8
 
 
 @dataclass(frozen=True)
-class Job:
+class MoveJob:
     """One move and how it is to be made."""
 
     description: RobotDescription
@@ -69,7 +69,7 @@ class Made:
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedMove:
     """One move made in every way."""
 
     unshaped: Made
@@ -91,21 +91,21 @@ class Judged:
         return round(1e3 * (made.duration - self.unshaped.duration), 6)
 
 
-def record(job: Job) -> tuple[Recording, Recording]:
+def record(job: MoveJob) -> tuple[Recording, Recording]:
     """A move unshaped and shaped, on the same arm with the same seed."""
     unshaped, shaped, _ = _record(job)
     return unshaped, shaped
 
 
-def judge(job: Job) -> Judged:
+def judge(job: MoveJob) -> JudgedMove:
     """Make a move in every way and measure it."""
     unshaped, shaped, others = _record(job)
-    return Judged(
+    return JudgedMove(
         measured(unshaped), measured(shaped), {name: measured(other) for name, other in others.items()}
     )
 
 
-def evaluate(jobs: Sequence[Job]) -> Iterator[Judged]:
+def evaluate(jobs: Sequence[MoveJob]) -> Iterator[JudgedMove]:
     """All jobs in order, each as soon as it is done, on all cores."""
     motions = max((job.motions for job in jobs), default=1)
     return spread(judge, jobs, few=2 * AT_ONCE // motions, chunk=max(AT_ONCE // motions, 1))
@@ -127,7 +127,7 @@ def measured(recording: Recording) -> Made:
     )
 
 
-def _record(job: Job) -> tuple[Recording, Recording, dict[str, Recording]]:
+def _record(job: MoveJob) -> tuple[Recording, Recording, dict[str, Recording]]:
     description, move, recipe = job.description, job.move, job.recipe
     start, target = np.array(move.start), np.array(move.target)
     carried = body(paper_payload(description, move.mass))
@@ -149,7 +149,7 @@ def _record(job: Job) -> tuple[Recording, Recording, dict[str, Recording]]:
     return follow(reference), shaped, others
 
 
-def report(jobs: Sequence[Job], judged: Sequence[Judged]) -> dict[str, Any]:
+def report(jobs: Sequence[MoveJob], judged: Sequence[JudgedMove]) -> dict[str, Any]:
     """What `tvist evaluate --json` prints of the moves."""
     counted = [one for one in judged if one.counts]
     rows = [_row(job, one) for job, one in zip(jobs, judged, strict=True)]
@@ -168,7 +168,7 @@ def report(jobs: Sequence[Job], judged: Sequence[Judged]) -> dict[str, Any]:
     }
 
 
-def _row(job: Job, one: Judged) -> dict[str, Any]:
+def _row(job: MoveJob, one: JudgedMove) -> dict[str, Any]:
     return {
         "payload_kg": job.move.mass,
         "unshaped_peak_m_s2": one.unshaped.peak,
@@ -196,7 +196,7 @@ def _row(job: Job, one: Judged) -> dict[str, Any]:
     }
 
 
-def _summary(pairs: list[tuple[Judged, Made]]) -> dict[str, Any]:
+def _summary(pairs: list[tuple[JudgedMove, Made]]) -> dict[str, Any]:
     """Summarize one way over all moves; reductions only over those that count."""
     reductions = np.array([one.reduction(made) for one, made in pairs if one.counts])
     delays = np.array([one.delay(made) for one, made in pairs])

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tvist_controller.setup import paper_payload
-from tvist_controller.trajectory import Limits
+from tvist_controller.trajectory import MotionLimits
 from tvist_lab.evaluation.candidates import Candidate, Task
 from tvist_lab.evaluation.line import PAPER
 from tvist_lab.evaluation.recipes import Recipe
@@ -37,7 +37,7 @@ class Info:
     """Tick [s]."""
     joints: int
     """Number of joints of the arm; `q_ref` has as many entries."""
-    limits: Limits
+    limits: MotionLimits
     """Limits of the reference, for every joint: velocity [rad/s], acceleration [rad/s²], jerk [rad/s³]."""
     payload: Payload
     """Declared: mass [kg], com [m], inertia [kg m²]."""

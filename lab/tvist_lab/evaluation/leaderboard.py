@@ -11,7 +11,7 @@ from tvist_lab.evaluation.candidates import Candidate
 from tvist_lab.evaluation.curves import Bend
 from tvist_lab.evaluation.evaluate import WORTH
 from tvist_lab.evaluation.moves import Move
-from tvist_lab.evaluation.shaperbench import PAYLOAD_ERRORS, Job, Score, Scores
+from tvist_lab.evaluation.shaperbench import PAYLOAD_ERRORS, BenchJob, Score, Scores
 from tvist_lab.recordings import Floats
 
 KEPT = 1.003
@@ -21,7 +21,7 @@ KEPT = 1.003
 def leaderboard(
     candidates: Sequence[Candidate],
     faults: Sequence[str | None],
-    jobs: Sequence[Job],
+    jobs: Sequence[BenchJob],
     done: Sequence[Scores],
     bent: Sequence[tuple[Bend, float | None]],
 ) -> dict[str, Any]:
@@ -34,7 +34,7 @@ def leaderboard(
         done: What came of them.
         bent: Curved paths and what came of them.
     """
-    by_candidate: dict[str, list[tuple[Job, Scores]]] = {one.name: [] for one in candidates}
+    by_candidate: dict[str, list[tuple[BenchJob, Scores]]] = {one.name: [] for one in candidates}
     for job, scores in zip(jobs, done, strict=True):
         by_candidate[job.candidate.name].append((job, scores))
     basis = {
@@ -86,7 +86,7 @@ def _beats(other: dict[str, Any], row: dict[str, Any]) -> bool:
 
 
 def _row(
-    mine: list[tuple[Job, Scores]], basis: dict[tuple[Move, float, int], Score], bent: list[float]
+    mine: list[tuple[BenchJob, Scores]], basis: dict[tuple[Move, float, int], Score], bent: list[float]
 ) -> dict[str, Any]:
     pairs = [
         (score, basis[job.move, score.error, score.arm]) for job, scores in mine for score in scores.scores

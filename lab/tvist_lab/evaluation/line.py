@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from tvist_controller.control.differentiator import Target
 from tvist_controller.cycle import STILL, ControlCycle
 from tvist_controller.reporting import truth_of
-from tvist_controller.trajectory import JointLine, Limits, Trajectory, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits, Trajectory, quickest_motion
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import PERIOD, Plant
@@ -21,7 +21,7 @@ from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.filter import TvistFilter
 
-PAPER = Limits(velocity=1.5, acceleration=2.0, jerk=100.0)
+PAPER = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
 """The paper's limits, and a `move_j`'s where none are given."""
 LONGEST = 3.0
 """Time after the reference's end in which a shaped reference has to end [s]."""
@@ -65,7 +65,7 @@ class Played(Trajectory):
         return self._next >= len(self._q)
 
 
-def point_to_point(start: Floats, target: Floats, limits: Limits = PAPER) -> Floats:
+def point_to_point(start: Floats, target: Floats, limits: MotionLimits = PAPER) -> Floats:
     """Reference of a double S from the first sample that may move to the one at the target, shape (T, n) [rad]."""
     trajectory = quickest_motion(JointLine(start, target), limits, PERIOD)
     samples = []
@@ -74,7 +74,7 @@ def point_to_point(start: Floats, target: Floats, limits: Limits = PAPER) -> Flo
     return np.array(samples)
 
 
-def round_a_corner(start: Floats, corner: Floats, target: Floats, limits: Limits = PAPER) -> Floats:
+def round_a_corner(start: Floats, corner: Floats, target: Floats, limits: MotionLimits = PAPER) -> Floats:
     """Two double S of which the second begins when the first has a quarter of its time left: a curved path.
 
     Returns:
@@ -91,7 +91,7 @@ def round_a_corner(start: Floats, corner: Floats, target: Floats, limits: Limits
     return path
 
 
-def lengthened(start: Floats, target: Floats, ticks: int, limits: Limits = PAPER) -> Floats:
+def lengthened(start: Floats, target: Floats, ticks: int, limits: MotionLimits = PAPER) -> Floats:
     """Reference of a double S that takes as long as another motion, by a lower jerk: no shaper, no model at all.
 
     Args:
@@ -106,12 +106,14 @@ def lengthened(start: Floats, target: Floats, ticks: int, limits: Limits = PAPER
     low, high = np.log(1e-2 * limits.jerk), np.log(limits.jerk)
     for _ in range(30):  # the lower the jerk, the longer it takes
         middle = 0.5 * (low + high)
-        slower = Limits(limits.velocity, limits.acceleration, float(np.exp(middle)))
+        slower = MotionLimits(limits.velocity, limits.acceleration, float(np.exp(middle)))
         if quickest_motion(JointLine(start, target), slower, PERIOD).duration > ticks * PERIOD:
             low = middle
         else:
             high = middle
-    return point_to_point(start, target, Limits(limits.velocity, limits.acceleration, float(np.exp(high))))
+    return point_to_point(
+        start, target, MotionLimits(limits.velocity, limits.acceleration, float(np.exp(high)))
+    )
 
 
 def shape(step: Step, reference: Floats) -> tuple[Floats, bool]:

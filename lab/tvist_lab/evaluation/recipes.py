@@ -6,7 +6,7 @@ from tvist_controller.choices import choose_filter, wanted_modes
 from tvist_controller.mode_source import ModeSource
 from tvist_controller.own_shapers import OwnShaper
 from tvist_controller.setup import paper_payload
-from tvist_controller.trajectory import Limits
+from tvist_controller.trajectory import MotionLimits
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration
@@ -127,6 +127,6 @@ class Recipe:
         return Mistaken(right, self.frequency_error) if self.frequency_error else right
 
 
-def spared(limits: Limits, tvist: Filter) -> Limits:
+def spared(limits: MotionLimits, tvist: Filter) -> MotionLimits:
     """What a reference is to keep so that the shaped one keeps these limits."""
     return replace(limits, acceleration=(1.0 - tvist.excess) * limits.acceleration)

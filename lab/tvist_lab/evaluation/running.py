@@ -41,7 +41,7 @@ class Shaped:
     """Processor time of a tick, as it happened to take [s]."""
 
 
-class Stepper(Protocol):
+class RunningShaper(Protocol):
     """A shaper at work on one reference."""
 
     def step(self, q: Floats) -> Floats:
@@ -68,7 +68,7 @@ def sound(tvist: Filter) -> Callable[[Floats], Floats]:
     return step
 
 
-def run(stepper: Stepper, reference: Floats) -> Shaped:
+def run(stepper: RunningShaper, reference: Floats) -> Shaped:
     """Feed a reference to a shaper, let it end, and watch it for a while.
 
     Raises:

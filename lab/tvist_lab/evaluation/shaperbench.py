@@ -34,7 +34,7 @@ PAYLOAD_ERRORS = (0.0, 0.1, -0.1)
 
 
 @dataclass(frozen=True)
-class Job:
+class BenchJob:
     """A move by one candidate with one payload error, on all arms."""
 
     description: RobotDescription
@@ -97,7 +97,7 @@ def jobs(
     seed: int,
     *,
     quick: bool,
-) -> list[Job]:
+) -> list[BenchJob]:
     """All of them: candidate by move by payload error; when it has to be quick, each move has one error in turn."""
     arms = tuple(range(len(ARMS)))
     errors = [
@@ -105,19 +105,19 @@ def jobs(
         for number in range(len(moves))
     ]
     return [
-        Job(description, candidate, move, error, seed + number, arms)
+        BenchJob(description, candidate, move, error, seed + number, arms)
         for candidate in candidates
         for number, move in enumerate(moves)
         for error in errors[number]
     ]
 
 
-def play(jobs: Sequence[Job]) -> Iterator[Scores]:
+def play(jobs: Sequence[BenchJob]) -> Iterator[Scores]:
     """Do all jobs in order, on all cores."""
     return spread(judge, jobs, few=2, chunk=1)
 
 
-def judge(job: Job) -> Scores:
+def judge(job: BenchJob) -> Scores:
     """Shape once, and let every arm follow."""
     description, move = job.description, job.move
     declared = move.mass * (1.0 + job.error)
@@ -144,7 +144,7 @@ def judge(job: Job) -> Scores:
     )
 
 
-def _score(number: int, job: Job, recording: Recording) -> Score:
+def _score(number: int, job: BenchJob, recording: Recording) -> Score:
     motion = motions(recording)[0]
     try:
         still = still_after(recording, motion) - motion.duration(recording)

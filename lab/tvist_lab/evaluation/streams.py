@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import ruckig
 
-from tvist_controller.trajectory import Limits
+from tvist_controller.trajectory import MotionLimits
 from tvist_lab.evaluation.line import PAPER
 from tvist_lab.evaluation.moves import WITH_WRISTS
 from tvist_lab.recordings import Floats
@@ -34,7 +34,7 @@ def retargeted(
     *,
     wrists: bool = True,
     together: bool = False,
-    limits: Limits = PAPER,
+    limits: MotionLimits = PAPER,
 ) -> Floats:
     """A stream whose joints go to random targets and are called away from them, often before they are there.
 
@@ -73,7 +73,7 @@ def retargeted(
     return out
 
 
-def peaks(q: Floats, limits: Limits = PAPER) -> Peaks:
+def peaks(q: Floats, limits: MotionLimits = PAPER) -> Peaks:
     """Return the peaks of positions at every tick, shape (T, n) [rad], by first and second difference."""
     qd, qdd = (float(np.abs(np.diff(q, order, axis=0)).max()) / PERIOD**order for order in (1, 2))
     return Peaks(qd / limits.velocity, qdd / limits.acceleration)

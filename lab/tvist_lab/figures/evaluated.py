@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from tvist_lab.evaluation.evaluate import Judged
+from tvist_lab.evaluation.evaluate import JudgedMove
 from tvist_lab.figures.style import FAINT, SHAPED, UNSHAPED, legend, panels, title
 from tvist_lab.metrics import amplitude, best_tool_acceleration, motions
 from tvist_lab.recordings import Recording
@@ -14,7 +14,7 @@ FLOOR = 1e-4
 """Smaller peaks are drawn here [m/s²]."""
 
 
-def residual_by_move_figure(judged: Sequence[Judged]) -> Figure:
+def residual_by_move_figure(judged: Sequence[JudgedMove]) -> Figure:
     """Peak |α| after the stop, shaped over unshaped, a point a move; and how the reductions are distributed."""
     figure, (above, below) = panels(2, 6.0, share_x=False, ratios=(3, 2))
     for counts, color, label in (

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from tvist_controller import calibrations
 from tvist_controller.calibrations.modal import modal_estimator
 from tvist_controller.setup import paper_payload
-from tvist_controller.trajectory import JointLine, Limits, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_lab.figures.style import INK, SHAPED, UNSHAPED, legend, panels
 from tvist_lab.recordings import Floats
 from tvist_plant.description import load
@@ -14,7 +14,7 @@ from tvist_plant.plant import PERIOD
 from tvist_shaping import BUILT_IN
 from tvist_shaping.base import Filter
 
-LIMITS = Limits(1.5, 2.0, 100.0)
+LIMITS = MotionLimits(1.5, 2.0, 100.0)
 MODES = 3
 """Number of modes in the product of zero-vibration shapers."""
 NAMES = ("zv of three modes", "auto, its mean delay constant")

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from tvist_lab.figures.style import FAINT, MUTED, SHAPED, UNSHAPED, legend, note, panels, title
-from tvist_lab.metrics.motion import Motion
+from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.metrics.settling import REPEATABILITY, distance
 from tvist_lab.metrics.vibration import amplitude, tool_acceleration
 from tvist_lab.recordings import Floats, Recording
@@ -21,7 +21,7 @@ REST = 1.0
 NEAR = 0.15
 """Largest distance to the attained position on the axis [mm]: five times the repeatability."""
 
-Recorded = tuple[Recording, Motion]
+Recorded = tuple[Recording, MotionRows]
 """A recording and one of its motions."""
 
 

@@ -11,20 +11,22 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import expm
 
-from tvist_controller.trajectory import JointLine, Limits, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_lab.identification.modal_fit import information
 from tvist_lab.identification.ring_downs import SAMPLES, SKIPPED, Jog, Ringing
-from tvist_lab.identification.unknowns import Arm
+from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
 
 NOISE = 0.03
 """rms that is counted on, an axis [m/s^2]."""
-LIMITS = Limits(velocity=1.5, acceleration=2.0, jerk=100.0)
+LIMITS = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
 """Limits of the jog, as in a client's `move_j`."""
 
 
-def choose(arm: Arm, candidates: Sequence[Floats], jog: Jog, counts: Sequence[int]) -> list[tuple[int, int]]:
+def choose(
+    arm: ArmModes, candidates: Sequence[Floats], jog: Jog, counts: Sequence[int]
+) -> list[tuple[int, int]]:
     """Choose ring-downs.
 
     Args:
@@ -54,7 +56,7 @@ def choose(arm: Arm, candidates: Sequence[Floats], jog: Jog, counts: Sequence[in
     return chosen
 
 
-def predicted(arm: Arm, q: Floats, payload: int, jog: Jog) -> Ringing:
+def predicted(arm: ArmModes, q: Floats, payload: int, jog: Jog) -> Ringing:
     """Ring-down after a jog of the arm as guessed, linear about its end and with perfect feed-forward."""
     flexible, mass = arm.flexible(payload), arm.mass(q, payload)
     drivetrain = arm.drivetrain(arm.guess)

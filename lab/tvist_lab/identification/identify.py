@@ -37,7 +37,7 @@ class IdentificationError(ClientError):
 
 
 @dataclass(frozen=True)
-class Plan:
+class MeasurementPlan:
     """What to measure."""
 
     configurations: int = CONFIGURATIONS
@@ -97,7 +97,7 @@ class Identification:
 async def identify(
     robot: Robot,
     arm: Arm,
-    plan: Plan,
+    plan: MeasurementPlan,
     *,
     name: str,
     command: str,
@@ -162,7 +162,7 @@ async def identify(
     )  # fmt: skip
 
 
-async def _ring_down(robot: Robot, arm: Arm, q: Floats, plan: Plan) -> RingDown | None:
+async def _ring_down(robot: Robot, arm: Arm, q: Floats, plan: MeasurementPlan) -> RingDown | None:
     """What rings at a configuration; None where it cannot be reached or fitted."""
     try:
         ring = await measure(robot, arm, q, plan.jog, plan.repeats)
@@ -181,7 +181,15 @@ async def _true_mode(robot: Robot) -> tuple[float, float] | None:
 
 
 def _calibration(
-    info: Info, plan: Plan, fit: Fit, f_d: Floats, zeta: Floats, rejected: int, *, name: str, command: str
+    info: Info,
+    plan: MeasurementPlan,
+    fit: Fit,
+    f_d: Floats,
+    zeta: Floats,
+    rejected: int,
+    *,
+    name: str,
+    command: str,
 ) -> Calibration:
     return Calibration(
         name=name,

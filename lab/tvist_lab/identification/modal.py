@@ -7,7 +7,7 @@ from importlib.metadata import version
 
 import numpy as np
 
-from tvist_client.arm import Arm as Control
+from tvist_client.arm import Arm
 from tvist_client.errors import ClientError
 from tvist_client.robot import Robot
 from tvist_controller.calibrations.modal import modal_estimator
@@ -27,7 +27,7 @@ from tvist_lab.identification.modal_fit import (
     own_poles,
 )
 from tvist_lab.identification.ring_downs import Jog, Ringing, listen
-from tvist_lab.identification.unknowns import Arm
+from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats, RecordingError
 from tvist_lab.workspace import IDENTIFIED
 from tvist_plant.description import RobotDescription
@@ -102,7 +102,7 @@ class ModalIdentification:
 
 async def identify_modal(
     robot: Robot,
-    control: Control,
+    control: Arm,
     description: RobotDescription,
     plan: ModalPlan,
     *,
@@ -114,7 +114,7 @@ async def identify_modal(
 
     Args:
         robot: The robot, on a network or in process.
-        control: Control of it.
+        control: The arm under control.
         description: Its masses and geometry.
         plan: What to measure.
         name: Name of the calibration.
@@ -133,7 +133,7 @@ async def identify_modal(
     payloads = plan.payloads or (info.payload,)
     check(plan, len(payloads))
     await control.set_shaper("none")
-    arm = Arm(description, payloads)
+    arm = ArmModes(description, payloads)
     candidates = free_configurations(description, payloads, CANDIDATES, plan)
     try:
         ringings, rejected = await _measure(robot, control, arm, candidates, plan, progress)
@@ -148,8 +148,8 @@ async def identify_modal(
 
 async def _measure(
     robot: Robot,
-    control: Control,
-    arm: Arm,
+    control: Arm,
+    arm: ArmModes,
     candidates: Sequence[Floats],
     plan: ModalPlan,
     progress: Progress,
@@ -213,7 +213,7 @@ def free_configurations(
 
 
 def calibrate(
-    arm: Arm,
+    arm: ArmModes,
     ringings: Sequence[Ringing],
     info: Info,
     plan: ModalPlan,
@@ -269,7 +269,7 @@ def calibrate(
     )
 
 
-def _check_contradictions(arm: Arm, ringings: Sequence[Ringing], fit: ModalFit) -> None:
+def _check_contradictions(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> None:
     """Find what no springs and drives can explain together.
 
     A ring-down that is wrong spoils the fit of the others, too. So of those that are explained worst the one is left
@@ -307,12 +307,12 @@ def _check_contradictions(arm: Arm, ringings: Sequence[Ringing], fit: ModalFit) 
         )
 
 
-def _own(arm: Arm, ringing: Ringing, fit: ModalFit) -> OwnPoles:
+def _own(arm: ArmModes, ringing: Ringing, fit: ModalFit) -> OwnPoles:
     """A ring-down's own poles beside those of a fit."""
     return own_poles(arm, ringing, fit.drivetrain.poles(arm.mass(ringing.q, ringing.payload))[0][:MODES])
 
 
-def _cross_validate(arm: Arm, ringings: Sequence[Ringing], fit: ModalFit) -> list[ModeErrors | None]:
+def _cross_validate(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> list[ModeErrors | None]:
     """Errors of each mode by fits that did not see a configuration, where its own ring-down is certain enough."""
     pairs: list[list[tuple[float, float, float, float]]] = [[] for _ in range(TOLD)]
     for place in {r.q.tobytes() for r in ringings}:
@@ -334,12 +334,12 @@ def _cross_validate(arm: Arm, ringings: Sequence[Ringing], fit: ModalFit) -> lis
     return errors
 
 
-def _range(arm: Arm, fit: ModalFit, rated: float) -> tuple[float, float]:
+def _range(arm: ArmModes, fit: ModalFit, rated: float) -> tuple[float, float]:
     """Lowest f_d and highest ζ that a filter has to count on, with some room."""
     description = arm.description
     everywhere = IDENTIFIED.spread(WORKSPACE, description.joints, 0)
     lowest, highest = np.inf, 0.0
-    whole = Arm(description, (paper_payload(description, 0.0), paper_payload(description, rated)))
+    whole = ArmModes(description, (paper_payload(description, 0.0), paper_payload(description, rated)))
     for payload in range(2):
         for q in everywhere:
             f_d, zeta = describe(fit.drivetrain.poles(whole.mass(q, payload))[0][:MODES])
@@ -347,13 +347,13 @@ def _range(arm: Arm, fit: ModalFit, rated: float) -> tuple[float, float]:
     return MARGIN * lowest, 1.0 - MARGIN * (1.0 - highest)
 
 
-async def _carry(control: Control, payload: Payload) -> None:
+async def _carry(control: Arm, payload: Payload) -> None:
     """Have a simulated arm carry something, and say so."""
     await control.reset(payload=payload)
     await control.set_payload(payload.mass, payload.com, payload.inertia)
 
 
-async def _ringing(robot: Robot, control: Control, q: Floats, payload: int, jog: Jog) -> Ringing | None:
+async def _ringing(robot: Robot, control: Arm, q: Floats, payload: int, jog: Jog) -> Ringing | None:
     """What rings at a configuration; None where it cannot be reached or was not heard whole."""
     try:
         return await listen(robot, control, q, payload, jog)
@@ -367,7 +367,7 @@ async def _ringing(robot: Robot, control: Control, q: Floats, payload: int, jog:
 
 async def _against_truth(
     robot: Robot,
-    control: Control,
+    control: Arm,
     calibration: Calibration,
     description: RobotDescription,
     plan: ModalPlan,

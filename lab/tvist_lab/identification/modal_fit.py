@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 
 from tvist_lab.identification.ring_downs import Ringing
-from tvist_lab.identification.unknowns import Arm
+from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.metrics import SLOW_POLE
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
@@ -77,7 +77,7 @@ class _Signal:
         return np.column_stack(columns)
 
 
-def fit_modal(arm: Arm, ringings: Sequence[Ringing], start: Floats | None = None) -> ModalFit:
+def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None = None) -> ModalFit:
     """Find the parameters.
 
     Args:
@@ -125,7 +125,7 @@ def fit_modal(arm: Arm, ringings: Sequence[Ringing], start: Floats | None = None
     )
 
 
-def fit_from_many(arm: Arm, ringings: Sequence[Ringing]) -> ModalFit:
+def fit_from_many(arm: ArmModes, ringings: Sequence[Ringing]) -> ModalFit:
     """The best of fits from several starts.
 
     Parameters can stand in for each other, so that several sets explain ring-downs alike. Those that do count for
@@ -141,14 +141,14 @@ def fit_from_many(arm: Arm, ringings: Sequence[Ringing]) -> ModalFit:
     return replace(best, deviations=np.sqrt(best.deviations**2 + between))
 
 
-def sensitivity(arm: Arm, signal: _Signal, logarithms: Floats) -> Floats:
+def sensitivity(arm: ArmModes, signal: _Signal, logarithms: Floats) -> Floats:
     """Derivative of what is left of a ring-down by each parameter, shape (samples, P)."""
     poles, shapes = (part[:MODES] for part in arm.drivetrain(logarithms).poles(signal.mass))
     steps = STEP * np.eye(len(logarithms))
     return signal.change([arm.drivetrain(logarithms + step) for step in steps], poles, shapes)
 
 
-def information(arm: Arm, ringing: Ringing, logarithms: Floats) -> Floats:
+def information(arm: ArmModes, ringing: Ringing, logarithms: Floats) -> Floats:
     """What a ring-down says about the parameters: the inverse of their covariance, shape (P, P)."""
     signal = _Signal(arm.mass(ringing.q, ringing.payload), ringing.force, ringing.noise)
     change = sensitivity(arm, signal, logarithms)
@@ -177,7 +177,7 @@ LOOSE = 0.5
 """Deviation of the logarithms of f_d and ζ that a ring-down's own poles may take from where they are looked for [-]."""
 
 
-def own_poles(arm: Arm, ringing: Ringing, poles: Complex) -> OwnPoles:
+def own_poles(arm: ArmModes, ringing: Ringing, poles: Complex) -> OwnPoles:
     """Poles that fit one ring-down best, near others, whatever springs and drives would have to be."""
     signal = _Signal(arm.mass(ringing.q, ringing.payload), ringing.force, ringing.noise)
     start = _logarithms(poles)

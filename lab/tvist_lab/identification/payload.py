@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from tvist_client.arm import Arm as Control
+from tvist_client.arm import Arm
 from tvist_client.robot import Robot
 from tvist_controller.collision import CollisionModel
 from tvist_controller.setup import body, paper_payload
@@ -83,7 +83,7 @@ class PayloadFound:
 
 async def identify_payload(
     robot: Robot,
-    control: Control,
+    control: Arm,
     description: RobotDescription,
     *,
     poses: int = POSES,
@@ -94,7 +94,7 @@ async def identify_payload(
 
     Args:
         robot: The robot, on a network or in process.
-        control: Control of it.
+        control: The arm under control.
         description: The arm's masses, geometry and friction.
         poses: In how many it rests, at least 3.
         seed: Seed of the poses to choose from.
@@ -262,9 +262,7 @@ def _free(description: RobotDescription, declared: Payload, seed: int) -> list[F
     return found
 
 
-async def _hold(
-    robot: Robot, control: Control, aside: Floats, q: Floats, period: float
-) -> tuple[Floats, Floats]:
+async def _hold(robot: Robot, control: Arm, aside: Floats, q: Floats, period: float) -> tuple[Floats, Floats]:
     """Angles and torques at rest in a pose, reached from another."""
     await reach(control, aside)
     await control.move_j(q, acceleration=1.0)
@@ -275,7 +273,7 @@ async def _hold(
     return recording["actual_q"].mean(axis=0), recording["actual_moment"].mean(axis=0)
 
 
-async def _swing(robot: Robot, control: Control, q: Floats, period: float) -> Recording:
+async def _swing(robot: Robot, control: Arm, q: Floats, period: float) -> Recording:
     """There and back along one way, where it is free."""
     shares = (1.0, 0.5, 0.25, -0.25, -0.5)
     swing = np.zeros_like(q)

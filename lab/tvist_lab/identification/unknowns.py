@@ -67,7 +67,7 @@ def unknowns(description: RobotDescription) -> tuple[Unknown, ...]:
     return tuple(found)
 
 
-class Arm:
+class ArmModes:
     """Modes of an arm as functions of what is unknown of it, with each of several payloads.
 
     Args:

@@ -12,7 +12,7 @@ from tvist_lab.metrics.common_clock import (
     still_after,
 )
 from tvist_lab.metrics.errors import NotMeasurableError
-from tvist_lab.metrics.motion import Motion, motions
+from tvist_lab.metrics.motion import MotionRows, motions
 from tvist_lab.metrics.residual import ModalResidual, Residual, residual, residual_by_modes
 from tvist_lab.metrics.ring_down import SLOW_POLE, RingDown, fit_ring_down
 from tvist_lab.metrics.settling import Settling, attained_position, distance, settling
@@ -23,8 +23,8 @@ __all__ = [
     "SLOW_POLE",
     "CommonClock",
     "ModalResidual",
-    "Motion",
     "MotionResult",
+    "MotionRows",
     "NotMeasurableError",
     "Residual",
     "RingDown",

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.signal import hilbert
 
 from tvist_lab.metrics.errors import NotMeasurableError
-from tvist_lab.metrics.motion import DIFFERENTIATOR_TICKS, Motion
+from tvist_lab.metrics.motion import DIFFERENTIATOR_TICKS, MotionRows
 from tvist_lab.metrics.vibration import amplitude, band_pass, best_tool_acceleration, tool_acceleration
 from tvist_lab.recordings import Floats, Recording
 
@@ -36,7 +36,9 @@ class CommonClock:
     """Largest |q̈*| of any joint [rad/s²]."""
 
 
-def common_clock(recording: Recording, motion: Motion, kinematics: Kinematics | None = None) -> CommonClock:
+def common_clock(
+    recording: Recording, motion: MotionRows, kinematics: Kinematics | None = None
+) -> CommonClock:
     """All metrics of a motion on the common clock, from the truth channel where there is one.
 
     Raises:
@@ -53,7 +55,7 @@ def common_clock(recording: Recording, motion: Motion, kinematics: Kinematics | 
     )
 
 
-def still_after(recording: Recording, motion: Motion, threshold: float = STILL) -> float:
+def still_after(recording: Recording, motion: MotionRows, threshold: float = STILL) -> float:
     """Last time |α| exceeds a threshold [m/s²], from the start of the reference before shaping [s].
 
     Taken on the truth channel; where there is none, on the sensor below 60 Hz.
@@ -70,7 +72,7 @@ def still_after(recording: Recording, motion: Motion, threshold: float = STILL) 
     return float(recording.time[motion.start + loud[-1]] - recording.time[motion.start])
 
 
-def peak_after_stop(recording: Recording, motion: Motion, after: float = AFTER_STOP) -> float:
+def peak_after_stop(recording: Recording, motion: MotionRows, after: float = AFTER_STOP) -> float:
     """`evaluate`'s peak: largest |α| later than 10 ms after the shaped reference stops [m/s²], true.
 
     Raises:
@@ -81,12 +83,12 @@ def peak_after_stop(recording: Recording, motion: Motion, after: float = AFTER_S
     return float(np.max(amplitude(tool_acceleration(recording, truth=True)[rows])))
 
 
-def peak_acceleration(recording: Recording, motion: Motion) -> float:
+def peak_acceleration(recording: Recording, motion: MotionRows) -> float:
     """Largest |q̈*| of any joint during the motion [rad/s²]."""
     return float(np.max(np.abs(recording["target_qdd"][motion.start : motion.shaped_stop + 2])))
 
 
-def peak_velocity(recording: Recording, motion: Motion) -> float:
+def peak_velocity(recording: Recording, motion: MotionRows) -> float:
     """Largest |q̇*| of any joint during the motion [rad/s]."""
     return float(np.max(np.abs(recording["target_qd"][motion.start : motion.shaped_stop + 2])))
 
@@ -111,7 +113,7 @@ def envelope(alpha: Floats, period: float) -> Floats:
     return np.asarray(np.linalg.norm(np.abs(analytic), axis=1)[rows - 1 : 2 * rows - 1], dtype=np.float64)
 
 
-def rigid_acceleration(recording: Recording, motion: Motion, kinematics: Kinematics) -> Floats:
+def rigid_acceleration(recording: Recording, motion: MotionRows, kinematics: Kinematics) -> Floats:
     """Acceleration a rigid arm's flange would have along the shaped reference, in its own frame [m/s²].
 
     Second central difference of the position at `target_q`.
@@ -133,7 +135,7 @@ def rigid_acceleration(recording: Recording, motion: Motion, kinematics: Kinemat
     return np.asarray(np.einsum("tji,tj->ti", rotation, world), dtype=np.float64)
 
 
-def in_motion_rms(recording: Recording, motion: Motion, kinematics: Kinematics) -> float:
+def in_motion_rms(recording: Recording, motion: MotionRows, kinematics: Kinematics) -> float:
     """Vibration during the motion: rms of |α - α of the rigid arm| until the shaped reference stops [m/s²].
 
     Raises:
@@ -145,14 +147,14 @@ def in_motion_rms(recording: Recording, motion: Motion, kinematics: Kinematics) 
     return float(np.sqrt(np.mean(np.sum((alpha - rigid) ** 2, axis=1))))
 
 
-def _after_declared_stop(recording: Recording, motion: Motion) -> slice:
+def _after_declared_stop(recording: Recording, motion: MotionRows) -> slice:
     """Rows after the stop of the reference before shaping plus the delay its shaper declares then."""
     delay = float(np.nan_to_num(recording["shaper_delay"][motion.reference_stop]))
     published = DIFFERENTIATOR_TICKS * recording.period
     return _later_than(recording, motion, recording.time[motion.reference_stop] + delay + published)
 
 
-def _later_than(recording: Recording, motion: Motion, moment: float) -> slice:
+def _later_than(recording: Recording, motion: MotionRows, moment: float) -> slice:
     """The motion's rows later than a moment."""
     first = int(np.searchsorted(recording.time, moment + 1e-9))
     if first >= motion.end:

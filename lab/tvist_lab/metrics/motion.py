@@ -20,7 +20,7 @@ DIFFERENTIATOR_TICKS = 1
 
 
 @dataclass(frozen=True)
-class Motion:
+class MotionRows:
     """One motion of the reference, as indices of rows of its recording."""
 
     start: int
@@ -54,7 +54,7 @@ class Motion:
         return max(self.shaped_duration(recording) - self.duration(recording), 0.0)
 
 
-def motions(recording: Recording) -> list[Motion]:
+def motions(recording: Recording) -> list[MotionRows]:
     """Find the motions of a recording, in order.
 
     They come from the events `motion_started`, `motion_done` and `motion_stopped` if there are any, otherwise
@@ -65,11 +65,11 @@ def motions(recording: Recording) -> list[Motion]:
     step = _step_per_tick(recording, "reference_q")
     moving = (step > MOVING) & (step <= JUMP)
     spans = _spans_of_events(recording) or _spans_of_reference(recording, moving)
-    found: list[Motion] = []
+    found: list[MotionRows] = []
     for lo, hi, identifier, stopped in spans:
         rows = lo + np.flatnonzero(moving[lo:hi])
         if rows.size:
-            found.append(Motion(int(rows[0]) - 1, int(rows[-1]), 0, 0, identifier, stopped))
+            found.append(MotionRows(int(rows[0]) - 1, int(rows[-1]), 0, 0, identifier, stopped))
     jumps = np.flatnonzero(step > JUMP)
     target_moving = _step_per_tick(recording, "target_q") > MOVING
     for index, motion in enumerate(found):

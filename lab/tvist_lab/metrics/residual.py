@@ -7,7 +7,7 @@ from scipy.optimize import least_squares
 from scipy.signal import find_peaks
 
 from tvist_lab.metrics.errors import NotMeasurableError
-from tvist_lab.metrics.motion import Motion
+from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.metrics.vibration import amplitude, tool_acceleration
 from tvist_lab.recordings import Floats, Recording
 
@@ -54,7 +54,7 @@ class ModalResidual:
     """rms of what the modes do not explain, over all axes [m/s²]."""
 
 
-def residual(recording: Recording, motion: Motion) -> Residual:
+def residual(recording: Recording, motion: MotionRows) -> Residual:
     """RV as in section 4.2 of the paper.
 
     Local maxima of |α| (from the sensor, gravity removed) in the 0.3 s after the shaped reference stops, with
@@ -94,7 +94,7 @@ def _exponential(t: Floats, y: Floats) -> tuple[float, float]:
 
 def residual_by_modes(
     recording: Recording,
-    motion: Motion,
+    motion: MotionRows,
     f_d: Floats | list[float],
     zeta: Floats | list[float],
     *,
@@ -142,7 +142,7 @@ def _major_axis(cosine: Floats, sine: Floats) -> float:
     return float(np.linalg.norm(np.column_stack([cosine, sine]), ord=2))
 
 
-def _window(recording: Recording, motion: Motion, length: float) -> slice:
+def _window(recording: Recording, motion: MotionRows, length: float) -> slice:
     """Rows from the shaped stop on, for a time."""
     past = int(np.searchsorted(recording.time, recording.time[motion.shaped_stop] + length - 1e-9)) + 1
     if past > motion.end:

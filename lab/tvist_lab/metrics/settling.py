@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tvist_lab.metrics.errors import NotMeasurableError
-from tvist_lab.metrics.motion import Motion
+from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.recordings import Floats, Recording
 
 REPEATABILITY = 3.0e-5
@@ -30,7 +30,7 @@ class Settling:
     """e_os: largest E after t_enter, zero where that is within the repeatability [m]."""
 
 
-def attained_position(recording: Recording, motion: Motion) -> Floats:
+def attained_position(recording: Recording, motion: MotionRows) -> Floats:
     """Mean position of the tool over the last 0.2 s before the next motion [m], shape (3,).
 
     The tool's position is the forward kinematics of the joint angles, as in the paper: what the links bend is
@@ -43,7 +43,7 @@ def attained_position(recording: Recording, motion: Motion) -> Floats:
     return np.asarray(np.mean(recording["actual_TCP_pose"][rows, :3], axis=0), dtype=np.float64)
 
 
-def distance(recording: Recording, motion: Motion) -> Floats:
+def distance(recording: Recording, motion: MotionRows) -> Floats:
     """E: distance of the tool to its attained position [m], for the rows from the motion's start to its end.
 
     Raises:
@@ -55,7 +55,7 @@ def distance(recording: Recording, motion: Motion) -> Floats:
     )
 
 
-def settling(recording: Recording, motion: Motion, band: float = REPEATABILITY) -> Settling:
+def settling(recording: Recording, motion: MotionRows, band: float = REPEATABILITY) -> Settling:
     """t_enter, t_stb, t_cycle and e_os of the paper, section 4.2; crossings are interpolated between ticks.
 
     Args:
@@ -94,7 +94,7 @@ def _crossing(time: Floats, E: Floats, row: int, band: float) -> float:
     return float(time[row] + share * (time[row + 1] - time[row]))
 
 
-def _tail(recording: Recording, motion: Motion) -> slice:
+def _tail(recording: Recording, motion: MotionRows) -> slice:
     """Rows over which the attained position is the mean."""
     first = int(np.searchsorted(recording.time, recording.time[motion.end - 1] - TAIL + 1e-9))
     if first <= motion.shaped_stop:

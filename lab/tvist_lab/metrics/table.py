@@ -8,7 +8,7 @@ import numpy as np
 
 from tvist_lab.metrics.common_clock import still_after
 from tvist_lab.metrics.errors import NotMeasurableError
-from tvist_lab.metrics.motion import Motion, motions
+from tvist_lab.metrics.motion import MotionRows, motions
 from tvist_lab.metrics.residual import Residual, residual
 from tvist_lab.metrics.ring_down import SLOW_POLE, RingDown, fit_ring_down
 from tvist_lab.metrics.settling import Settling, settling
@@ -78,13 +78,13 @@ def analyze(recording: Recording) -> list[MotionResult]:
     return [measure(recording, motion) for motion in motions(recording)]
 
 
-def measure(recording: Recording, motion: Motion) -> MotionResult:
+def measure(recording: Recording, motion: MotionRows) -> MotionResult:
     """Measure one motion; what cannot be measured is None with a note."""
     notes: dict[str, str] = {}
     if motion.stopped:
         notes["stop_s"] = "the motion was stopped before its target"
 
-    def attempt(take: Callable[[Recording, Motion], T], *fields: str) -> T | None:
+    def attempt(take: Callable[[Recording, MotionRows], T], *fields: str) -> T | None:
         try:
             return take(recording, motion)
         except NotMeasurableError as error:
@@ -112,7 +112,7 @@ def measure(recording: Recording, motion: Motion) -> MotionResult:
     )
 
 
-def _ring_down(recording: Recording, motion: Motion) -> RingDown:
+def _ring_down(recording: Recording, motion: MotionRows) -> RingDown:
     """The mode that rings after the stop."""
     alpha = tool_acceleration(recording)[motion.shaped_stop : motion.end]
     fit = fit_ring_down(alpha, recording.period, modes=2, slow_poles=(SLOW_POLE,))

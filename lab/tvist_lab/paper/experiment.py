@@ -19,7 +19,7 @@ from tvist_lab.metrics import (
 )
 from tvist_lab.paper.methods import (
     EqualDuration,
-    Fixed,
+    FixedShaper,
     FrozenAtEnd,
     Method,
     TimeVarying,
@@ -39,7 +39,7 @@ Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedRun:
     """One run of one motion."""
 
     result: MotionResult
@@ -61,7 +61,7 @@ class Experiment:
     runs: int
     table_1: dict[str, dict[str, float]]
     """Pose to its lowest mode: as estimated, and the truth where the robot tells it."""
-    judged: dict[tuple[str, str], list[Judged]] = field(default_factory=dict)
+    judged: dict[tuple[str, str], list[JudgedRun]] = field(default_factory=dict)
     """(motion, method) to its runs."""
     labels: dict[str, str] = field(default_factory=dict)
     """Method to its name for people."""
@@ -83,12 +83,12 @@ class Experiment:
         return 1e-3 * float(np.mean([judged.result.delay_ms for judged in self.judged[motion, "shaped"]]))
 
 
-def judge(recording: Recording) -> Judged:
+def judge(recording: Recording) -> JudgedRun:
     """Measure the one motion of a recording."""
     motion = motions(recording)[0]
     has_truth = "truth_tool_acceleration" in recording
     result = measure(recording, motion)
-    return Judged(
+    return JudgedRun(
         result=result,
         peak=peak_after_stop(recording, motion) if has_truth else None,
         still_after=still_after(recording, motion) if result.still_after_ms is not None else None,
@@ -159,7 +159,7 @@ def fixed_baselines(info: Info, delay: float) -> Sequence[Method]:
         return [EqualDuration(delay)]
     f_d, zeta = info.calibration.f_d_range, info.calibration.zeta_range
     robust = [
-        Fixed(name, *robust_over(name, f_d, zeta), name=f"fixed_{name}", label=f"fixed {name.upper()}")
+        FixedShaper(name, *robust_over(name, f_d, zeta), name=f"fixed_{name}", label=f"fixed {name.upper()}")
         for name in ("mzv", "ei2", "ei3")
     ]
     return [EqualDuration(delay), FrozenAtEnd(), *robust]

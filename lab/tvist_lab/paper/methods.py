@@ -75,7 +75,7 @@ class FrozenAtEnd(Method):
 
 
 @dataclass(frozen=True)
-class Fixed(Method):
+class FixedShaper(Method):
     """One robust shaper for the whole workspace."""
 
     shaper: str

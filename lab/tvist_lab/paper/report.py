@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from tvist_lab.metrics import table_2, table_notes
-from tvist_lab.paper.experiment import Experiment, Judged
+from tvist_lab.paper.experiment import Experiment, JudgedRun
 from tvist_lab.paper.methods import ACCELERATION
 from tvist_lab.paper.published import MOTIONS
 
@@ -34,7 +34,7 @@ def _methods(done: Experiment, motion: str) -> dict[str, dict[str, float | None]
     return {method: _row(judged, unshaped) for (ran, method), judged in done.judged.items() if ran == motion}
 
 
-def _row(judged: list[Judged], unshaped: list[Judged]) -> dict[str, float | None]:
+def _row(judged: list[JudgedRun], unshaped: list[JudgedRun]) -> dict[str, float | None]:
     residual = _mean([one.result.residual_vibration_m_s2 for one in judged])
     before = _mean([one.result.residual_vibration_m_s2 for one in unshaped])
     peak, peak_before = _mean([one.peak for one in judged]), _mean([one.peak for one in unshaped])

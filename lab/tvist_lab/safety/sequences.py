@@ -44,7 +44,7 @@ class BrokenError(AssertionError):
 
 
 @dataclass
-class Ahead:
+class Undisturbed:
     """What the reference would do if nothing were commanded."""
 
     references: Floats
@@ -74,7 +74,7 @@ class Sequence:
         )  # fmt: skip
         self.done: list[str] = []
         """What was sent, and how it was answered."""
-        self._ahead: Ahead | None = None
+        self._ahead: Undisturbed | None = None
         self._excused = False
         self._sequence = 0
         self._at = self._towards = self.robot.references[-1]
@@ -107,13 +107,13 @@ class Sequence:
             if self._free.meeting(q) is None:
                 return q
 
-    def _foresee(self) -> Ahead | None:
+    def _foresee(self) -> Undisturbed | None:
         """What comes if nothing is commanded, where it goes along a line."""
         motion, cycle = self.robot.controller.motion, self.robot.controller.cycle
         if cycle.at_rest or cycle.trajectory.path is None:
             return None
         ahead = motion.outlook.foresee()
-        return None if ahead is None else Ahead(ahead[1:], self.robot.controller.tick_number)
+        return None if ahead is None else Undisturbed(ahead[1:], self.robot.controller.tick_number)
 
     def _tick(self, count: int) -> None:
         robot = self.robot
@@ -166,7 +166,7 @@ class Sequence:
         elif not self._excused:
             raise self._broken(f"by the reference {meeting}, nearer than {CLEARANCE} m")
 
-    def _watch_way(self, ahead: Ahead, q: Floats) -> None:
+    def _watch_way(self, ahead: Undisturbed, q: Floats) -> None:
         """On the line, not ahead, and at rest no later."""
         references = ahead.references
         tick = self.robot.controller.tick_number - ahead.since

@@ -24,7 +24,7 @@ MAX_TERMS = 1000
 """More would cost more than a tick's share, and no ring-down campaign could determine them."""
 
 
-class Basis:
+class BasisFunctions:
     """A set of basis functions.
 
     Attributes:
@@ -165,4 +165,4 @@ def terms(
     Raises:
         EstimatorError: A parameter is wrong.
     """
-    return Basis(tuple(joints), basis, degree, centre, scale).terms(q)
+    return BasisFunctions(tuple(joints), basis, degree, centre, scale).terms(q)

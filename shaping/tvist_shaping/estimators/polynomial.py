@@ -10,7 +10,7 @@ from tvist_shaping._compiled import compiled
 from tvist_shaping._types import Floats
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.base import Estimator
-from tvist_shaping.estimators.basis import Basis, Kind
+from tvist_shaping.estimators.basis import BasisFunctions, Kind
 from tvist_shaping.impulses import F_D_RANGE
 
 MARGIN = 0.1
@@ -57,7 +57,7 @@ def evaluate(
         trigonometric: Whether the basis is trigonometric.
         centre: Centre [rad], shape (k,).
         scale: Scale [rad], shape (k,).
-        multiples: `Basis.multiples`, shape (rows, k).
+        multiples: `BasisFunctions.multiples`, shape (rows, k).
         coefficients: Coefficients of f_d and ζ, shape (2, terms).
         ranges: Lowest and highest f_d and ζ, shape (2, 2).
 
@@ -104,7 +104,7 @@ class Polynomial(Estimator):
         saturating: Whether the last estimate's f_d or ζ lay outside its range before it was held.
     """
 
-    basis: Basis
+    basis: BasisFunctions
     saturating: bool
 
     def __init__(
@@ -136,7 +136,7 @@ class Polynomial(Estimator):
         Raises:
             EstimatorError: A parameter is wrong; it names which.
         """
-        self.basis = Basis(tuple(joints), basis, degree, centre, scale)
+        self.basis = BasisFunctions(tuple(joints), basis, degree, centre, scale)
         self.saturating = False
         self._coefficients: Floats = np.stack(
             (

@@ -1,4 +1,4 @@
-"""What the tests of UR's doors share: a control that records, and snapshots of a real controller."""
+"""What the tests of UR's interfaces share: a control that records, and snapshots of a real controller."""
 
 import contextlib
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.values import Payload
-from tvist_server.gateways.ur.doors import UrDoors
+from tvist_server.gateways.ur.interfaces import UrInterfaces
 
 from .desks import EVERYWHERE, Desk, until
 
@@ -151,7 +151,7 @@ def snapshot(snapshots):
 
 @pytest.fixture
 def robot(snapshots) -> SimpleNamespace:
-    """What all doors of a robot share, as far as no door is tested."""
+    """What all interfaces of a robot share, as far as no interface is tested."""
     told, reported = [], []
     return SimpleNamespace(
         description=UR5E,
@@ -168,13 +168,13 @@ def robot(snapshots) -> SimpleNamespace:
 @pytest.fixture
 async def desk():
     desk = Desk()
-    desk.doors = UrDoors(desk, UR5E, "ur5e", "127.0.0.1", EVERYWHERE)
-    await desk.doors.open()
+    desk.interfaces = UrInterfaces(desk, UR5E, "ur5e", "127.0.0.1", EVERYWHERE)
+    await desk.interfaces.open()
     yield desk
     for writer in desk.writers:
         writer.close()
         with contextlib.suppress(ConnectionError):
             await writer.wait_closed()
-    await desk.doors.shut()
-    await until(lambda: not desk.doors._connections)
-    desk.doors.close()
+    await desk.interfaces.shut()
+    await until(lambda: not desk.interfaces._connections)
+    desk.interfaces.close()

@@ -1,4 +1,4 @@
-"""A controller behind its doors, and clients at them, all in the test's own loop."""
+"""A controller behind its interfaces, and clients at them, all in the test's own loop."""
 
 import asyncio
 
@@ -22,7 +22,7 @@ class Desk(Sink):
         self.controller = Robot().controller
         self.controller.session.release()
         self.host = Host(self.controller, self)
-        self.doors = None
+        self.interfaces = None
         self.writers = []
 
     def command(self, command, answer):
@@ -40,13 +40,13 @@ class Desk(Sink):
         return None if lease is None else lease.client
 
     def state(self, state):
-        self.doors.publish("state", state, b"")
+        self.interfaces.publish("state", state, b"")
 
     def event(self, event):
-        self.doors.publish("event", event, b"")
+        self.interfaces.publish("event", event, b"")
 
     def io(self, io):
-        self.doors.publish("io", io, b"")
+        self.interfaces.publish("io", io, b"")
 
     async def tick(self, count=1):
         for _ in range(count):
@@ -54,8 +54,8 @@ class Desk(Sink):
             await asyncio.sleep(0)
 
 
-async def connect(desk, door):
-    reader, writer = await asyncio.open_connection("127.0.0.1", desk.doors.ports[door])
+async def connect(desk, interface):
+    reader, writer = await asyncio.open_connection("127.0.0.1", desk.interfaces.ports[interface])
     desk.writers.append(writer)
     return reader, writer
 

@@ -1,4 +1,4 @@
-"""A robot as its doors see it, with programs."""
+"""A robot as its interfaces see it, with programs."""
 
 from tests.server.robots import UR5E
 
@@ -10,7 +10,7 @@ from .decoders import message
 
 
 def host(robot):
-    """The fixture `robot`, with programs and what else the text doors share."""
+    """The fixture `robot`, with programs and what else the text interfaces share."""
     robot.programs = Programs(robot, built_in(UR5E))
     robot.operational_mode = NO_MODE
     return robot

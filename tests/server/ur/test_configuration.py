@@ -1,9 +1,9 @@
-"""Where the doors are: addresses, ports, and what is refused before anything is opened."""
+"""Where the interfaces are: addresses, ports, and what is refused before anything is opened."""
 
 import pytest
 
 from tvist_server.config import ConfigError, ServeConfig, from_mapping
-from tvist_server.gateways.exposure import ExposureError, guarded_doors
+from tvist_server.gateways.exposure import ExposureError, guarded_interfaces
 from tvist_server.ur_ports import UrPorts
 
 EVERYWHERE = "0.0.0.0"  # noqa: S104  it is refused
@@ -14,21 +14,21 @@ def config(**values) -> ServeConfig:
 
 
 def test_they_are_where_ur_has_them():
-    assert config().doors(0) == ("127.0.0.1", UrPorts().open())
+    assert config().interfaces(0) == ("127.0.0.1", UrPorts().open())
 
 
 def test_one_can_be_moved_and_another_kept_shut():
-    _, ports = config(ur_ports={"rtde": 31004, "dashboard": 0}).doors(0)
+    _, ports = config(ur_ports={"rtde": 31004, "dashboard": 0}).interfaces(0)
     assert ports == {
-        **{door: port for door, port in UrPorts().open().items() if door != "dashboard"},
+        **{interface: port for interface, port in UrPorts().open().items() if interface != "dashboard"},
         "rtde": 31004,
     }
 
 
 def test_of_several_robots_each_has_the_next_address():
-    addresses = [config(ur_address="127.0.0.254").doors(number)[0] for number in range(3)]
+    addresses = [config(ur_address="127.0.0.254").interfaces(number)[0] for number in range(3)]
     assert addresses == ["127.0.0.254", "127.0.0.255", "127.0.1.0"]
-    assert config(ur_address="::1").doors(0)[0] == "::1"
+    assert config(ur_address="::1").interfaces(0)[0] == "::1"
 
 
 @pytest.mark.parametrize(
@@ -40,12 +40,12 @@ def test_of_several_robots_each_has_the_next_address():
 )
 def test_an_address_that_is_none_is_named(values, named):
     with pytest.raises(ConfigError, match=named):
-        config(**values).doors(0)
+        config(**values).interfaces(0)
 
 
 def test_everywhere_is_no_address_for_several():
     with pytest.raises(ConfigError, match="one address each"):
-        config(ur_address=EVERYWHERE).doors(1)
+        config(ur_address=EVERYWHERE).interfaces(1)
 
 
 @pytest.mark.parametrize(
@@ -58,9 +58,9 @@ def test_a_port_or_door_that_is_none_is_named(ports, named):
 
 
 def test_nobody_else_reaches_them_unasked():
-    guarded_doors("127.9.9.9", insecure=False)
-    guarded_doors("::1", insecure=False)
-    guarded_doors(EVERYWHERE, insecure=True)
+    guarded_interfaces("127.9.9.9", insecure=False)
+    guarded_interfaces("::1", insecure=False)
+    guarded_interfaces(EVERYWHERE, insecure=True)
     for address in (EVERYWHERE, "192.168.1.2", "::"):
         with pytest.raises(ExposureError, match="insecure"):
-            guarded_doors(address, insecure=False)
+            guarded_interfaces(address, insecure=False)

@@ -13,7 +13,7 @@ from tvist_protocol.programs import ProgramLoad, ProgramPlay, ProgramStop
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_server.gateways.ur.dashboard.commands import COMMANDS, find
 from tvist_server.gateways.ur.dashboard.lines import LONGEST
-from tvist_server.gateways.ur.dashboard.session import MOST_WAITING, DashboardSession
+from tvist_server.gateways.ur.dashboard.session import MAX_WAITING, DashboardSession
 
 from .conftest import io
 from .decoders import message
@@ -389,9 +389,9 @@ def test_a_reply_after_the_client_has_gone_is_nobodys(client, control):
 
 def test_too_many_waiting_commands_are_declined_in_their_turn(client, control):
     control.wait()
-    count = MOST_WAITING + 50
+    count = MAX_WAITING + 50
     client.send("power on\n" + "version\n" * count + "robotmode\n")
-    assert len(client.session._waiting) == MOST_WAITING
+    assert len(client.session._waiting) == MAX_WAITING
     control.answer()
     heard = client.heard()
     assert len(heard) == count + 2

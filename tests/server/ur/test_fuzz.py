@@ -1,4 +1,4 @@
-"""Whatever the bytes, and however they are cut: each door of a robot stands, and its other clients notice nothing.
+"""Whatever the bytes, and however they are cut: each interface of a robot stands, and its other clients notice nothing.
 
 The controller is a real one. Its replies come late, as over a thread, so that clients go while they are on their way.
 """
@@ -41,7 +41,7 @@ READ = ["timestamp", "actual_q"]
 
 
 class House(Sink):
-    """A robot with doors and no sockets; `tick` lets time pass, `answer` gives the replies that are due."""
+    """A robot with interfaces and no sockets; `tick` lets time pass, `answer` gives the replies that are due."""
 
     def __init__(self):
         self.controller = Robot().controller
@@ -103,11 +103,11 @@ class House(Sink):
 class Client:
     """A connection. What it was sent is looked at, and thrown away, by `heard`."""
 
-    def __init__(self, house, door, host="127.0.0.1"):
-        self.house, self.door = house, door
+    def __init__(self, house, interface, host="127.0.0.1"):
+        self.house, self.interface = house, interface
         self.stream, self.sampled, self.rest = bytearray(), b"", b""
         self.control = ConnectionControl(house.leases[host])
-        self.session = DOORS[door](house.robot, self.control, self.take)
+        self.session = DOORS[interface](house.robot, self.control, self.take)
         house.clients.append(self)
         self.session.opened()
 
@@ -117,11 +117,11 @@ class Client:
     def heard(self):
         data = bytes(self.stream)
         self.stream.clear()
-        if self.door == "rtde":
+        if self.interface == "rtde":
             rtde_client.packages(data)
-        elif self.door == "primary":
+        elif self.interface == "primary":
             split(data)
-        elif self.door == "dashboard":
+        elif self.interface == "dashboard":
             assert not data or data.endswith(b"\n")
             data.decode()
         return data
@@ -232,10 +232,10 @@ def watch(house, reader, asker):
     assert asker.heard().startswith(b"5.22")
 
 
-def attack(house, door, random, packages):
+def attack(house, interface, random, packages):
     """Clients that come, send so many packages, cut anywhere, and go."""
     hosts = [*house.leases]
-    clients = [Client(house, door, random.choice(hosts)) for _ in range(CLIENTS)]
+    clients = [Client(house, interface, random.choice(hosts)) for _ in range(CLIENTS)]
     reader, asker = Client(house, "rtde"), Client(house, "dashboard")
     listener = Client(house, "primary")
     for sent in (rtde_client.version(), rtde_client.outputs(READ), rtde_client.package("S")):
@@ -245,7 +245,7 @@ def attack(house, door, random, packages):
     for number in range(packages):
         which = random.randrange(CLIENTS)
         client = clients[which]
-        client.rest += SENT[door](random)
+        client.rest += SENT[interface](random)
         if random.random() < 0.7:
             cut = random.randrange(len(client.rest) + 1)
             if not client.session.over:
@@ -256,7 +256,7 @@ def attack(house, door, random, packages):
             house.answer()
         if random.random() < 1 / LIVES:
             client.go()
-            clients[which] = Client(house, door, random.choice(hosts))
+            clients[which] = Client(house, interface, random.choice(hosts))
         if number % 20 == 0:
             watch(house, reader, asker)
             listener.heard()
@@ -271,8 +271,8 @@ def attack(house, door, random, packages):
 @pytest.mark.parametrize(
     "packages", [1_000, pytest.param(100_000, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
 )
-@pytest.mark.parametrize("door", DOORS)
-def test_a_door_stands_and_nobody_else_notices(door, packages):
+@pytest.mark.parametrize("interface", DOORS)
+def test_a_door_stands_and_nobody_else_notices(interface, packages):
     house, random = House(), Random(packages)
     house.host.tick()
     house.tick()
@@ -281,7 +281,7 @@ def test_a_door_stands_and_nobody_else_notices(door, packages):
     tracemalloc.start(1)
     try:
         for _ in range(rounds):
-            attack(house, door, random, packages // rounds)
+            attack(house, interface, random, packages // rounds)
             gc.collect()
             memory.append(tracemalloc.get_traced_memory()[0])
     finally:

@@ -1,4 +1,4 @@
-"""Places at the doors: how many, and for whom some are kept."""
+"""Places at the interfaces: how many, and for whom some are kept."""
 
 from dataclasses import dataclass
 

@@ -193,26 +193,26 @@ class Changed:
 
 
 def test_the_version_comes_first_and_the_first_state_at_once(robot, control, sent, snapshot):
-    door = session(robot, control, sent.append)
-    door.opened()
+    interface = session(robot, control, sent.append)
+    interface.opened()
     hello = message(sent[0])
     assert hello.kind == 3
     assert hello.values["name"] == "URControl"
     assert hello.values["numbers"] == [version.MAJOR, version.MINOR, version.BUGFIX, version.BUILD]
     assert hello.values["date"] == version.DATE
-    assert door.sample(Ticks(snapshot).at(1234)) == b""
+    assert interface.sample(Ticks(snapshot).at(1234)) == b""
     assert [kind for kind, _ in split(b"".join(sent[1:]))] == [16]
 
 
 def test_states_come_at_10_hz_even_where_ticks_were_left_out(robot, control, sent, snapshot):
-    door = session(robot, control, sent.append)
+    interface = session(robot, control, sent.append)
     ticks = Ticks(snapshot)
-    door.sample(ticks.at(1))
+    interface.sample(ticks.at(1))
     assert len(sent) == 1
-    assert [tick for tick in range(2, 501) if door.sample(ticks.at(tick))] == list(range(50, 501, 50))
-    assert door.sample(ticks.at(561))
-    assert not door.sample(ticks.at(599))
-    assert door.sample(ticks.at(600))
+    assert [tick for tick in range(2, 501) if interface.sample(ticks.at(tick))] == list(range(50, 501, 50))
+    assert interface.sample(ticks.at(561))
+    assert not interface.sample(ticks.at(599))
+    assert interface.sample(ticks.at(600))
     assert len(sent) == 1
 
 
@@ -226,26 +226,26 @@ def test_it_is_packed_once_for_all_clients(robot, control, snapshot):
 
 
 def test_the_safety_mode_is_told_when_it_changes_and_not_before(robot, control, sent, snapshot):
-    door = session(robot, control, sent.append)
+    interface = session(robot, control, sent.append)
     ticks = Ticks(snapshot)
-    door.opened()
+    interface.opened()
     for tick, mode in enumerate((1, 1, 3, 3, 1), start=1):
-        door.sample(ticks.at(tick, safety_mode=mode))
+        interface.sample(ticks.at(tick, safety_mode=mode))
     changes = [message(data) for data in sent if data[4] == 20][1:]
     assert [(one.kind, one.values["mode"]) for one in changes] == [(5, 3), (5, 1)]
 
 
 def test_a_client_that_comes_in_a_protective_stop_is_told_of_its_end_alone(robot, control, sent, snapshot):
-    door = session(robot, control, sent.append)
+    interface = session(robot, control, sent.append)
     ticks = Ticks(snapshot)
-    door.sample(ticks.at(1, safety_mode=3))
-    door.sample(ticks.at(2, safety_mode=1))
+    interface.sample(ticks.at(1, safety_mode=3))
+    interface.sample(ticks.at(2, safety_mode=1))
     assert [message(data).values["mode"] for data in sent if data[4] == 20] == [1]
 
 
 def test_a_protective_stop_is_error_209_of_argument_0_as_a_warning(robot, control, sent):
-    door = session(robot, control, sent.append)
-    door.event(Event(tick=7, kind="protective_stop", code="limit_torque", why="too much"))
+    interface = session(robot, control, sent.append)
+    interface.event(Event(tick=7, kind="protective_stop", code="limit_torque", why="too much"))
     (error,) = [message(data) for data in sent]
     assert error.kind == 6
     assert (error.values["code"], error.values["argument"], error.values["level"]) == (209, 0, 2)
@@ -254,9 +254,9 @@ def test_a_protective_stop_is_error_209_of_argument_0_as_a_warning(robot, contro
 
 
 def test_warnings_are_lines_of_the_log_and_other_events_are_not_told(robot, control, sent):
-    door = session(robot, control, sent.append)
-    door.event(Event(tick=7, kind="motion_started", id=1))
-    door.event(Event(tick=7, kind="warning", why="mind the gap"))
+    interface = session(robot, control, sent.append)
+    interface.event(Event(tick=7, kind="motion_started", id=1))
+    interface.event(Event(tick=7, kind="warning", why="mind the gap"))
     (line,) = [message(data) for data in sent]
     assert (line.kind, line.values) == (0, {"text": "mind the gap"})
 
@@ -458,9 +458,9 @@ REPORTS = {
 
 @pytest.mark.parametrize("text", REPORTS)
 def test_what_became_of_a_script_is_one_line_on_the_console(robot, control, sent, text):
-    door = session(robot, control, sent.append)
-    door.receive(text)
-    door.closed()
+    interface = session(robot, control, sent.append)
+    interface.receive(text)
+    interface.closed()
     assert robot.reported == [REPORTS[text].format(control.peer)]
 
 
@@ -504,8 +504,8 @@ def test_a_protective_stop_that_cannot_be_left_yet_is_a_refusal(robot, control, 
 
 
 def test_the_read_only_ports_answer_commands_with_210_and_do_nothing(robot, control, sent):
-    door = session(robot, control, sent.append, read_only=True)
-    door.receive(b"power off\ndef f():\n  x=1\nend\nstop program\n")
+    interface = session(robot, control, sent.append, read_only=True)
+    interface.receive(b"power off\ndef f():\n  x=1\nend\nstop program\n")
     errors = [message(data) for data in sent]
     assert [error.values["code"] for error in errors] == [210] * 3
     assert not control.commands
@@ -522,9 +522,9 @@ def test_no_bytes_break_a_session(data):
         ask=lambda _, then: then(Refused(code="malformed", where="", why="")),
         change=lambda _, then: then(Refused(code="no_control", where="", why="")),
     )
-    door = PrimarySession(robot, control, message)
-    door.opened()
-    door.receive(data)
-    door.receive(b"\npower on\nstop program\n")
-    door.closed()
+    interface = PrimarySession(robot, control, message)
+    interface.opened()
+    interface.receive(data)
+    interface.receive(b"\npower on\nstop program\n")
+    interface.closed()
     assert all(line.isprintable() and len(line) < 300 for line in reported)

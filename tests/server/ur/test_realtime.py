@@ -98,28 +98,28 @@ def test_joints_that_are_not_there_are_zero(ur5e, joints):
 
 
 def test_what_is_sent_to_it_is_taken_for_a_script(robot, control):
-    door = session(robot, control)
+    interface = session(robot, control)
     for piece in (b"def f():\n  movej([0,", b"0,0,0,0,0])\nen", b"d\n"):
-        door.receive(piece)
+        interface.receive(piece)
     (exception,) = told(robot)
     assert exception.kind == 10
     assert (exception.values["line"], exception.values["column"]) == (1, 1)
-    door.receive(b"power off\n")
+    interface.receive(b"power off\n")
     assert control.of(c.PowerOff)
 
 
 def test_the_read_only_port_hears_nothing(robot, control):
-    door = session(robot, control, read_only=True)
-    door.receive(b"power off\ndef f():\nend\n" + bytes(range(256)))
+    interface = session(robot, control, read_only=True)
+    interface.receive(b"power off\ndef f():\nend\n" + bytes(range(256)))
     assert not control.commands
     assert not robot.told
 
 
 def test_a_program_sent_without_end_is_bounded(robot, control):
-    door = session(robot, control)
+    interface = session(robot, control)
     for _ in range(40):
-        door.receive(b"def f():\n" + b"  x = 1\n" * 10_000)
-    assert door._intake.held <= 1 << 20
+        interface.receive(b"def f():\n" + b"  x = 1\n" * 10_000)
+    assert interface._intake.held <= 1 << 20
     assert [one.values["text"].split(":")[0] for one in told(robot)] == ["program_too_long"]
 
 

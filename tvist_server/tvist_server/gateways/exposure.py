@@ -76,7 +76,7 @@ def guarded(
     return list(listen), {**(LIMITS if exposed else {}), "access_control": open_access(robots)}
 
 
-def guarded_doors(address: str, *, insecure: bool) -> None:
+def guarded_interfaces(address: str, *, insecure: bool) -> None:
     """Refuse to open UR's interfaces, which cannot authenticate clients, where other machines would reach them.
 
     Args:

@@ -13,13 +13,13 @@ from tvist_protocol.info import Info
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import Recorded
 from tvist_protocol.stream import Event, State, Truth
-from tvist_server.recording.recorder import Recorder, RecordingError
+from tvist_server.recording.recorder import Recorder, RecorderError
 
 log = logging.getLogger(__name__)
 
 KEPT = 500
 """Ticks before the failure, one second."""
-MOST_FILES = 10
+MAX_FILES = 10
 """Files of one robot: one that fails again and again does not fill the disk."""
 
 
@@ -67,7 +67,7 @@ class BlackBox(Sink):
         self._kept.append(entry)
 
     def _write(self, tick: int) -> None:
-        if self._written < MOST_FILES:
+        if self._written < MAX_FILES:
             self._written += 1
             info = self._info()
             path = self._folder / f"tvist-{info.name}-{os.getpid()}-{tick}.mcap"
@@ -89,7 +89,7 @@ class BlackBox(Sink):
                             recorder.truth(message)
                         case Entry():
                             recorder.journal(message)
-        except RecordingError as error:
+        except RecorderError as error:
             log.error("the last second before the failure is lost: %s", error)  # noqa: TRY400  the sentence says it
         else:
             why = recorder.error or f"the last second before it is in {path}: look with tvist analyze {path}"

@@ -32,7 +32,7 @@ LOOK = 1.0
 """Time between two looks whether the file is still where it was [s]."""
 
 
-class RecordingError(TvistError):
+class RecorderError(TvistError):
     """A recording cannot be begun."""
 
 
@@ -72,7 +72,7 @@ class Recorder(Sink):
         on_moved: Callable[[str], None] | None = None,
     ) -> None:
         if queue_size < 1:
-            raise RecordingError(f"queue_size is {queue_size}: must be at least 1")
+            raise RecorderError(f"queue_size is {queue_size}: must be at least 1")
         self.path = Path(path)
         self.place: Path | None = self.path
         """Place of the file, as far as is known: `path`, unless it was moved away. After `close` it is where it was
@@ -152,20 +152,20 @@ class Recorder(Sink):
         try:
             topic_of, first = topics(info.name), heading(info, start)
         except (TypeError, ValueError, TvistError) as error:
-            raise RecordingError(f"{self.path} cannot be started: {error}") from error
+            raise RecorderError(f"{self.path} cannot be started: {error}") from error
         try:
             self._stream = self.path.open("wb" if overwrite else "xb")
         except FileExistsError:
-            raise RecordingError(
+            raise RecorderError(
                 f"{self.path} exists already and is not overwritten: choose another file"
             ) from None
         except OSError as error:
-            raise RecordingError(f"{self.path} cannot be written: {_reason(error)}") from error
+            raise RecorderError(f"{self.path} cannot be written: {_reason(error)}") from error
         try:
             self._writer = RecordingWriter(self._stream, topic_of, first)
         except OSError as error:
             self._abandon()
-            raise RecordingError(f"{self.path} cannot be written: {_reason(error)}") from error
+            raise RecorderError(f"{self.path} cannot be written: {_reason(error)}") from error
 
     def _run(self) -> None:
         try:

@@ -1,4 +1,4 @@
-"""UR's own interfaces: doors beside Zenoh's, to the same controller.
+"""UR's own interfaces to the controller that Zenoh's clients use, too.
 
-Each is a codec and a session without socket or clock; `doors` opens them.
+Each is a codec and a session without socket or clock; `interfaces` opens them.
 """

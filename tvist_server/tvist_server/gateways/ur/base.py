@@ -15,11 +15,11 @@ Then = Callable[[Reply], None]
 """Takes the controller's reply to a command, later."""
 
 
-class Control(Protocol):
+class ControllerAccess(Protocol):
     """The way of one connection to the controller."""
 
     peer: str
-    """Name of the client and of the door it uses, for people."""
+    """The client and the interface it uses, in words."""
 
     def change(self, command: Callable[[str], Command], then: Then) -> None:
         """Send a command that needs control, and take control first where nobody has it.
@@ -32,7 +32,7 @@ class Control(Protocol):
     def ask(self, command: Command, then: Then) -> None:
         """Send a command that needs none."""
 
-    def lasting(self) -> "Control":
+    def lasting(self) -> "ControllerAccess":
         """Another one for the same host, that does not end with the connection but by its own `leave`."""
 
     def leave(self) -> None:
@@ -43,7 +43,7 @@ class Control(Protocol):
         """Whether somebody else holds control, as far as is known: commands that change something are refused."""
 
 
-class Session(ABC):
+class PortSession(ABC):
     """One connection. Everything is called in one thread, and nothing waits.
 
     Whatever bytes come, nothing here raises: what is wrong is answered in the interface's own way.

@@ -1,4 +1,4 @@
-"""A socket of a door, and the session behind it."""
+"""A socket of an interface, and the session behind it."""
 
 import asyncio
 import ipaddress
@@ -9,7 +9,7 @@ from typing import cast
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.stream import Event
-from tvist_server.gateways.ur.base import Send, Session
+from tvist_server.gateways.ur.base import PortSession, Send
 from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
 from tvist_server.gateways.ur.notices import Notices
 from tvist_server.gateways.ur.places import Places
@@ -17,27 +17,27 @@ from tvist_server.gateways.ur.places import Places
 log = logging.getLogger(__name__)
 
 PIECE = 256
-"""Bytes taken of a client at once: one that floods its door is served in turn with all others."""
-MOST_COMMANDS = 32
+"""Bytes read from a client at a time, so that one that floods its interface waits its turn."""
+MAX_COMMANDS = 32
 """Commands of a client that may wait for the controller's answers before more is taken of it: a tick does them all."""
-MOST_UNREAD = 1_000_000
+MAX_UNREAD = 1_000_000
 """Bytes that may wait for a client that does not read them; then it is cut off."""
-HEARS = MOST_UNREAD // 4
+HEARS = MAX_UNREAD // 4
 """Unread bytes above which, in real time, a client gets no messages that go to all clients."""
-ANSWERS = MOST_UNREAD // 2
+ANSWERS = MAX_UNREAD // 2
 """Unread bytes above which, in real time, nothing more is read from a client until it has read."""
-MOST_UNREAD_LOCKSTEP = 64_000_000
+MAX_UNREAD_LOCKSTEP = 64_000_000
 """Limit in lockstep, where samples wait as well: a minute of them."""
 
 FIRST_WORD = 30.0
 """Time in which a client has to say something where it has to begin [s]."""
 
-MakeSession = Callable[[ConnectionControl, Send], Session]
-"""Makes a door's session: the way to the controller, and the way back."""
+MakeSession = Callable[[ConnectionControl, Send], PortSession]
+"""Makes an interface's session: the way to the controller, and the way back."""
 
 
 class Connection(asyncio.BufferedProtocol):
-    """One client at one door.
+    """One client at one interface.
 
     Args:
         make: Its session.
@@ -61,16 +61,16 @@ class Connection(asyncio.BufferedProtocol):
         self._places = places
         self._notices = notices
         self._lossless = lossless
-        self._most_unread = MOST_UNREAD_LOCKSTEP if lossless else MOST_UNREAD
+        self._most_unread = MAX_UNREAD_LOCKSTEP if lossless else MAX_UNREAD
         self._transport: asyncio.Transport | None = None
         self._piece = bytearray(PIECE)
         self._behind = False
         """Whether the client leaves its answers unread."""
         self._first_word: asyncio.TimerHandle | None = None
         """What ends the connection of a client that says nothing."""
-        self.session: Session | None = None
+        self.session: PortSession | None = None
         self.peer = "a client"
-        """Name of the client and of the door it uses, for people."""
+        """The client and the interface it uses, in words."""
         self.heard = 0.0
         """When it last sent something, or came [s of the loop's clock]."""
         self.dropped = 0
@@ -79,8 +79,8 @@ class Connection(asyncio.BufferedProtocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """A client came."""
         stream = cast("asyncio.Transport", transport)
-        (host, port), (own, door) = (stream.get_extra_info(end)[:2] for end in ("peername", "sockname"))
-        self.peer = f"the client {host}:{port} of port {door}"
+        (host, port), (own, own_port) = (stream.get_extra_info(end)[:2] for end in ("peername", "sockname"))
+        self.peer = f"the client {host}:{port} of port {own_port}"
         if not self._places.make_room(self.peer, local=host == own or _is_loopback(host)):
             stream.abort()
             return
@@ -135,7 +135,7 @@ class Connection(asyncio.BufferedProtocol):
             return
         if session.over:
             transport.close()
-        elif self._behind or self._control.unanswered >= MOST_COMMANDS:
+        elif self._behind or self._control.unanswered >= MAX_COMMANDS:
             transport.pause_reading()
         else:
             transport.resume_reading()

@@ -1,4 +1,4 @@
-"""Control for clients that know no lease: the doors take it for a host with its first command that changes something.
+"""Control for clients without leases: the interfaces take it for a host with the first command that changes something.
 
 All connections of a host share it, since a client opens several, one for commands, one for inputs, one to listen.
 It is given back when the last of them that used it is closed.
@@ -9,7 +9,7 @@ from collections.abc import Callable
 from tvist_protocol.commands import Command, KeepAlive, ReleaseControl, TakeControl
 from tvist_protocol.replies import Accepted, Refused, Reply
 from tvist_server.gateways.base import Desk
-from tvist_server.gateways.ur.base import Control, Then
+from tvist_server.gateways.ur.base import ControllerAccess, Then
 
 LEASE = 3600.0
 """How long it lasts without a sign of life [s]; there is one every `ALIVE`."""
@@ -19,7 +19,7 @@ _LOST = {"no_control", "stale_token"}
 _NO_TOKEN = ""
 
 Soon = Callable[[Callable[[], None]], None]
-"""Has something done in the doors' thread; from any thread."""
+"""Schedules a call in the interfaces' thread; may be called from any thread."""
 
 
 class HostLease:
@@ -28,7 +28,7 @@ class HostLease:
     Args:
         desk: The robot.
         host: Address of the host.
-        soon: Back into the doors' thread.
+        soon: Back into the interfaces' thread.
     """
 
     def __init__(self, desk: Desk, host: str, soon: Soon) -> None:
@@ -107,7 +107,7 @@ class HostLease:
                 then(reply)
 
 
-class ConnectionControl(Control):
+class ConnectionControl(ControllerAccess):
     """One connection's way to the controller.
 
     Args:

@@ -1,4 +1,4 @@
-"""What a person at the server's console is told of the doors' clients, who must not be able to flood it."""
+"""Notices about the interfaces' clients on the server's console, limited so that no client can flood it."""
 
 import asyncio
 from collections.abc import Callable

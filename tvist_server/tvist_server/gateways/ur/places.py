@@ -1,10 +1,10 @@
-"""The places at a robot's doors: how many clients may be connected, and who goes when places become scarce."""
+"""How many clients may be connected to a robot's interfaces, and who is disconnected when places run out."""
 
 from collections.abc import Callable
 from typing import Final, Generic, Protocol, TypeVar
 
 MOST: Final = 256
-"""Connections to all doors of a robot together."""
+"""Connections to all interfaces of a robot together."""
 KEPT: Final = 8
 """Number of places kept for clients on this machine, so that a local user can always connect."""
 SCARCE: Final = 0.9
@@ -39,7 +39,7 @@ class Places(Generic[AnOccupant]):
     When nine places of ten are taken, each newcomer sends away the dispensable client that has been silent for
     longest, counted from when it last sent something. Dispensable are clients of the dashboard, and those of RTDE
     that are not being served: RTDE serves a client from its start to its pause, during which it may well only
-    read. Whoever is served stays, and so does whoever reads from the other doors. A newcomer is turned away only
+    read. Whoever is served stays, and so does whoever reads from the other interfaces. A newcomer is turned away only
     where all places are taken by such clients: a flood of newcomers then disturbs nobody who is at work.
 
     Args:

@@ -5,14 +5,14 @@ from collections.abc import Callable
 from tvist_protocol.commands import Command, PowerOff, PowerOn, RestartSafety, UnlockProtectiveStop
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.replies import Refused, Reply
-from tvist_server.gateways.ur.base import Control
+from tvist_server.gateways.ur.base import ControllerAccess
 from tvist_server.gateways.ur.robot import UrRobot
 
 Outcome = Callable[[Refused | None], None]
 """Takes the refusal, or None where it is as it was asked for."""
 
 
-def power_on(robot: UrRobot, control: Control, outcome: Outcome) -> None:
+def power_on(robot: UrRobot, control: ControllerAccess, outcome: Outcome) -> None:
     """Power an arm that has none; the brakes go on holding it."""
     there = (RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING)
     _change(
@@ -23,7 +23,7 @@ def power_on(robot: UrRobot, control: Control, outcome: Outcome) -> None:
     )
 
 
-def release_brakes(robot: UrRobot, control: Control, outcome: Outcome) -> None:
+def release_brakes(robot: UrRobot, control: ControllerAccess, outcome: Outcome) -> None:
     """Make the arm ready to move, from wherever it is."""
     _change(
         control,
@@ -33,12 +33,12 @@ def release_brakes(robot: UrRobot, control: Control, outcome: Outcome) -> None:
     )
 
 
-def power_off(control: Control, outcome: Outcome) -> None:
+def power_off(control: ControllerAccess, outcome: Outcome) -> None:
     """Take the arm's power, once it stands; no program survives it."""
     _change(control, lambda token: PowerOff(token=token), outcome, lambda: False)
 
 
-def restart_safety(robot: UrRobot, control: Control, outcome: Outcome) -> None:
+def restart_safety(robot: UrRobot, control: ControllerAccess, outcome: Outcome) -> None:
     """Restart the safety system after a violation or a fault; otherwise take the arm's power, as a restart does."""
     latest = robot.latest
     if latest is not None and latest.safety_mode in (SafetyMode.VIOLATION, SafetyMode.FAULT):
@@ -47,7 +47,7 @@ def restart_safety(robot: UrRobot, control: Control, outcome: Outcome) -> None:
         power_off(control, outcome)
 
 
-def unlock(robot: UrRobot, control: Control, outcome: Outcome) -> None:
+def unlock(robot: UrRobot, control: ControllerAccess, outcome: Outcome) -> None:
     """Leave a protective stop; where there is none, nothing is left to do."""
     _change(
         control,
@@ -58,7 +58,7 @@ def unlock(robot: UrRobot, control: Control, outcome: Outcome) -> None:
 
 
 def _change(
-    control: Control, command: Callable[[str], Command], outcome: Outcome, there: Callable[[], bool]
+    control: ControllerAccess, command: Callable[[str], Command], outcome: Outcome, there: Callable[[], bool]
 ) -> None:
     """Ask for a change; a robot that refuses it since it is already so has nothing against it."""
 

@@ -5,12 +5,12 @@ from pathlib import PurePosixPath
 from typing import Protocol
 
 from tvist_controller.instruments.snapshot import Snapshot
-from tvist_controller.programs.built_in import Move
+from tvist_controller.programs.built_in import ProgramLine
 from tvist_protocol.io import Io
 from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramState, ProgramStop
 from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import Event
-from tvist_server.gateways.ur.base import Control
+from tvist_server.gateways.ur.base import ControllerAccess
 from tvist_server.gateways.ur.primary import messages
 
 FOLDER = "/programs"
@@ -20,7 +20,7 @@ Heard = Callable[[bool], None]
 """Takes whether it was done."""
 
 
-class Host(Protocol):
+class ProgramRobot(Protocol):
     """What the program's messages need of its robot."""
 
     @property
@@ -41,13 +41,13 @@ class Programs:
         known: Programs that can be loaded, by name: their moves.
     """
 
-    def __init__(self, host: Host, known: Mapping[str, Sequence[Move]]) -> None:
+    def __init__(self, host: ProgramRobot, known: Mapping[str, Sequence[ProgramLine]]) -> None:
         self._host = host
         self._known = known
         self.path: str | None = None
         """Path of the loaded program; None before the first."""
         self.state: ProgramState = "STOPPED"
-        self._control: Control | None = None
+        self._control: ControllerAccess | None = None
         """Control of the client that plays the program; it lasts as long as the program, even without the client."""
 
     @property
@@ -74,7 +74,7 @@ class Programs:
         """Whether there is such a file; folders before its name make no difference."""
         return PurePosixPath(path).name in self._known
 
-    def load(self, path: str, control: Control, heard: Heard) -> None:
+    def load(self, path: str, control: ControllerAccess, heard: Heard) -> None:
         """Load a program, and stop the one that runs.
 
         Args:
@@ -93,7 +93,7 @@ class Programs:
 
         control.ask(ProgramLoad(name=name), then)
 
-    def play(self, control: Control, heard: Heard) -> None:
+    def play(self, control: ControllerAccess, heard: Heard) -> None:
         """Start the loaded program, or go on with a paused one.
 
         Args:
@@ -116,7 +116,7 @@ class Programs:
 
         lasting.change(lambda token: ProgramPlay(token=token), then)
 
-    def pause(self, control: Control, heard: Heard) -> None:
+    def pause(self, control: ControllerAccess, heard: Heard) -> None:
         """Hold the program that runs.
 
         Args:
@@ -128,7 +128,7 @@ class Programs:
         else:
             control.change(lambda token: ProgramPause(token=token), self._changed("PAUSED", heard))
 
-    def stop(self, control: Control, heard: Heard) -> None:
+    def stop(self, control: ControllerAccess, heard: Heard) -> None:
         """End the program, and whatever moves: anyone may.
 
         Args:
@@ -166,7 +166,7 @@ class Programs:
         if "STOPPED" in {before, state} and before != state:
             self._say("PROGRAM_XXX_STOPPED" if state == "STOPPED" else "PROGRAM_XXX_STARTED")
 
-    def _hold(self, control: Control | None) -> None:
+    def _hold(self, control: ControllerAccess | None) -> None:
         before, self._control = self._control, control
         if before is not None:
             before.leave()

@@ -7,7 +7,7 @@ from struct import Struct
 from typing import Final
 
 from tvist_controller.instruments.snapshot import Snapshot
-from tvist_server.gateways.ur.base import Control, Send, Session
+from tvist_server.gateways.ur.base import ControllerAccess, PortSession, Send
 from tvist_server.gateways.ur.primary.orders import Orders
 from tvist_server.gateways.ur.primary.scripts import Intake
 from tvist_server.gateways.ur.robot import UrRobot
@@ -79,7 +79,7 @@ def package(snapshot: Snapshot) -> bytes:
     return made
 
 
-class RealtimeSession(Session):
+class RealtimeSession(PortSession):
     """One client of the real-time interface. What it sends is taken for URScript, as on the primary interface.
 
     Args:
@@ -89,7 +89,14 @@ class RealtimeSession(Session):
         read_only: Whether what the client sends is thrown away.
     """
 
-    def __init__(self, robot: UrRobot, control: Control, send: Send, *, read_only: bool = False) -> None:  # noqa: ARG002
+    def __init__(
+        self,
+        robot: UrRobot,
+        control: ControllerAccess,
+        send: Send,  # noqa: ARG002
+        *,
+        read_only: bool = False,
+    ) -> None:
         self._intake = Intake()
         self._orders = None if read_only else Orders(robot, control, robot.tell)
 

@@ -1,4 +1,4 @@
-"""What all doors to one robot share."""
+"""State that all interfaces of one robot share."""
 
 from collections.abc import Callable
 from zlib import crc32
@@ -14,7 +14,7 @@ NO_MODE = "NONE"
 
 
 class UrRobot:
-    """One robot, as the clients of its doors see it.
+    """One robot, as the clients of its interfaces see it.
 
     Args:
         description: The robot.

@@ -8,7 +8,7 @@ from typing import Final
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.replies import Refused
 from tvist_server.gateways.ur import power, version
-from tvist_server.gateways.ur.base import Control
+from tvist_server.gateways.ur.base import ControllerAccess
 from tvist_server.gateways.ur.primary import messages
 from tvist_server.gateways.ur.robot import NO_MODE, UrRobot
 
@@ -34,7 +34,7 @@ class Request:
     """One command as a client sent it."""
 
     robot: UrRobot
-    control: Control
+    control: ControllerAccess
     """The way to its controller."""
     keyword: str
     argument: str

@@ -6,22 +6,22 @@ from typing import Final
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.modes import RuntimeState
-from tvist_server.gateways.ur.base import Control, Send, Session
+from tvist_server.gateways.ur.base import ControllerAccess, PortSession, Send
 from tvist_server.gateways.ur.dashboard.commands import QUIT, Request, find
 from tvist_server.gateways.ur.dashboard.lines import Lines
 from tvist_server.gateways.ur.robot import UrRobot
 
 GREETING: Final = "Connected: Universal Robots Dashboard Server"
-MOST_WAITING: Final = 1000
+MAX_WAITING: Final = 1000
 """Lines that may wait for the answer to an earlier one."""
-TOO_MANY: Final = f"could not understand: more than {MOST_WAITING} commands wait to be carried out"
+TOO_MANY: Final = f"could not understand: more than {MAX_WAITING} commands wait to be carried out"
 PATIENCE: Final = 2500
 """Ticks in which what was stopped has to come to rest."""
 ECHO: Final = 200
 """Characters that are repeated of a line that makes no sense."""
 
 
-class DashboardSession(Session):
+class DashboardSession(PortSession):
     """Carries out a client's commands one after the other: the next begins when the last one was answered.
 
     Args:
@@ -32,7 +32,7 @@ class DashboardSession(Session):
 
     client_begins = True
 
-    def __init__(self, robot: UrRobot, control: Control, send: Send) -> None:
+    def __init__(self, robot: UrRobot, control: ControllerAccess, send: Send) -> None:
         self._robot = robot
         self._control = control
         self._send = send
@@ -59,7 +59,7 @@ class DashboardSession(Session):
         if self.over:
             return
         for line in self._lines.feed(data):
-            if self._declined or len(self._waiting) >= MOST_WAITING:
+            if self._declined or len(self._waiting) >= MAX_WAITING:
                 self._declined += 1
             else:
                 self._waiting.append(line)

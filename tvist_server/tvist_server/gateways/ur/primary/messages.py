@@ -28,7 +28,7 @@ _POPUP = Struct(">IB???B")
 _VERSION = Struct(">BBii")
 
 
-class Kind(IntEnum):
+class MessageKind(IntEnum):
     """Kinds of robot messages."""
 
     TEXT = 0
@@ -40,7 +40,7 @@ class Kind(IntEnum):
     RUNTIME_EXCEPTION = 10
 
 
-class Level(IntEnum):
+class ErrorLevel(IntEnum):
     """How bad an error is."""
 
     DEBUG = 0
@@ -60,18 +60,18 @@ def version(major: int, minor: int, bugfix: int, build: int, date: str) -> bytes
     """What runs on the controller: the first message a client gets."""
     name = b"URControl"
     body = bytes([len(name)]) + name + _VERSION.pack(major, minor, bugfix, build) + _text(date)
-    return _message(0, Kind.VERSION, body)
+    return _message(0, MessageKind.VERSION, body)
 
 
 def text(time: int, what: str) -> bytes:
     """A line for the log."""
-    return _message(time, Kind.TEXT, _text(what))
+    return _message(time, MessageKind.TEXT, _text(what))
 
 
 def key(time: int, title: str, what: str) -> bytes:
     """A program has started or stopped: `PROGRAM_XXX_STARTED` or `PROGRAM_XXX_STOPPED`, and its name."""
     head = _text(title, 255)
-    return _message(time, Kind.KEY, _KEY.pack(0, 0, len(head)) + head + _text(what))
+    return _message(time, MessageKind.KEY, _KEY.pack(0, 0, len(head)) + head + _text(what))
 
 
 def runtime_exception(time: int, line: int, column: int, what: str) -> bytes:
@@ -83,26 +83,28 @@ def runtime_exception(time: int, line: int, column: int, what: str) -> bytes:
         column: Column in the line, 1 for the first.
         what: Why.
     """
-    return _message(time, Kind.RUNTIME_EXCEPTION, _PLACE.pack(line, column) + _text(what))
+    return _message(time, MessageKind.RUNTIME_EXCEPTION, _PLACE.pack(line, column) + _text(what))
 
 
-def error_code(time: int, code: int, argument: int, level: Level, what: str) -> bytes:
+def error_code(time: int, code: int, argument: int, level: ErrorLevel, what: str) -> bytes:
     """An error by its number, without data."""
-    return _message(time, Kind.ERROR_CODE, _ERROR.pack(code, argument, level, 0, 0) + _text(what))
+    return _message(time, MessageKind.ERROR_CODE, _ERROR.pack(code, argument, level, 0, 0) + _text(what))
 
 
 def safety_mode(time: int, mode: int) -> bytes:
     """The safety mode has changed to this, RTDE's number."""
-    return _message(time, Kind.SAFETY_MODE, _SAFETY.pack(0, 0, mode & 0xFF, 0, 0))
+    return _message(time, MessageKind.SAFETY_MODE, _SAFETY.pack(0, 0, mode & 0xFF, 0, 0))
 
 
 def popup(time: int, title: str, what: str) -> bytes:
     """A window for the person at the robot, that waits for no answer."""
     head = _text(title, 255)
-    return _message(time, Kind.POPUP, _POPUP.pack(0, 0, False, False, False, len(head)) + head + _text(what))
+    return _message(
+        time, MessageKind.POPUP, _POPUP.pack(0, 0, False, False, False, len(head)) + head + _text(what)
+    )
 
 
-def _message(time: int, kind: Kind, body: bytes) -> bytes:
+def _message(time: int, kind: MessageKind, body: bytes) -> bytes:
     return _HEADER.pack(_HEADER.size + len(body), ROBOT_MESSAGE, time, SOURCE, kind) + body
 
 

@@ -5,9 +5,9 @@ from typing import Final
 
 from tvist_protocol.replies import Refused
 from tvist_server.gateways.ur import power
-from tvist_server.gateways.ur.base import Control
+from tvist_server.gateways.ur.base import ControllerAccess
 from tvist_server.gateways.ur.primary import messages
-from tvist_server.gateways.ur.primary.messages import Level
+from tvist_server.gateways.ur.primary.messages import ErrorLevel
 from tvist_server.gateways.ur.primary.scripts import LONGEST, Unit
 from tvist_server.gateways.ur.robot import UrRobot
 
@@ -29,7 +29,7 @@ class Orders:
         answer: Sends a robot message to the client, or to whoever hears for it.
     """
 
-    def __init__(self, robot: UrRobot, control: Control, answer: Callable[[bytes], None]) -> None:
+    def __init__(self, robot: UrRobot, control: ControllerAccess, answer: Callable[[bytes], None]) -> None:
         self._robot = robot
         self._control = control
         self._answer = answer
@@ -77,7 +77,7 @@ class Orders:
 
     def _read_only(self) -> None:
         stamp = messages.stamp(self._robot.latest)
-        self._answer(messages.error_code(stamp, messages.READ_ONLY, 0, Level.VIOLATION, READ_ONLY))
+        self._answer(messages.error_code(stamp, messages.READ_ONLY, 0, ErrorLevel.VIOLATION, READ_ONLY))
 
     def _except(self, unit: Unit, what: str) -> None:
         stamp = messages.stamp(self._robot.latest)

@@ -5,9 +5,9 @@ from typing import Final
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.stream import Event
 from tvist_server.gateways.ur import version
-from tvist_server.gateways.ur.base import Control, Send, Session
+from tvist_server.gateways.ur.base import ControllerAccess, PortSession, Send
 from tvist_server.gateways.ur.primary import messages
-from tvist_server.gateways.ur.primary.messages import Level
+from tvist_server.gateways.ur.primary.messages import ErrorLevel
 from tvist_server.gateways.ur.primary.orders import Orders
 from tvist_server.gateways.ur.primary.packages import robot_state
 from tvist_server.gateways.ur.primary.scripts import Intake
@@ -17,7 +17,7 @@ EVERY: Final = 50
 """Ticks between two robot states: 10 Hz."""
 
 
-class PrimarySession(Session):
+class PrimarySession(PortSession):
     """Tells a client of the robot's state and of what happens, and hears its commands. The secondary is the same.
 
     Args:
@@ -27,7 +27,9 @@ class PrimarySession(Session):
         read_only: Whether what the client sends is declined.
     """
 
-    def __init__(self, robot: UrRobot, control: Control, send: Send, *, read_only: bool = False) -> None:
+    def __init__(
+        self, robot: UrRobot, control: ControllerAccess, send: Send, *, read_only: bool = False
+    ) -> None:
         self._robot = robot
         self._send = send
         self._read_only = read_only
@@ -83,6 +85,6 @@ class PrimarySession(Session):
         stamp = messages.stamp(self._robot.latest)
         why = event.why or ""
         if event.kind == "protective_stop":
-            self._send(messages.error_code(stamp, messages.PROTECTIVE_STOP, 0, Level.WARNING, why))
+            self._send(messages.error_code(stamp, messages.PROTECTIVE_STOP, 0, ErrorLevel.WARNING, why))
         elif event.kind in {"warning", "safety_stop"}:
             self._send(messages.text(stamp, why))

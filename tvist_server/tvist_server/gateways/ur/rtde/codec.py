@@ -11,7 +11,7 @@ TEXT = 255
 """Longest text in a message [bytes]."""
 
 
-class Kind(IntEnum):
+class PackageKind(IntEnum):
     """What a package is, by its letter."""
 
     REQUEST_PROTOCOL_VERSION = ord("V")
@@ -24,7 +24,7 @@ class Kind(IntEnum):
     PAUSE = ord("P")
 
 
-class Level(IntEnum):
+class TextLevel(IntEnum):
     """How grave a text message is."""
 
     EXCEPTION = 0
@@ -61,12 +61,12 @@ class PackageReader:
         return packages
 
 
-def package(kind: Kind, payload: bytes = b"") -> bytes:
+def package(kind: PackageKind, payload: bytes = b"") -> bytes:
     """A package; its payload must fit."""
     return HEADER.pack(HEADER.size + len(payload), kind) + payload
 
 
-def words(kind: Kind, head: bytes, names: Iterable[str]) -> bytes:
+def words(kind: PackageKind, head: bytes, names: Iterable[str]) -> bytes:
     """A package of words between commas, cut behind the last one that fits: its size has two bytes and no more."""
     text = ",".join(names).encode()
     room = LARGEST - HEADER.size - len(head)
@@ -75,12 +75,13 @@ def words(kind: Kind, head: bytes, names: Iterable[str]) -> bytes:
     return package(kind, head + text)
 
 
-def text_message(version: int, level: Level, text: str, source: str) -> bytes:
+def text_message(version: int, level: TextLevel, text: str, source: str) -> bytes:
     """A message to the client; version 1 has neither lengths nor source."""
     message = text.encode()[:TEXT]
     if version == 1:
-        return package(Kind.TEXT_MESSAGE, bytes([level]) + message)
+        return package(PackageKind.TEXT_MESSAGE, bytes([level]) + message)
     named = source.encode()[:TEXT]
     return package(
-        Kind.TEXT_MESSAGE, bytes([len(message)]) + message + bytes([len(named)]) + named + bytes([level])
+        PackageKind.TEXT_MESSAGE,
+        bytes([len(message)]) + message + bytes([len(named)]) + named + bytes([level]),
     )

@@ -5,7 +5,7 @@ from operator import itemgetter
 from struct import Struct
 
 from tvist_controller.instruments.snapshot import Snapshot
-from tvist_server.gateways.ur.rtde.codec import HEADER, LARGEST, Kind
+from tvist_server.gateways.ur.rtde.codec import HEADER, LARGEST, PackageKind
 from tvist_server.gateways.ur.rtde.inputs import INPUTS
 from tvist_server.gateways.ur.rtde.outputs import OUTPUTS, READERS
 from tvist_server.gateways.ur.rtde.registers import EncodedRegisters
@@ -81,7 +81,7 @@ class OutputRecipe:
         package = encoded.packages.get(key)
         if package is None:
             size = HEADER.size + len(head) + self._size
-            package = HEADER.pack(size, Kind.DATA) + head + b"".join(self._fields(encoded))
+            package = HEADER.pack(size, PackageKind.DATA) + head + b"".join(self._fields(encoded))
             encoded.packages[key] = package
         return package
 

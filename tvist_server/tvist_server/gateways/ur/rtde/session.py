@@ -10,9 +10,16 @@ from struct import Struct
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_server.gateways.ur import version
-from tvist_server.gateways.ur.base import Control, Send, Session
+from tvist_server.gateways.ur.base import ControllerAccess, PortSession, Send
 from tvist_server.gateways.ur.robot import UrRobot
-from tvist_server.gateways.ur.rtde.codec import Kind, Level, PackageReader, package, text_message, words
+from tvist_server.gateways.ur.rtde.codec import (
+    PackageKind,
+    PackageReader,
+    TextLevel,
+    package,
+    text_message,
+    words,
+)
 from tvist_server.gateways.ur.rtde.inputs import INPUTS, NEED_CONTROL
 from tvist_server.gateways.ur.rtde.recipes import InputRecipe, OutputRecipe, split
 from tvist_server.gateways.ur.rtde.writing import InputWriter
@@ -32,18 +39,18 @@ _VERSION = Struct(">4I")
 _TRUE, _FALSE = b"\x01", b"\x00"
 
 
-class RtdeSession(Session):
+class RtdeSession(PortSession):
     """Answers a client and samples for it.
 
     Args:
-        robot: What the doors of a robot share.
+        robot: What the interfaces of a robot share.
         control: The way to its controller.
         send: Sends an answer.
     """
 
     client_begins = True
 
-    def __init__(self, robot: UrRobot, control: Control, send: Send) -> None:
+    def __init__(self, robot: UrRobot, control: ControllerAccess, send: Send) -> None:
         self._robot = robot
         self._control = control
         self._send = send
@@ -59,14 +66,14 @@ class RtdeSession(Session):
         self._next: int | None = None
         self._said: set[str] = set()
         self._handlers: dict[int, Callable[[bytes], None]] = {
-            Kind.REQUEST_PROTOCOL_VERSION: self._request_version,
-            Kind.GET_URCONTROL_VERSION: self._tell_version,
-            Kind.TEXT_MESSAGE: self._take_text,
-            Kind.DATA: self._take_data,
-            Kind.SETUP_OUTPUTS: self._set_up_outputs,
-            Kind.SETUP_INPUTS: self._set_up_inputs,
-            Kind.START: self._start,
-            Kind.PAUSE: self._pause,
+            PackageKind.REQUEST_PROTOCOL_VERSION: self._request_version,
+            PackageKind.GET_URCONTROL_VERSION: self._tell_version,
+            PackageKind.TEXT_MESSAGE: self._take_text,
+            PackageKind.DATA: self._take_data,
+            PackageKind.SETUP_OUTPUTS: self._set_up_outputs,
+            PackageKind.SETUP_INPUTS: self._set_up_inputs,
+            PackageKind.START: self._start,
+            PackageKind.PAUSE: self._pause,
         }
 
     @property
@@ -108,11 +115,11 @@ class RtdeSession(Session):
         if accepted:
             self._version = wanted
             self._head = b"" if wanted == 1 else OUTPUT_ID
-        self._send(package(Kind.REQUEST_PROTOCOL_VERSION, _TRUE if accepted else _FALSE))
+        self._send(package(PackageKind.REQUEST_PROTOCOL_VERSION, _TRUE if accepted else _FALSE))
 
     def _tell_version(self, _payload: bytes) -> None:
         numbers = version.MAJOR, version.MINOR, version.BUGFIX, version.BUILD
-        self._send(package(Kind.GET_URCONTROL_VERSION, _VERSION.pack(*numbers)))
+        self._send(package(PackageKind.GET_URCONTROL_VERSION, _VERSION.pack(*numbers)))
 
     def _set_up_outputs(self, payload: bytes) -> None:
         """A new output recipe replaces the old one; one that is not valid leaves none."""
@@ -127,7 +134,7 @@ class RtdeSession(Session):
         self._every, self._next = ticks_between(frequency), None
         number = OUTPUT_ID if recipe.valid else _FALSE
         head = b"" if self._version == 1 else number
-        self._send(words(Kind.SETUP_OUTPUTS, head, recipe.words))
+        self._send(words(PackageKind.SETUP_OUTPUTS, head, recipe.words))
 
     def _set_up_inputs(self, payload: bytes) -> None:
         """A further input recipe; one that is not valid has id 0 and takes nothing."""
@@ -139,7 +146,7 @@ class RtdeSession(Session):
             self._robot.inputs.take(names, self)
             self._inputs.append(InputRecipe(names))
             number = len(self._inputs)
-        self._send(words(Kind.SETUP_INPUTS, bytes([number]), types))
+        self._send(words(PackageKind.SETUP_INPUTS, bytes([number]), types))
 
     def _input_word(self, name: str) -> str:
         """Type of an input variable, or why it cannot be had."""
@@ -162,11 +169,11 @@ class RtdeSession(Session):
         """Samples begin; not after output variables that were wrong."""
         self._started, self._next = not self._outputs_wrong, None
         self._said.clear()
-        self._send(package(Kind.START, _TRUE if self._started else _FALSE))
+        self._send(package(PackageKind.START, _TRUE if self._started else _FALSE))
 
     def _pause(self, _payload: bytes) -> None:
         self._started = False
-        self._send(package(Kind.PAUSE, _TRUE))
+        self._send(package(PackageKind.PAUSE, _TRUE))
 
     def _take_text(self, _payload: bytes) -> None:
         """What clients say is for a person's log; there is none to show it in."""
@@ -175,7 +182,7 @@ class RtdeSession(Session):
         """Tell the client, once; never before the start, where it would be taken for the answer to a set-up."""
         if self._started and sentence not in self._said and len(self._said) < SENTENCES:
             self._said.add(sentence)
-            self._send(text_message(self._version, Level.WARNING, sentence, "RTDE"))
+            self._send(text_message(self._version, TextLevel.WARNING, sentence, "RTDE"))
 
 
 def ticks_between(frequency: float) -> int:

@@ -7,7 +7,7 @@ from tvist_controller.peripherals import analog_share
 from tvist_protocol.commands import Command, SetSpeed
 from tvist_protocol.io import Bank, Io, SetIo, SetRegisters
 from tvist_protocol.replies import Refused, Reply
-from tvist_server.gateways.ur.base import Control
+from tvist_server.gateways.ur.base import ControllerAccess
 from tvist_server.gateways.ur.robot import UrRobot
 from tvist_server.gateways.ur.rtde.inputs import DIGITAL, REGISTERS
 from tvist_server.gateways.ur.rtde.recipes import Value
@@ -32,7 +32,7 @@ class InputWriter:
         complain: Takes sentences for the client.
     """
 
-    def __init__(self, robot: UrRobot, control: Control, complain: Complain) -> None:
+    def __init__(self, robot: UrRobot, control: ControllerAccess, complain: Complain) -> None:
         self._robot = robot
         self._control = control
         self._complain = complain

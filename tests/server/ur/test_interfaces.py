@@ -1,4 +1,4 @@
-"""The doors' sockets: who comes in, who is slow, who has gone."""
+"""The interfaces' sockets: who comes in, who is slow, who has gone."""
 
 import asyncio
 import contextlib
@@ -14,7 +14,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import TakeControl
 from tvist_server.gateways.base import GatewayError
-from tvist_server.gateways.ur.doors import UrDoors
+from tvist_server.gateways.ur.interfaces import UrInterfaces
 
 from .desks import PATIENCE, Desk, connect, lines, until
 
@@ -24,14 +24,14 @@ async def test_every_door_speaks_its_language(desk):
     reader, writer = await connect(desk, "dashboard")
     assert (await reader.readline()).startswith(b"Connected")
     assert await lines(reader, writer, "robotmode") == ["Robotmode: RUNNING"]
-    for door in ("primary", "secondary", "primary_read_only", "secondary_read_only"):
-        reader, _ = await connect(desk, door)
+    for interface in ("primary", "secondary", "primary_read_only", "secondary_read_only"):
+        reader, _ = await connect(desk, interface)
         head = await reader.readexactly(5)
         assert head[4] == 20
-    for door in ("realtime", "realtime_read_only"):
-        before = len(desk.doors._connections)
-        reader, _ = await connect(desk, door)
-        await until(lambda before=before: len(desk.doors._connections) > before)
+    for interface in ("realtime", "realtime_read_only"):
+        before = len(desk.interfaces._connections)
+        reader, _ = await connect(desk, interface)
+        await until(lambda before=before: len(desk.interfaces._connections) > before)
         await desk.tick()
         package = await reader.readexactly(1220)
         assert struct.unpack_from(">id", package) == (1220, 40.0 + desk.controller.now)
@@ -45,7 +45,7 @@ async def test_a_client_that_stops_reading_loses_samples_and_nobody_else_does(de
     quick, _ = await connect(desk, "realtime")
     _, slow = await connect(desk, "realtime")
     slow.transport.pause_reading()
-    await until(lambda: len(desk.doors._connections) == 2)
+    await until(lambda: len(desk.interfaces._connections) == 2)
     stamps, ticks = [], 1500
 
     async def read():
@@ -61,7 +61,7 @@ async def test_a_client_that_stops_reading_loses_samples_and_nobody_else_does(de
     await reading
     first = desk.controller.tick_number - ticks + 1
     assert stamps == [40.0 + tick * 0.002 for tick in range(first, first + ticks)]
-    dropped = sorted(connection.dropped for connection in desk.doors._connections)
+    dropped = sorted(connection.dropped for connection in desk.interfaces._connections)
     assert dropped[0] == 0
     # What the system holds of packages of 1220 bytes, on both sides, and one that waits.
     assert dropped[1] > 0
@@ -92,11 +92,11 @@ async def test_a_door_declines_in_its_own_way_where_somebody_else_has_control(de
 async def test_a_fault_of_ours_ends_one_connection_and_no_other(desk, monkeypatch, caplog):
     await desk.tick()
     (broken, _), (whole, _) = [await connect(desk, "realtime") for _ in range(2)]
-    await until(lambda: len(desk.doors._connections) == 2)
-    first = next(iter(desk.doors._connections))
+    await until(lambda: len(desk.interfaces._connections) == 2)
+    first = next(iter(desk.interfaces._connections))
     monkeypatch.setattr(first.session, "sample", lambda _: 1 / 0)
     await desk.tick(3)
-    await until(lambda: len(desk.doors._connections) == 1)
+    await until(lambda: len(desk.interfaces._connections) == 1)
     got = []
     for reader in (broken, whole):
         try:
@@ -108,11 +108,11 @@ async def test_a_fault_of_ours_ends_one_connection_and_no_other(desk, monkeypatc
 
 
 async def test_a_port_in_use_is_said_with_what_to_do(desk):
-    ports = {"rtde": desk.doors.ports["rtde"]}
+    ports = {"rtde": desk.interfaces.ports["rtde"]}
     with pytest.raises(GatewayError, match=rf"port {ports['rtde']} for rtde: .*--ur-port"):
-        UrDoors(desk, UR5E, "ur5e", "127.0.0.1", ports)
+        UrInterfaces(desk, UR5E, "ur5e", "127.0.0.1", ports)
     with pytest.raises(GatewayError, match="does not have this address"):
-        UrDoors(desk, UR5E, "ur5e", "203.0.113.7", {"rtde": 0})
+        UrInterfaces(desk, UR5E, "ur5e", "203.0.113.7", {"rtde": 0})
 
 
 async def test_events_reach_the_clients_of_the_primary_interface(desk):
@@ -128,11 +128,11 @@ async def test_events_reach_the_clients_of_the_primary_interface(desk):
 
 async def test_in_lockstep_nothing_is_dropped():
     desk = Desk()
-    desk.doors = UrDoors(desk, UR5E, "ur5e", "127.0.0.1", {"realtime": 0}, lockstep=True)
-    await desk.doors.open()
+    desk.interfaces = UrInterfaces(desk, UR5E, "ur5e", "127.0.0.1", {"realtime": 0}, lockstep=True)
+    await desk.interfaces.open()
     await desk.tick()
     reader, writer = await connect(desk, "realtime")
-    await until(lambda: desk.doors._connections)
+    await until(lambda: desk.interfaces._connections)
     ticks, first = 1000, desk.controller.tick_number + 1
     writer.transport.pause_reading()
     await asyncio.to_thread(lambda: [desk.host.tick() for _ in range(ticks)])
@@ -141,29 +141,29 @@ async def test_in_lockstep_nothing_is_dropped():
     stamps = [struct.unpack_from(">id", package)[1] for package in packages]
     assert stamps == [40.0 + tick * 0.002 for tick in range(first, first + ticks)]
     writer.close()
-    await desk.doors.shut()
-    await until(lambda: not desk.doors._connections)
-    desk.doors.close()
+    await desk.interfaces.shut()
+    await until(lambda: not desk.interfaces._connections)
+    desk.interfaces.close()
 
 
 @pytest.mark.parametrize("lockstep", [False, True])
 async def test_what_everybody_is_told_reaches_who_is_far_behind_in_lockstep_alone(lockstep):
     desk = Desk()
-    desk.doors = UrDoors(desk, UR5E, "ur5e", "127.0.0.1", {"primary": 0}, lockstep=lockstep)
-    await desk.doors.open()
+    desk.interfaces = UrInterfaces(desk, UR5E, "ur5e", "127.0.0.1", {"primary": 0}, lockstep=lockstep)
+    await desk.interfaces.open()
     reader, writer = await connect(desk, "primary")
-    await until(lambda: desk.doors._connections)
-    (connection,) = desk.doors._connections
+    await until(lambda: desk.interfaces._connections)
+    (connection,) = desk.interfaces._connections
     writer.transport.pause_reading()
     connection._transport.pause_reading()
     connection._transport.write(bytes(5_000_000))
-    desk.doors.robot.tell(b"news")
+    desk.interfaces.robot.tell(b"news")
     connection.close()
     writer.transport.resume_reading()
     assert (await reader.read()).endswith(b"news") == lockstep
-    await until(lambda: not desk.doors._connections)
-    await desk.doors.shut()
-    desk.doors.close()
+    await until(lambda: not desk.interfaces._connections)
+    await desk.interfaces.shut()
+    desk.interfaces.close()
     writer.close()
 
 
@@ -174,14 +174,14 @@ async def test_a_program_goes_on_without_its_client_and_control_ends_with_it(des
     answers = await lines(reader, writer, "load Q2.urp", "play")
     assert answers[1] == "Starting program"
     writer.close()
-    await until(lambda: not desk.doors._connections)
+    await until(lambda: not desk.interfaces._connections)
     await desk.tick(100)
-    assert desk.doors.robot.programs.playing
+    assert desk.interfaces.robot.programs.playing
     assert desk.holder() == "ur-127.0.0.1"
     await desk.tick(1200)
     await until(lambda: desk.holder() is None)
-    assert not desk.doors.robot.programs.playing
-    target = desk.doors.robot.latest.target_q
+    assert not desk.interfaces.robot.programs.playing
+    target = desk.interfaces.robot.latest.target_q
     assert max(abs(a - b) for a, b in zip(target, UR5E.poses["Q2"], strict=True)) < 1e-6
 
 
@@ -215,7 +215,7 @@ async def test_a_client_that_asks_and_does_not_read_is_not_asked_for_more(desk):
     reader, writer = await connect(desk, "dashboard")
     await reader.readline()
     reader._transport.pause_reading()
-    (connection,) = desk.doors._connections
+    (connection,) = desk.interfaces._connections
     writer.write(b"\n" * 60_000)
     await until(lambda: not connection._transport.is_reading())
     assert connection._transport.get_write_buffer_size() < 600_000
@@ -234,7 +234,7 @@ async def test_scripts_by_the_thousand_cut_nobody_off_who_hears_of_them(desk):
     await desk.tick()
     listener, _ = await connect(desk, "primary")
     _, writer = await connect(desk, "realtime")
-    await until(lambda: len(desk.doors._connections) == 2)
+    await until(lambda: len(desk.interfaces._connections) == 2)
     writer.write(b"x\n" * 30_000)
     text = b"program_not_run"
     heard = 0
@@ -242,7 +242,7 @@ async def test_scripts_by_the_thousand_cut_nobody_off_who_hears_of_them(desk):
         data = await asyncio.wait_for(listener.read(1 << 16), PATIENCE)
         assert data
         heard += data.count(text)
-    await until(lambda: len(desk.doors._connections) == 2)
+    await until(lambda: len(desk.interfaces._connections) == 2)
 
 
 async def test_no_more_commands_of_a_client_wait_than_a_tick_can_do(desk, monkeypatch):
@@ -265,31 +265,31 @@ async def test_no_more_commands_of_a_client_wait_than_a_tick_can_do(desk, monkey
 
 async def test_who_comes_first_finds_a_robot():
     desk = Desk()
-    desk.doors = UrDoors(desk, UR5E, "ur5e", "127.0.0.1", {"dashboard": 0})
-    waiting = asyncio.create_task(desk.doors.open())
+    desk.interfaces = UrInterfaces(desk, UR5E, "ur5e", "127.0.0.1", {"dashboard": 0})
+    waiting = asyncio.create_task(desk.interfaces.open())
     await asyncio.sleep(0)
     assert not waiting.done()
     await desk.tick()
     await waiting
-    assert desk.doors.robot.latest.state.tick == 1
-    await desk.doors.shut()
-    desk.doors.close()
+    assert desk.interfaces.robot.latest.state.tick == 1
+    await desk.interfaces.shut()
+    desk.interfaces.close()
 
 
 async def test_hosts_that_have_gone_are_forgotten(desk):
     await desk.tick()
     for last in range(2, 12):
         reader, writer = await asyncio.open_connection(
-            "127.0.0.1", desk.doors.ports["dashboard"], local_addr=(f"127.0.0.{last}", 0)
+            "127.0.0.1", desk.interfaces.ports["dashboard"], local_addr=(f"127.0.0.{last}", 0)
         )
         await reader.readline()
         assert await lines(reader, writer, "power off") == ["Powering off"]
         assert desk.holder() == f"ur-127.0.0.{last}"
         writer.close()
         await until(lambda: desk.holder() is None)
-    await until(lambda: not desk.doors._connections)
+    await until(lambda: not desk.interfaces._connections)
     await until(
-        lambda: gc.collect() >= 0 and not desk.doors._leases
+        lambda: gc.collect() >= 0 and not desk.interfaces._leases
     )  # the answer to the last release is on its way
 
 
@@ -305,7 +305,7 @@ async def test_a_fault_of_ours_at_an_answer_ends_that_connection(desk, monkeypat
     await desk.tick()
     reader, writer = await connect(desk, "dashboard")
     await reader.readline()
-    (connection,) = desk.doors._connections
+    (connection,) = desk.interfaces._connections
     monkeypatch.setattr(connection.session, "_say", lambda _: 1 / 0)
     writer.write(b"power off\n")
     with contextlib.suppress(ConnectionError):
@@ -325,7 +325,7 @@ async def test_a_tick_leaves_nothing_for_the_collector(desk):
     gc.disable()
     try:
         await desk.tick()
-        gone = weakref.ref(desk.doors.robot.latest)
+        gone = weakref.ref(desk.interfaces.robot.latest)
         await desk.tick(2)
         assert gone() is None
     finally:
@@ -334,8 +334,8 @@ async def test_a_tick_leaves_nothing_for_the_collector(desk):
 
 async def test_a_client_whose_machine_lost_power_is_found_out(desk):
     await connect(desk, "dashboard")
-    await until(lambda: desk.doors._connections)
-    (connection,) = desk.doors._connections
+    await until(lambda: desk.interfaces._connections)
+    (connection,) = desk.interfaces._connections
     found = connection._transport.get_extra_info("socket")
     assert found.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
     idle = found.getsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE)

@@ -5,7 +5,7 @@ import threading
 from tvist_protocol.codec import decode_event, decode_state
 from tvist_protocol.stream import Event
 from tvist_server.courier import Courier
-from tvist_server.outlet import MAX_WAITING, Outlet
+from tvist_server.publisher import MAX_WAITING, Publisher
 
 from .robots import Robot
 
@@ -29,14 +29,14 @@ class NotingGateway:
         self.news.set()
 
 
-def outlet(*, lossless=False):
-    gateway, made = NotingGateway(), Outlet(lossless=lossless)
+def publisher(*, lossless=False):
+    gateway, made = NotingGateway(), Publisher(lossless=lossless)
     made.open([gateway])
     return gateway, made
 
 
 def test_messages_and_answers_go_out_in_their_order():
-    gateway, made = outlet()
+    gateway, made = publisher()
     made.event(Event(tick=1, kind="warning"))
     made.state(STATE)
     made.answer(lambda: gateway.published.append(("reply", None)))
@@ -48,7 +48,7 @@ def test_messages_and_answers_go_out_in_their_order():
 
 
 def test_in_real_time_states_without_room_are_dropped_and_counted_and_events_are_not():
-    gateway, made = outlet()
+    gateway, made = publisher()
     for _ in range(MAX_WAITING + 10):
         made.state(STATE)
     made.event(Event(tick=1, kind="warning"))
@@ -58,7 +58,7 @@ def test_in_real_time_states_without_room_are_dropped_and_counted_and_events_are
 
 
 def test_in_lockstep_the_robot_waits_for_room_and_nothing_is_lost():
-    gateway, made = outlet(lossless=True)
+    gateway, made = publisher(lossless=True)
     courier = Courier([made.hand_on])
     made.open([gateway], courier.wake)
     gateway.free.clear()
@@ -75,7 +75,7 @@ def test_in_lockstep_the_robot_waits_for_room_and_nothing_is_lost():
 
 
 def test_whoever_waits_for_room_goes_on_when_the_robot_is_about_to_end():
-    _, made = outlet(lossless=True)
+    _, made = publisher(lossless=True)
     robot = threading.Thread(target=lambda: [made.state(STATE) for _ in range(MAX_WAITING + 1)])
     robot.start()
     made.hurry()
@@ -85,7 +85,7 @@ def test_whoever_waits_for_room_goes_on_when_the_robot_is_about_to_end():
 
 
 def test_one_courier_empties_the_outlets_of_several_robots():
-    pairs = [outlet() for _ in range(3)]
+    pairs = [publisher() for _ in range(3)]
     courier = Courier([made.hand_on for _, made in pairs])
     courier.start()
     for _, made in pairs:
@@ -97,7 +97,7 @@ def test_one_courier_empties_the_outlets_of_several_robots():
 
 
 def test_a_gateway_that_fails_is_logged_and_the_next_message_goes_out(caplog):
-    gateway, made = outlet()
+    gateway, made = publisher()
     made.answer(lambda: 1 / 0)
     made.state(STATE)
     made.hand_on()
@@ -106,7 +106,7 @@ def test_a_gateway_that_fails_is_logged_and_the_next_message_goes_out(caplog):
 
 
 def test_the_state_and_io_are_told_again_to_those_who_come_late():
-    gateway, made = outlet()
+    gateway, made = publisher()
     made.repeat(STATE, IO)
     made.hand_on()
     assert [topic for topic, _ in gateway.published] == ["io", "state"]

@@ -34,7 +34,7 @@ TOPICS: Mapping[type[Message], Topic] = {
 }
 
 
-class Outlet(Sink):
+class Publisher(Sink):
     """A sink that others empty.
 
     Args:

@@ -14,8 +14,8 @@ CLIENTS = 10
 ADDRESS = "127.0.0.1"
 
 
-async def ur_doors(seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Watch a robot without clients at its doors, and with ten that read every tick.
+async def ur_interfaces(seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
+    """Watch a robot without clients at its interfaces, and with ten that read every tick.
 
     Args:
         seconds: How long, each time.
@@ -23,11 +23,11 @@ async def ur_doors(seconds: float, tell: Callable[[str], None]) -> dict[str, Any
     """
     port = str(free_port())
     options = ["--ur-address", ADDRESS]
-    for door in UrPorts().open():
-        options += ["--ur-port", f"{door}={port if door == 'rtde' else 'off'}"]
+    for interface in UrPorts().open():
+        options += ["--ur-port", f"{interface}={port if interface == 'rtde' else 'off'}"]
     async with served(options) as server:
         await server.robot.state()
-        tell(f"a robot whose doors are open, without clients, for {seconds:g} s")
+        tell(f"a robot whose interfaces are open, without clients, for {seconds:g} s")
         alone, idle = await punctuality(server, seconds)
         tell(f"{CLIENTS} RTDE clients for {seconds:g} s")
         async with readers("rtde_clients", ADDRESS, port, str(CLIENTS)) as said:

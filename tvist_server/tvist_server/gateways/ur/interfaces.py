@@ -1,4 +1,4 @@
-"""The doors of one robot: a listening socket each, and everybody who came in."""
+"""The interfaces of one robot: a listening socket each, and the clients connected to it."""
 
 import asyncio
 import contextlib
@@ -18,7 +18,7 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.io import Io
 from tvist_protocol.stream import Event, State
 from tvist_server.gateways.base import Desk, Gateway, GatewayError, Message
-from tvist_server.gateways.ur.base import Send, Session
+from tvist_server.gateways.ur.base import PortSession, Send
 from tvist_server.gateways.ur.connection import Connection
 from tvist_server.gateways.ur.dashboard.session import DashboardSession
 from tvist_server.gateways.ur.lease import ALIVE, ConnectionControl, HostLease
@@ -28,7 +28,7 @@ from tvist_server.gateways.ur.primary.session import PrimarySession
 from tvist_server.gateways.ur.realtime import RealtimeSession
 from tvist_server.gateways.ur.robot import UrRobot
 from tvist_server.gateways.ur.rtde.session import RtdeSession
-from tvist_server.ur_ports import Door
+from tvist_server.ur_ports import InterfaceName
 
 log = logging.getLogger(__name__)
 
@@ -39,7 +39,7 @@ PROBES = (10, 5, 3)
 it is gone, and its control with it: its machine may have lost power or network."""
 FIRST = 1000
 """Ticks that the first one may take."""
-MOST_PENDING = 250
+MAX_PENDING = 250
 """States that may wait for this thread: half a second."""
 LEAD = 20
 """Largest lead in lockstep: the further a step runs ahead of what clients are told, the later their answers come."""
@@ -47,15 +47,15 @@ PAUSE = 0.02
 """Time between two looks for room, in lockstep [s]."""
 
 
-class UrDoors(Gateway):
-    """A robot's doors. They are bound at once, and open with `open`.
+class UrInterfaces(Gateway):
+    """A robot's interfaces. They are bound at once, and open with `open`.
 
     Args:
         desk: The robot.
         description: What it is.
         name: On the network.
         address: IP address to listen at.
-        ports: Port by door; a door without one stays shut.
+        ports: Port by interface; an interface without one stays shut.
         lockstep: Whether a client lets time pass: then no state may be lost.
 
     Raises:
@@ -68,7 +68,7 @@ class UrDoors(Gateway):
         description: RobotDescription,
         name: str,
         address: str,
-        ports: Mapping[Door, int],
+        ports: Mapping[InterfaceName, int],
         *,
         lockstep: bool = False,
     ) -> None:
@@ -82,9 +82,9 @@ class UrDoors(Gateway):
         self._instruments = Instruments(description)
         self._io: Io | None = None
         self._early = deque[State](maxlen=FIRST)
-        """States before the doors open: temperatures and energies begin with the first tick."""
+        """States before the interfaces open: temperatures and energies begin with the first tick."""
         self._connections: set[Connection] = set()
-        """Connections in their `Places` while the doors are open."""
+        """Connections in their `Places` while the interfaces are open."""
         self._leases = WeakValueDictionary[str, HostLease]()
         """By host, as long as one of its connections lives."""
         self._lockstep = lockstep
@@ -94,18 +94,18 @@ class UrDoors(Gateway):
         self._loop: asyncio.AbstractEventLoop | None = None
         self._servers: list[asyncio.Server] = []
         self._alive: asyncio.Task[None] | None = None
-        self._sockets: dict[Door, socket.socket] = {}
+        self._sockets: dict[InterfaceName, socket.socket] = {}
         try:
-            for door, port in ports.items():
-                self._sockets[door] = _listen(address, port, door)
+            for interface, port in ports.items():
+                self._sockets[interface] = _listen(address, port, interface)
         except BaseException:
             self._close_sockets()
             raise
 
     @property
-    def ports(self) -> dict[Door, int]:
-        """Port by door, as they are."""
-        return {door: bound.getsockname()[1] for door, bound in self._sockets.items()}
+    def ports(self) -> dict[InterfaceName, int]:
+        """Port by interface, as they are."""
+        return {interface: bound.getsockname()[1] for interface, bound in self._sockets.items()}
 
     async def _first_tick(self) -> None:
         """Wait for it, where time passes by itself: clients that come before would find no controller."""
@@ -124,12 +124,12 @@ class UrDoors(Gateway):
             self.robot.programs.io(self._io)
         while self._early:
             self._see(self._early.popleft())
-        for door, bound in self._sockets.items():
+        for interface, bound in self._sockets.items():
             self._servers.append(
                 await self._loop.create_server(
                     partial(
                         Connection,
-                        partial(_session, door, self.robot),
+                        partial(_session, interface, self.robot),
                         self._lease,
                         places,
                         self._coming_and_going,
@@ -141,7 +141,7 @@ class UrDoors(Gateway):
         self._alive = asyncio.create_task(self._keep_alive())
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  not MessagePack here
-        """Hand a message over to the doors' thread."""
+        """Hand a message over to the interfaces' thread."""
         if self._loop is None:  # nobody is in
             if isinstance(message, Io):
                 self._io = message
@@ -160,7 +160,7 @@ class UrDoors(Gateway):
 
     def _has_room(self) -> bool:
         """Whether one more state may wait; in lockstep there is room in the end."""
-        most = LEAD if self._lockstep else MOST_PENDING
+        most = LEAD if self._lockstep else MAX_PENDING
         while self._handed - self._taken >= most:
             if not self._lockstep or self._loop is None:
                 return False
@@ -187,7 +187,7 @@ class UrDoors(Gateway):
         self._loop = None
         self._close_sockets()
 
-    # ------------------------------------------------------------------ in the doors' thread
+    # ------------------------------------------------------------------ in the interfaces' thread
 
     def _on_state(self, state: State) -> None:
         self._taken += 1
@@ -241,19 +241,19 @@ class UrDoors(Gateway):
         self._sockets.clear()
 
 
-def _session(door: Door, robot: UrRobot, control: ConnectionControl, send: Send) -> Session:
-    match door:
+def _session(interface: InterfaceName, robot: UrRobot, control: ConnectionControl, send: Send) -> PortSession:
+    match interface:
         case "dashboard":
             return DashboardSession(robot, control, send)
         case "rtde":
             return RtdeSession(robot, control, send)
         case "realtime" | "realtime_read_only":
-            return RealtimeSession(robot, control, send, read_only=door == "realtime_read_only")
+            return RealtimeSession(robot, control, send, read_only=interface == "realtime_read_only")
         case _:
-            return PrimarySession(robot, control, send, read_only=door.endswith("read_only"))
+            return PrimarySession(robot, control, send, read_only=interface.endswith("read_only"))
 
 
-def _listen(address: str, port: int, door: Door) -> socket.socket:
+def _listen(address: str, port: int, interface: InterfaceName) -> socket.socket:
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     bound = socket.socket(family, socket.SOCK_STREAM)
     try:
@@ -269,7 +269,9 @@ def _listen(address: str, port: int, door: Door) -> socket.socket:
         bound.listen(32)
     except OSError as error:
         bound.close()
-        raise GatewayError(f"cannot listen on {address} port {port} for {door}: {_reason(error)}") from error
+        raise GatewayError(
+            f"cannot listen on {address} port {port} for {interface}: {_reason(error)}"
+        ) from error
     bound.setblocking(False)
     return bound
 

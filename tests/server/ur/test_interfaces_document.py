@@ -1,4 +1,4 @@
-"""The page about the doors says what they do."""
+"""The page about the interfaces says what they do."""
 
 import re
 from pathlib import Path
@@ -11,7 +11,7 @@ from tvist_server.gateways.ur.realtime import LAYOUT
 
 from .decoders import parts, split
 
-PAGE = (Path(__file__).parents[3] / "docs/reference/ur-doors.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs/reference/ur-interfaces.md").read_text(encoding="utf-8")
 ROWS = [
     [cell.strip() for cell in line.strip("|").split("|")] for line in PAGE.splitlines() if line[:1] == "|"
 ]

@@ -1,4 +1,4 @@
-"""Who gets a place at the doors, over real sockets: those who say nothing keep nobody out."""
+"""Who gets a place at the interfaces, over real sockets: those who say nothing keep nobody out."""
 
 import asyncio
 import struct
@@ -57,25 +57,25 @@ async def dashboard(desk):
     return reader, writer
 
 
-async def readers(desk, count, door="realtime"):
+async def readers(desk, count, interface="realtime"):
     """So many clients that only read."""
-    before = len(desk.doors._connections)
-    found = [(await connect(desk, door))[0] for _ in range(count)]
-    await until(lambda: len(desk.doors._connections) == before + count)
+    before = len(desk.interfaces._connections)
+    found = [(await connect(desk, interface))[0] for _ in range(count)]
+    await until(lambda: len(desk.interfaces._connections) == before + count)
     return found
 
 
-async def silent(desk, count=MOST, door="dashboard"):
+async def silent(desk, count=MOST, interface="dashboard"):
     """So many clients that say nothing; they have come in, and some have had to go again."""
-    found = [(await connect(desk, door))[0] for _ in range(count)]
-    await until(lambda: all(connection.session for connection in desk.doors._connections))
+    found = [(await connect(desk, interface))[0] for _ in range(count)]
+    await until(lambda: all(connection.session for connection in desk.interfaces._connections))
     return found
 
 
-@pytest.mark.parametrize("door", ["dashboard", "rtde"])
-async def test_clients_that_say_nothing_lock_nobody_out(door, desk):
+@pytest.mark.parametrize("interface", ["dashboard", "rtde"])
+async def test_clients_that_say_nothing_lock_nobody_out(interface, desk):
     await desk.tick()
-    await silent(desk, door=door)
+    await silent(desk, interface=interface)
     await dashboard(desk)
     await rtde(desk)
     reader, _ = await connect(desk, "primary")
@@ -89,11 +89,11 @@ async def test_who_says_nothing_for_half_a_minute_is_closed_and_who_reads_or_has
     (reading,) = await readers(desk, 1)
     spoken, writer = await dashboard(desk)
     served, _ = await rtde(desk)
-    silent_ones = [(await connect(desk, door))[0] for door in ("dashboard", "rtde")]
-    await until(lambda: len(desk.doors._connections) == 5)
+    silent_ones = [(await connect(desk, interface))[0] for interface in ("dashboard", "rtde")]
+    await until(lambda: len(desk.interfaces._connections) == 5)
     later(FIRST_WORD - 1.0)
     await asyncio.sleep(0)
-    assert len(desk.doors._connections) == 5
+    assert len(desk.interfaces._connections) == 5
     later(1.0)
     for reader in silent_ones:
         assert await is_cut_off(reader)
@@ -126,7 +126,7 @@ async def test_where_room_is_left_nobody_has_to_go(later, desk):
     await dashboard(desk)
     later(86_400.0)
     await readers(desk, 230)
-    assert len(desk.doors._connections) == 231
+    assert len(desk.interfaces._connections) == 231
 
 
 async def test_who_is_being_served_goes_for_nobody_and_the_last_newcomer_is_turned_away(later, desk, caplog):

@@ -27,7 +27,7 @@ def asked(host, *lines, port=29999):
         return said
 
 
-def test_each_of_several_robots_has_doors_of_its_own():
+def test_each_of_several_robots_has_interfaces_of_its_own():
     with Served("--robots", "ur5e*2", "--ur", "--ur-address", own_address(1), name=None) as served:
         first, second = (asked(own_address(last), "get serial number", "power off") for last in (1, 2))
         assert first[0] != second[0]
