@@ -2,8 +2,9 @@
 
 from tvist_controller.loopback import LoopbackHost
 from tvist_protocol.codec import decode_reply, encode
-from tvist_protocol.commands import MoveJ, SimulationStep, TakeControl
+from tvist_protocol.commands import MoveJ, TakeControl
 from tvist_protocol.replies import Accepted, Done, Reply
+from tvist_protocol.simulation import SimulationStep
 from tvist_server.config import from_mapping
 
 host = LoopbackHost(from_mapping({"clock": "lockstep", "truth": True}, "configuration").setup())

@@ -9,8 +9,8 @@ from tvist_client import motion as asynchronous_motion
 from tvist_client import servo as asynchronous_servo
 from tvist_client import stepper as asynchronous_stepper
 from tvist_client.portal import Portal
-from tvist_protocol.commands import StepSetpoint
 from tvist_protocol.io import Bank
+from tvist_protocol.simulation import StepSetpoint
 from tvist_protocol.stream import Event
 from tvist_protocol.values import Payload, ResetMode
 

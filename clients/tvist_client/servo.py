@@ -8,7 +8,8 @@ from tvist_client.errors import MisuseError, StreamStoppedError
 from tvist_client.stepper import MAX_STEP
 from tvist_client.values import JointRange
 from tvist_protocol.codec import encode
-from tvist_protocol.commands import Setpoint, StepSetpoint
+from tvist_protocol.commands import Setpoint
+from tvist_protocol.simulation import StepSetpoint
 from tvist_protocol.stream import Event
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 from tvist_client.leased import Leased
 from tvist_client.stepper import step
 from tvist_client.values import floats, number, whole
-from tvist_protocol.commands import SimulationInject, SimulationReset, StepSetpoint
 from tvist_protocol.replies import Done
+from tvist_protocol.simulation import SimulationInject, SimulationReset, StepSetpoint
 from tvist_protocol.values import Payload, ResetMode
 
 

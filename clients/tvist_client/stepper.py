@@ -8,9 +8,10 @@ from tvist_client.errors import UnexpectedReplyError
 from tvist_client.granted import granted
 from tvist_client.transports.base import Transport
 from tvist_client.values import whole
-from tvist_protocol.commands import ReleaseClock, SimulationStep, StepSetpoint, TakeClock
+from tvist_protocol.commands import ReleaseClock, TakeClock
 from tvist_protocol.keys import check_client_name
 from tvist_protocol.replies import Done
+from tvist_protocol.simulation import SimulationStep, StepSetpoint
 
 if TYPE_CHECKING:
     from tvist_client.robot import Robot

@@ -19,18 +19,11 @@ from tvist_controller.stepping import (
 )
 from tvist_protocol.channels import tag
 from tvist_protocol.codec import Envelope, decode_command, decode_envelope, decode_setpoint, refusal
-from tvist_protocol.commands import (
-    Command,
-    ReleaseClock,
-    SetEstimator,
-    Setpoint,
-    SimulationStep,
-    TakeClock,
-    TakeControl,
-)
+from tvist_protocol.commands import Command, ReleaseClock, SetEstimator, Setpoint, TakeClock, TakeControl
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.explain import EXPLAINED_BYTES
 from tvist_protocol.replies import Refused
+from tvist_protocol.simulation import SimulationStep
 
 STEP = tag(SimulationStep)
 LONG = frozenset((tag(SetEstimator), STEP))

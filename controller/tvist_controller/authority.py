@@ -7,16 +7,9 @@ from tvist_controller.events import Emit
 from tvist_controller.refusal import RefusalError
 from tvist_controller.session import Session
 from tvist_controller.stepping import ClockLease, check_step
-from tvist_protocol.commands import (
-    HandOver,
-    KeepAlive,
-    ReleaseClock,
-    ReleaseControl,
-    SimulationStep,
-    TakeClock,
-    TakeControl,
-)
+from tvist_protocol.commands import HandOver, KeepAlive, ReleaseClock, ReleaseControl, TakeClock, TakeControl
 from tvist_protocol.replies import Accepted, Reply
+from tvist_protocol.simulation import SimulationStep
 from tvist_protocol.values import PROTOCOL_VERSION
 
 

@@ -37,6 +37,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.info import StopReason
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Done, Reply
+from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_protocol.stream import Event, EventKind, State, Truth
 from tvist_protocol.values import Payload
 
@@ -115,8 +116,8 @@ class Controller:
     def rows(self) -> tuple[Row, ...]:
         """Commands on the whole robot."""
         return (
-            Row(c.SimulationReset, self._reset),
-            Row(c.SimulationStep, self._check_step, lease="none"),
+            Row(SimulationReset, self._reset),
+            Row(SimulationStep, self._check_step, lease="none"),
         )
 
     @property
@@ -309,7 +310,7 @@ class Controller:
 
     # ------------------------------------------------------------------ commands on the whole robot
 
-    def _reset(self, call: Call[c.SimulationReset]) -> Reply:
+    def _reset(self, call: Call[SimulationReset]) -> Reply:
         """Put the simulated arm somewhere at rest."""
         command = call.command
         check_content(command, self.setup.description)
@@ -332,7 +333,7 @@ class Controller:
         self._reporter.forget_modes()
         return Done(tick=self.tick_number)
 
-    def _check_step(self, call: Call[c.SimulationStep]) -> Reply:
+    def _check_step(self, call: Call[SimulationStep]) -> Reply:
         """Check that a client may let time pass; the driver then does."""
         command = call.command
         self._authority.check_step(command, call.now)

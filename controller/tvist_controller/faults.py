@@ -11,8 +11,8 @@ from tvist_controller.motion import MotionControl
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety_control import SafetyControl
 from tvist_plant.plant import PERIOD, Breakable, Pushable
-from tvist_protocol.commands import SimulationInject
 from tvist_protocol.faults import FAULTS
+from tvist_protocol.simulation import SimulationInject
 
 
 class Faults:

@@ -14,9 +14,10 @@ from tvist_controller.sink import Sink
 from tvist_controller.standing import Standing
 from tvist_controller.stepping import may_step
 from tvist_protocol.codec import encode
-from tvist_protocol.commands import Command, Setpoint, SimulationStep
+from tvist_protocol.commands import Command, Setpoint
 from tvist_protocol.journal import Entry, entry_of
 from tvist_protocol.replies import Done, Refused, Reply
+from tvist_protocol.simulation import SimulationStep
 from tvist_protocol.stream import Event
 
 Attend = Callable[[], bool]

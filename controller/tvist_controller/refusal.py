@@ -4,8 +4,9 @@ import math
 from collections.abc import Sequence
 
 from tvist_plant.description import RobotDescription, is_real_body
-from tvist_protocol.commands import Command, MoveJ, SetPayload, SimulationReset
+from tvist_protocol.commands import Command, MoveJ, SetPayload
 from tvist_protocol.replies import Code, Refused
+from tvist_protocol.simulation import SimulationReset
 from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload
 

@@ -6,7 +6,7 @@ It knows no motion, network or clock.
 from dataclasses import dataclass
 
 from tvist_controller.session import Lease, NoControlError, check_token
-from tvist_protocol.commands import SimulationStep
+from tvist_protocol.simulation import SimulationStep
 
 
 @dataclass(frozen=True)

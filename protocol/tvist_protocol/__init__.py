@@ -35,10 +35,6 @@ from tvist_protocol.commands import (
     Setpoint,
     SetShaper,
     SetSpeed,
-    SimulationInject,
-    SimulationReset,
-    SimulationStep,
-    StepSetpoint,
     Stop,
     TakeClock,
     TakeControl,
@@ -50,6 +46,7 @@ from tvist_protocol.io import Bank, Io, SetIo, SetRegisters, SetTcp, SimulationS
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramState, ProgramStop
 from tvist_protocol.replies import CODE_MEANINGS, Accepted, Code, Done, Refused, Reply
+from tvist_protocol.simulation import SimulationInject, SimulationReset, SimulationStep, StepSetpoint
 from tvist_protocol.stream import EVENT_MEANINGS, Event, EventKind, State, Telemetry, Truth
 from tvist_protocol.values import PROTOCOL_VERSION, Payload
 

@@ -7,13 +7,14 @@ from typing import Any
 import msgspec
 
 from tvist_protocol.channels import CHANNELS, COMMANDS, REPLIES, Channel, tag
-from tvist_protocol.commands import Setpoint, StepSetpoint
+from tvist_protocol.commands import Setpoint
 from tvist_protocol.faults import FAULTS, Fault
 from tvist_protocol.info import CalibrationInfo, Info, Limits, Stopping, StopReason
 from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import CODE_MEANINGS
 from tvist_protocol.schema import components, field_docs
+from tvist_protocol.simulation import StepSetpoint
 from tvist_protocol.stream import EVENT_MEANINGS, Event, State, Telemetry, Truth
 from tvist_protocol.transitions import HAPPENINGS, Activity, Control, Stepping, diagram
 from tvist_protocol.values import PATTERN_MEANINGS, Payload

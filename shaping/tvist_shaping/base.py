@@ -102,14 +102,6 @@ class Filter(ABC):
     def _weigh(self) -> None:
         """Weights of the next tick, and with them the next shaped reference."""
 
-    @abstractmethod
-    def with_estimator(self, estimator: Estimator) -> Self:
-        """Return this filter with another estimator, in the same state; this filter does not change.
-
-        Raises:
-            FilterError: The two do not fit.
-        """
-
     @property
     def width(self) -> int:
         """Entries of a sample."""

@@ -146,10 +146,6 @@ class TvistFilter(Filter):
         changed.take_over(self)
         return changed
 
-    def with_estimator(self, estimator: Estimator) -> "TvistFilter":
-        """Return this filter with another estimator, see `replace`."""
-        return self.replace(estimator=estimator)
-
     def _start(self) -> None:
         self._suppress(self.estimator.settle(self._angles(self._q_star)))
 

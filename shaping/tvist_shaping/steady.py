@@ -47,10 +47,6 @@ class Design(ABC):
     """Sum of the taps' magnitudes at the most, 1 where none is negative [-]."""
 
     @abstractmethod
-    def copy(self) -> "Design":
-        """Return a copy for another filter, since a design may remember its last result."""
-
-    @abstractmethod
     def fork(self) -> Self:
         """Return a copy for another filter with the state of this one, so that it continues from here."""
 
@@ -99,10 +95,6 @@ class ProductDesign(Design):
 
     def __repr__(self) -> str:
         return f"ProductDesign(mean_delay={self.mean_delay:g}, modes={self.modes})"
-
-    def copy(self) -> "ProductDesign":
-        """Return a copy for another filter."""
-        return ProductDesign(self.mean_delay, modes=self.modes, longest=self._longest, period=self.period)
 
     def fork(self) -> Self:
         """Itself: it remembers nothing."""
@@ -155,10 +147,6 @@ class ShortDesign(Design):
 
     def __repr__(self) -> str:
         return f"ShortDesign(mean_delay={self.mean_delay:g}, wanted={self.wanted!r})"
-
-    def copy(self) -> "ShortDesign":
-        """Return a copy without state for another filter."""
-        return ShortDesign(self.mean_delay, wanted=self.wanted, period=self.period, name=self.name)
 
     def fork(self) -> Self:
         """A copy with the present length and the present solution of the programme."""
@@ -269,12 +257,6 @@ class SteadyFilter(Filter):
     def peak(self) -> float:
         """See `Filter.peak`: the design's own."""
         return self.design.peak
-
-    def with_estimator(self, estimator: Estimator) -> Self:
-        """Return a filter with the same design for other modes; see `Filter.with_estimator`."""
-        other = type(self)(self.design.copy(), estimator, joints=self.joints, smooth=self._smooth)
-        other.take_over(self)
-        return other
 
     def _part(self) -> None:
         super()._part()

@@ -19,6 +19,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import KeepAlive
 from tvist_protocol.replies import Done
+from tvist_protocol.simulation import SimulationInject, SimulationReset, SimulationStep
 
 Q = (0.5, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -72,7 +73,7 @@ async def test_every_state_event_and_truth_comes_in_order_while_time_passes(free
 async def test_advance_steps_in_chunks_of_at_most_a_thousand(fake, free):
     async with free.control("me"):
         assert await free.advance(2500) == 2500
-    assert [x.ticks for x in fake.commands if isinstance(x, c.SimulationStep)] == [1000, 1000, 500]
+    assert [x.ticks for x in fake.commands if isinstance(x, SimulationStep)] == [1000, 1000, 500]
 
 
 async def test_time_passes_only_for_who_holds_control(free):
@@ -99,7 +100,7 @@ async def test_setpoints_are_stepped_through_one_a_tick_and_numbered_on(fake, fr
             await servo.step_through([[2.0] * 6])
             assert servo.sequence == 1501
         assert [(tick, sequence) for tick, sequence, _ in fake.setpoints] == [(k, k) for k in range(1501)]
-        steps = [x.ticks for x in fake.commands if isinstance(x, c.SimulationStep)]
+        steps = [x.ticks for x in fake.commands if isinstance(x, SimulationStep)]
         assert steps == [1000, 500, 1, CHUNK]  # the last one to see the arm at rest
 
 
@@ -200,14 +201,14 @@ async def test_what_is_said_reaches_the_robot_as_it_was_said(fake, free):
         c.TakeControl(client="me", lease_s=7.0),
         c.SetEstimator(token=token, name="polynomial", calibration="paper"),
         c.SetEstimator(token=token, name="polynomial", calibration={"a": 1}),
-        c.SimulationReset(token=token, q=Q, seed=3, payload=payload, mode="RUNNING", shaper="zvd"),
+        SimulationReset(token=token, q=Q, seed=3, payload=payload, mode="RUNNING", shaper="zvd"),
         c.Stop(token=token, deceleration=2.5),
         c.Pause(token=token),
         c.Resume(token=token),
         c.SetSpeed(token=token, fraction=1.0),
         c.PowerOff(token=token),
         c.PowerOn(token=token),
-        c.SimulationInject(token=token, fault="torque", joint=1, seconds=1.0, value=-30.0),
+        SimulationInject(token=token, fault="torque", joint=1, seconds=1.0, value=-30.0),
         c.UnlockProtectiveStop(token=token),
         c.RestartSafety(token=token),
         c.HandOver(token=token, client="you"),

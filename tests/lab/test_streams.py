@@ -7,10 +7,11 @@ from tvist_controller.calibrations import load as load_calibration
 from tvist_lab.evaluation.baselines import longest_mean_delay
 from tvist_lab.evaluation.line import PAPER
 from tvist_lab.evaluation.recipes import Recipe
-from tvist_lab.evaluation.streams import peaks, retargeted, streamed
 from tvist_plant.description import load
 from tvist_plant.plant import PERIOD
 from tvist_shaping.steady import ProductDesign, SteadyFilter
+
+from .retargeted import peaks, retargeted, streamed
 
 UR5E = load("ur5e")
 MODAL = load_calibration("ur5e_modal")

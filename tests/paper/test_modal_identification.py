@@ -9,11 +9,13 @@ import pytest
 from tvist_controller.calibrations.modal import modal_estimator
 from tvist_controller.collision import CollisionModel
 from tvist_controller.setup import body, paper_payload
-from tvist_lab.identification import modal
+from tvist_lab.identification import modal_calibration
 from tvist_lab.identification.design import choose, predicted
 from tvist_lab.identification.identify import IdentificationError
-from tvist_lab.identification.modal import ModalPlan, calibrate, free_configurations, identify_modal
+from tvist_lab.identification.modal import identify_modal
+from tvist_lab.identification.modal_calibration import calibrate
 from tvist_lab.identification.modal_fit import describe, fit_from_many, own_poles
+from tvist_lab.identification.modal_plan import ModalPlan, free_configurations
 from tvist_lab.identification.ring_downs import Jog
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.in_process import free_setup, robot_in_process
@@ -147,7 +149,7 @@ def test_a_ring_down_s_own_poles_explain_no_more_than_the_right_ones_but_for_noi
     for ring in rings:
         poles = arm.drivetrain(arm.guess).poles(arm.mass(ring.q, ring.payload))[0][:4]
         right = own_poles(arm, ring, poles)
-        assert right.significance < modal.SIGNIFICANT
+        assert right.significance < modal_calibration.SIGNIFICANT
         swapped = arm.drivetrain(arm.guess).poles(arm.mass(ring.q, 1 - ring.payload))[0][:4]
         assert own_poles(arm, ring, swapped).significance > right.significance
 

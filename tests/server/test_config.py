@@ -5,13 +5,12 @@ import tomllib
 from importlib import resources
 
 import pytest
+from tests.controller.robots import Q1, Q3, UR5E, calibration, cut, setup
 
 from tvist_controller.setup import Setup, paper_payload
 from tvist_plant.user_file import UserFileError
 from tvist_protocol.calibration import calibration_to_json
 from tvist_server.config import ConfigError, ServeConfig, from_mapping, read_toml
-
-from .robots import Q1, Q3, UR5E, calibration, cut, setup
 
 
 def config(**values) -> ServeConfig:

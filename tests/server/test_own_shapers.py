@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
+from tests.controller.robots import PAPER, Q1, Q2, Q3, H, Robot, calibration, setup
 
 from tvist_controller.about import info_of
 from tvist_controller.own_shapers import OwnShaper, OwnShaperError, is_file, load_own
@@ -17,12 +18,11 @@ from tvist_protocol import commands as c
 from tvist_protocol.journal import entry_of
 from tvist_protocol.modes import SafetyMode
 from tvist_protocol.replies import Done, Refused
+from tvist_protocol.simulation import SimulationReset
 from tvist_protocol.values import Frequency
 from tvist_server.config import ConfigError, from_mapping, read_toml
 from tvist_shaping import FirShaper, Impulses, Shaper, zv
 from tvist_shaping.own import TRIED_F_D
-
-from .robots import PAPER, Q1, Q2, Q3, H, Robot, calibration, setup
 
 MINE = '''
 import numpy as np
@@ -214,10 +214,10 @@ class TestOnARobot:
         assert one.send(c.SetShaper, name="thirds") == Done()
         assert one.controller.cycle.tvist.name == "thirds"
         for name in (f"{file}:mine"[-64:], "mine.py:mine", "mine"):
-            for refused in (one.send(c.SetShaper, name=name), one.send(c.SimulationReset, shaper=name)):
+            for refused in (one.send(c.SetShaper, name=name), one.send(SimulationReset, shaper=name)):
                 assert isinstance(refused, Refused)
                 assert refused.code == "unknown_shaper"
-        assert one.send(c.SimulationReset, shaper="thirds") == Done(tick=0)
+        assert one.send(SimulationReset, shaper="thirds") == Done(tick=0)
 
     def test_it_takes_another_payload_and_estimator_and_fades_in_motion(self):
         one = robot(FirShaper("mean", "", lambda _f_d, _zeta: np.full(20, 0.05), taps=20), shaper="zv")

@@ -4,6 +4,7 @@ import threading
 from collections import deque
 
 import pytest
+from tests.controller.robots import Q2, Q3, Robot, calibration, setup
 
 from tvist_controller.controller import Controller
 from tvist_controller.host import Host
@@ -16,8 +17,6 @@ from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.values import Payload
 from tvist_server.plan_ahead import MAX_WAITING, PlanAhead
 from tvist_server.reception import Reception
-
-from .robots import Q2, Q3, Robot, calibration, setup
 
 WAIT = 20.0
 LIGHT = {"mass": 2.0, "com": (0.0, 0.0, 0.04), "inertia": (0.002, 0.0, 0.0, 0.002, 0.0, 0.002)}

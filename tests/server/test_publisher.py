@@ -2,12 +2,12 @@
 
 import threading
 
+from tests.controller.robots import Robot
+
 from tvist_protocol.codec import decode_event, decode_state
 from tvist_protocol.stream import Event
 from tvist_server.courier import Courier
 from tvist_server.publisher import MAX_WAITING, Publisher
-
-from .robots import Robot
 
 WAIT = 30.0
 ROBOT = Robot()

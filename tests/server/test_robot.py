@@ -1,13 +1,14 @@
 """What a served robot tells between two ticks."""
 
+from tests.controller.robots import setup
+
 from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
 from tvist_protocol.io import Io
 from tvist_protocol.programs import ProgramLoad, ProgramPlay
 from tvist_protocol.replies import Done
+from tvist_protocol.simulation import SimulationStep
 from tvist_server.robot import ServedRobot
-
-from .robots import setup
 
 
 class NoLateness:
@@ -41,7 +42,7 @@ def test_with_the_telemetry_io_is_told_as_it_is_and_not_as_it_was_before_the_las
         return replies[-1]
 
     token = send(c.TakeControl(client="a")).token
-    assert send(c.SimulationStep(token=token, ticks=1)) == Done(tick=1)
+    assert send(SimulationStep(token=token, ticks=1)) == Done(tick=1)
     assert gateway.told[-1].program_state == "STOPPED"
     assert send(ProgramLoad(name="paper.urp")) == Done()
     assert send(ProgramPlay(token=token)) == Done()

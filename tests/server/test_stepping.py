@@ -2,6 +2,7 @@
 
 import msgpack
 import pytest
+from tests.controller.robots import UR5E, setup
 
 from tvist_client.blocking import Robot
 from tvist_client.transports.loopback import LoopbackTransport
@@ -17,15 +18,14 @@ from tvist_protocol.codec import decode_reply, encode
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.explain import EXPLAINED_BYTES
 from tvist_protocol.replies import Accepted, Refused
+from tvist_protocol.simulation import SimulationStep, StepSetpoint
 from tvist_server.jobs import Jobs
 from tvist_server.reception import Reception
-
-from .robots import UR5E, setup
 
 LEASE = Lease("anna", "anna#1", 30.0, 30.0, None)
 HOLD = ClockHold("bert", "bert#clock1", None)
 Q2 = UR5E.poses["Q2"]
-LONG = tuple(c.StepSetpoint(sequence=n, q=(3.0,) * 6) for n in range(1000))
+LONG = tuple(StepSetpoint(sequence=n, q=(3.0,) * 6) for n in range(1000))
 
 
 class Sink:
@@ -95,7 +95,7 @@ def test_control_lets_time_pass_while_nobody_holds_the_clock(hold, lease, token,
 
 def test_a_long_step_of_the_clock_s_holder_is_read_and_a_stranger_s_is_not():
     def long(token, motion_token):
-        return encode(c.SimulationStep(token=token, ticks=1000, setpoints=LONG, motion_token=motion_token))
+        return encode(SimulationStep(token=token, ticks=1000, setpoints=LONG, motion_token=motion_token))
 
     data = long(HOLD.token, LEASE.token)
     assert len(data) > EXPLAINED_BYTES
@@ -115,7 +115,7 @@ def test_a_long_step_of_the_clock_s_holder_is_read_and_a_stranger_s_is_not():
     [
         (c.TakeClock(client="bert"), "bert"),
         (c.ReleaseClock(token=HOLD.token), "bert"),
-        (c.SimulationStep(token=HOLD.token, ticks=1), "bert"),
+        (SimulationStep(token=HOLD.token, ticks=1), "bert"),
         (c.TakeControl(client="anna"), "anna"),
         (c.MoveJ(token=LEASE.token, q=Q2), "anna"),
         (c.Stop(), None),
@@ -160,7 +160,7 @@ def test_the_end_of_one_session_ends_both_rights():
 def test_a_step_in_a_callback_of_a_step_is_refused_and_other_commands_are_carried_out():
     host, said = LoopbackHost(free_setup()), []
     token = decode_reply(host.request("", encode(c.TakeControl(client="me")))).token
-    step = encode(c.SimulationStep(token=token, ticks=2))
+    step = encode(SimulationStep(token=token, ticks=2))
     host.subscribe("event", lambda _: said.append(decode_reply(host.request("", encode(c.Stop())))))
     host.request("", encode(c.MoveJ(token=token, q=Q2)))
     host.subscribe("state", lambda _: said.append(decode_reply(host.request("", step))) if said else None)

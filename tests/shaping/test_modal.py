@@ -14,7 +14,9 @@ from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.model import flexible_model
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators import modal
-from tvist_shaping.estimators.modal import Drivetrain, Modal
+from tvist_shaping.estimators import poles as kernels
+from tvist_shaping.estimators.drivetrain import Drivetrain
+from tvist_shaping.estimators.modal import Modal
 
 ROBOT = load("ur5e")
 Q1 = np.array(ROBOT.poses["Q1"])
@@ -220,7 +222,7 @@ def test_where_a_pole_is_lost_all_stay_and_all_are_followed_on_once_it_is_found(
 
 def test_a_kernel_that_fails_leaves_poles_and_shapes_as_they_were():
     """The last of three poles leads nowhere: the two before it have been moved by then."""
-    for follow in (modal.follow, modal.follow.py_func):
+    for follow in (kernels.follow, kernels.follow.py_func):
         estimator, mass, drivetrain = arm(modes=3)
         estimator.poles(Q1)
         poles, shapes = estimator._poles.copy(), estimator._shapes.copy()
@@ -307,7 +309,8 @@ import json, sys
 if sys.argv[1] == "without":
     sys.modules["numba"] = None
 import numpy as np
-from tvist_shaping.estimators.modal import Drivetrain, Modal
+from tvist_shaping.estimators.drivetrain import Drivetrain
+from tvist_shaping.estimators.modal import Modal
 drivetrain = Drivetrain((9e3, 8e3, 5e4), (0.3, 0.2, 0.0), (150.0, 120.0, 0.0), (15.0, 15.0, 0.0), (1.0, 1.0, 5.0))
 def mass(q):
     c, d = np.cos(q)

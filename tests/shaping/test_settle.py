@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from tests.examples import examples
 
 from tvist_shaping import DelayLine, Fixed, TvistFilter, shaper
-from tvist_shaping.estimators.modal import Drivetrain, Modal
+from tvist_shaping.estimators.drivetrain import Drivetrain
+from tvist_shaping.estimators.modal import Modal
 from tvist_shaping.steady import ProductDesign, SteadyFilter
 
 H = 0.002

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from tvist_cli.evaluated import print_evaluation
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import err, number, out, print_json, progress, say, table
+from tvist_cli.output import err, print_json, progress
 from tvist_cli.shapers_of import loaded
 
 if TYPE_CHECKING:
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
 
 UNIFORM = "uniform"
 """Value of --payload that draws a payload for each move, up to the arm's rating."""
-LISTED = 12
-"""Largest number of moves that are printed one by one."""
 
 
 def evaluate(
@@ -119,7 +118,7 @@ def evaluate(
     if json:
         print_json(result)
     else:
-        _print(result)
+        print_evaluation(result)
 
 
 def _check(
@@ -305,73 +304,3 @@ def _notes(
             f"{result['never_still']} shaped moves were still above 0.1 m/s² at the end of the simulation"
         )
     return notes
-
-
-def _print(result: dict[str, Any]) -> None:
-    if len(result["moves"]) <= LISTED:
-        table(
-            f"moves with shaper {result['shaper']}",
-            (
-                "move",
-                "kg",
-                "unshaped m/s²",
-                "shaped m/s²",
-                "less %",
-                "delay ms",
-                "still ms",
-                "q̈/limit",
-                "q̇/limit",
-            ),
-            [_row(place, move) for place, move in enumerate(result["moves"], 1)],
-        )
-    ways = {result["shaper"]: result, **result["baselines"]}
-    table(
-        f"{result['counted']} moves, arm {result['plant']}",
-        (
-            "",
-            "less % median",
-            "p5",
-            "min",
-            "delay ms",
-            "max",
-            "still¹ ms",
-            "p90",
-            "q̈/limit",
-            "p90",
-            "max",
-            "q̇ max",
-        ),
-        [_way(name, way) for name, way in ways.items()],
-    )
-    median, p5 = (result["reduction_percent_interval"][name] for name in ("median", "p5"))
-    if median is not None:
-        out.print(
-            f"95 % intervals (bootstrap): median {median[0]:.1f} to {median[1]:.1f} %, p5 {p5[0]:.1f} to {p5[1]:.1f} %"
-        )
-    peaks = [(name, way["peak_m_s2"]) for name, way in list(ways.items())[:2]]
-    if median is not None:
-        said = (f"{name} {number(peak['median'])} (p95 {number(peak['p95'])})" for name, peak in peaks)
-        out.print(f"peaks in m/s², median: {', '.join(said)}")
-    out.print("¹ last time |α| exceeds 0.1 m/s², median, from the stop of the unshaped reference")
-    for note in result["notes"]:
-        say(note)
-
-
-def _row(place: int, move: dict[str, Any]) -> tuple[str, ...]:
-    return (
-        str(place), number(move["payload_kg"], 2), number(move["unshaped_peak_m_s2"]), number(move["shaped_peak_m_s2"]),
-        number(move["reduction_percent"], 1), number(move["delay_ms"], 0), number(move["still_after_ms"]["shaped"], 0),
-        number(move["peak_acceleration_ratio"]), number(move["peak_velocity_ratio"]),
-    )  # fmt: skip
-
-
-def _way(name: str, way: dict[str, Any]) -> tuple[str, ...]:
-    less, delay, still = (
-        way[key] for key in ("reduction_percent", "delay_ms", "still_after_unshaped_stop_ms")
-    )
-    qdd = way["peak_acceleration_ratio"]
-    return (
-        name, *(number(less[key], 1) for key in ("median", "p5", "min")),
-        number(delay["median"], 0), number(delay["max"], 0), number(still["median"], 0), number(still["p90"], 0),
-        *(number(qdd[key]) for key in ("median", "p90", "max")), number(way["peak_velocity_ratio"]["max"]),
-    )  # fmt: skip

@@ -202,7 +202,8 @@ def _modal(
     json: bool,
 ) -> None:
     from tvist_controller.setup import paper_payload
-    from tvist_lab.identification.modal import ModalPlan, identify_modal
+    from tvist_lab.identification.modal import identify_modal
+    from tvist_lab.identification.modal_plan import ModalPlan
     from tvist_protocol.calibration import calibration_to_json
 
     carried = () if masses is None else tuple(paper_payload(arm, mass) for mass in _masses(masses))

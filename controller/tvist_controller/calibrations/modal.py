@@ -12,7 +12,8 @@ from tvist_plant.model import FlexibleModel, flexible_model
 from tvist_protocol.calibration import Calibration, ModalParameter, Quantity
 from tvist_protocol.values import Payload
 from tvist_shaping.errors import EstimatorError
-from tvist_shaping.estimators.modal import Drivetrain, Modal
+from tvist_shaping.estimators.drivetrain import Drivetrain
+from tvist_shaping.estimators.modal import Modal
 
 Floats = npt.NDArray[np.float64]
 MODES = 4

@@ -8,9 +8,10 @@ from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
 from tvist_controller.refusal import RefusalError, check_content, payload_of
 from tvist_controller.setup import Setup
 from tvist_protocol import commands as c
+from tvist_protocol.simulation import SimulationReset
 from tvist_shaping.base import Filter
 
-PLANNED = (c.MoveJ, c.SetShaper, c.SetEstimator, c.SetPayload, c.SimulationReset)
+PLANNED = (c.MoveJ, c.SetShaper, c.SetEstimator, c.SetPayload, SimulationReset)
 """Commands that are planned."""
 
 
@@ -66,6 +67,6 @@ class Planner:
                 return filters.estimate(command, on)
             case c.SetPayload():
                 return filters.with_payload(payload_of(command), on)
-            case c.SimulationReset() if command.shaper is not None:
+            case SimulationReset() if command.shaper is not None:
                 return filters.choose(command.shaper, 1, on.source, on.declared)
         return None

@@ -11,6 +11,7 @@ from tvist_protocol.calibration import Calibration
 from tvist_protocol.codec import MAX_BYTES, encode
 from tvist_protocol.io import SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.programs import ProgramLoad, ProgramPlay, ProgramStop
+from tvist_protocol.simulation import SimulationInject, SimulationStep
 
 POSE = (1.57, -1.57, 1.57, -1.57, -1.57, 0.0)
 STRANGER = "none of ours"
@@ -72,8 +73,8 @@ class Messages:
             SimulationSetInputs(token=token, digital_input_mask=255, digital_inputs=chance.randrange(256)),
             c.PowerOn(token=token),
             c.UnlockProtectiveStop(token=token),
-            c.SimulationStep(token=token, ticks=10),
-            c.SimulationInject(token=token, fault="nonsense"),
+            SimulationStep(token=token, ticks=10),
+            SimulationInject(token=token, fault="nonsense"),
         ]
 
     def _unsound(self) -> bytes:

@@ -18,7 +18,8 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD, Plant
 from tvist_protocol.codec import encode
-from tvist_protocol.commands import MoveJ, SimulationReset, SimulationStep, TakeControl
+from tvist_protocol.commands import MoveJ, TakeControl
+from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_shaping import TvistFilter, shaper
 
 TICKS = 1250

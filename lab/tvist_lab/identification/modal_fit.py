@@ -20,7 +20,8 @@ from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.metrics import SLOW_POLE
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
-from tvist_shaping.estimators.modal import Drivetrain, follow
+from tvist_shaping.estimators.drivetrain import Drivetrain
+from tvist_shaping.estimators.poles import follow
 
 Complex = npt.NDArray[np.complex128]
 

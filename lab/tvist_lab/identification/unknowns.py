@@ -12,7 +12,7 @@ from tvist_plant.description import RobotDescription
 from tvist_plant.model import FlexibleModel, flexible_model
 from tvist_protocol.calibration import ModalParameter, Quantity, Status
 from tvist_protocol.values import Payload
-from tvist_shaping.estimators.modal import Drivetrain
+from tvist_shaping.estimators.drivetrain import Drivetrain
 
 LARGE = 3
 """Joints from the base on that have the large drives, each with parameters of its own."""

@@ -14,6 +14,7 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_protocol.io import SetTcp
 from tvist_protocol.replies import Refused
+from tvist_protocol.simulation import SimulationInject
 from tvist_protocol.values import Payload
 
 Change = tuple[type, dict[str, object]]
@@ -84,7 +85,7 @@ def _draw(description: RobotDescription, random: np.random.Generator) -> Change:
         (c.SetEstimator, {"name": "fixed", "f_d": (float(random.uniform(4, 20)),), "zeta": (0.1,)}),
         (c.SetSpeed, {"fraction": float(random.uniform(0.0, 1.0))}),
         (SetTcp, {"offset": (0.0, 0.0, float(random.uniform(0.0, 0.3)), 0.0, 0.0, 0.0)}),
-        (c.SimulationInject, {"fault": "reduced"}),
+        (SimulationInject, {"fault": "reduced"}),
     ]
     return one if random.random() < 0.6 else others[int(random.integers(len(others)))]
 

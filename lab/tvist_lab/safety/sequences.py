@@ -19,6 +19,7 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_protocol.faults import FAULTS as FAULT_FIELDS
 from tvist_protocol.replies import Accepted, Refused
+from tvist_protocol.simulation import SimulationInject, SimulationReset
 from tvist_protocol.transitions import Activity
 
 COMMANDS = 40
@@ -189,7 +190,7 @@ class Sequence:
         """From everywhere there is a way back to motion."""
         robot = self.robot
         self._ahead = None
-        robot.send(c.SimulationInject, fault="normal")
+        robot.send(SimulationInject, fault="normal")
         robot.token = robot.take_control()
         robot.send(c.Stop)
         self._tick_until_rest()
@@ -287,7 +288,7 @@ class Sequence:
                 break
         mode = self._random.choice(["RUNNING", "RUNNING", "IDLE", "POWER_OFF", "none"])
         fields = {} if mode == "none" else {"mode": str(mode)}
-        reply = self.robot.send(c.SimulationReset, q=tuple(q.tolist()), **fields)
+        reply = self.robot.send(SimulationReset, q=tuple(q.tolist()), **fields)
         if not isinstance(reply, Refused):
             self.robot.references[-2:] = [q, q]
             self._excused = collisions.meeting(q) is not None
@@ -302,7 +303,7 @@ class Sequence:
         fields = {}
         if lasts:  # then what it stopped goes on by itself
             fields, self._injected = {"seconds": float(self._random.uniform(0.0, 1.0))}, "for a while"
-        reply = self.robot.send(c.SimulationInject, fault=fault, **fields)
+        reply = self.robot.send(SimulationInject, fault=fault, **fields)
         system, activity = self.robot.controller.motion.safety, self.robot.controller.motion.activity
         if (system.emergencies or system.latched) and activity in {Activity.REST, Activity.MOVING}:
             raise self._broken(f"{activity} under {system}")

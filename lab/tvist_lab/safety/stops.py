@@ -16,6 +16,7 @@ from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
+from tvist_protocol.simulation import SimulationInject
 
 EARLY = 17
 """Tick before which some moves are stopped: those that have barely begun."""
@@ -38,9 +39,9 @@ KINDS: dict[str, Halt] = {
     "token gone": lambda robot, _: robot.controller.client_gone(CLIENT, SESSION),
     "lease over": lambda robot, _: robot.send(c.ReleaseControl),
     "power off": lambda robot, _: robot.send(c.PowerOff),
-    "protective": lambda robot, _: robot.send(c.SimulationInject, fault="protective_stop"),
-    "safeguard": lambda robot, _: robot.send(c.SimulationInject, fault="safeguard_stop"),
-    "emergency": lambda robot, _: robot.send(c.SimulationInject, fault="emergency_stop"),
+    "protective": lambda robot, _: robot.send(SimulationInject, fault="protective_stop"),
+    "safeguard": lambda robot, _: robot.send(SimulationInject, fault="safeguard_stop"),
+    "emergency": lambda robot, _: robot.send(SimulationInject, fault="emergency_stop"),
     "pause": lambda robot, _: robot.send(c.Pause),
 }
 

@@ -14,6 +14,7 @@ from tvist_lab.safety.subject import CLIENT, SESSION, Subject, refused
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
+from tvist_protocol.simulation import SimulationInject
 
 LENGTH = 3.0
 """How long a stream lasts unless something ends it [s]."""
@@ -25,9 +26,9 @@ ENDS: dict[str, Callable[[Subject], object]] = {
     "stranger's stop": lambda robot: robot.send(c.Stop, token=None, deceleration=1.0),
     "token gone": lambda robot: robot.controller.client_gone(CLIENT, SESSION),
     "power off": lambda robot: robot.send(c.PowerOff),
-    "protective stop": lambda robot: robot.send(c.SimulationInject, fault="protective_stop"),
-    "emergency stop": lambda robot: robot.send(c.SimulationInject, fault="emergency_stop"),
-    "safeguard stop": lambda robot: robot.send(c.SimulationInject, fault="safeguard_stop"),
+    "protective stop": lambda robot: robot.send(SimulationInject, fault="protective_stop"),
+    "emergency stop": lambda robot: robot.send(SimulationInject, fault="emergency_stop"),
+    "safeguard stop": lambda robot: robot.send(SimulationInject, fault="safeguard_stop"),
 }
 """How a stream is ended."""
 

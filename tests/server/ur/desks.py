@@ -2,7 +2,7 @@
 
 import asyncio
 
-from tests.server.robots import Robot
+from tests.controller.robots import Robot
 
 from tvist_controller.host import Host
 from tvist_controller.sink import Sink

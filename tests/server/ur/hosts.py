@@ -1,6 +1,6 @@
 """A robot as its interfaces see it, with programs."""
 
-from tests.server.robots import UR5E
+from tests.controller.robots import UR5E
 
 from tvist_controller.programs.built_in import built_in
 from tvist_server.gateways.ur.programs import Programs

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.server.robots import UR5E
+from tests.controller.robots import UR5E
 
 from tvist_protocol import commands as c
 from tvist_protocol.programs import ProgramLoad, ProgramPlay, ProgramStop

@@ -10,7 +10,7 @@ from collections import deque
 from random import Random
 
 import pytest
-from tests.server.robots import UR5E, Robot
+from tests.controller.robots import UR5E, Robot
 
 from tvist_controller.host import Host
 from tvist_controller.instruments.snapshot import Instruments

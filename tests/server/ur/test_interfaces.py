@@ -8,11 +8,12 @@ import struct
 import weakref
 
 import pytest
-from tests.server.robots import UR5E
+from tests.controller.robots import UR5E
 
 from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import TakeControl
+from tvist_protocol.simulation import SimulationInject
 from tvist_server.gateways.base import GatewayError
 from tvist_server.gateways.ur.interfaces import UrInterfaces
 
@@ -120,7 +121,7 @@ async def test_events_reach_the_clients_of_the_primary_interface(desk):
     reader, _ = await connect(desk, "primary")
     await reader.readexactly(5)
     token = desk.controller.receive(c.TakeControl(client="a")).token
-    desk.controller.receive(c.SimulationInject(token=token, fault="protective_stop"))
+    desk.controller.receive(SimulationInject(token=token, fault="protective_stop"))
     await desk.tick(60)
     data = await asyncio.wait_for(reader.read(100_000), PATIENCE)
     assert struct.pack(">ii", 209, 0) in data

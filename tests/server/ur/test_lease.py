@@ -2,7 +2,7 @@
 
 from collections import deque
 
-from tests.server.robots import Robot
+from tests.controller.robots import Robot
 
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done, Refused

@@ -7,11 +7,12 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.server.robots import UR5E, cut
+from tests.controller.robots import UR5E, cut
 
 from tvist_protocol import commands as c
 from tvist_protocol.programs import ProgramStop
 from tvist_protocol.replies import Refused
+from tvist_protocol.simulation import SimulationInject
 from tvist_protocol.stream import Event
 from tvist_server.gateways.ur import version
 from tvist_server.gateways.ur.primary import messages
@@ -71,7 +72,7 @@ def test_a_robot_without_power_in_a_protective_stop_or_with_a_paused_program_say
     assert flags(off)[2] is False
     assert off[15] == 3
     stopped = ur5e()
-    stopped.send(c.SimulationInject, fault="protective_stop")
+    stopped.send(SimulationInject, fault="protective_stop")
     part = state_of(stopped.tick(50))[0][0]
     assert flags(part)[4:] == (True, False, False)
     resting = ur5e()

@@ -4,7 +4,7 @@ import struct
 from types import SimpleNamespace
 
 import pytest
-from tests.server.robots import cut
+from tests.controller.robots import cut
 
 from tvist_protocol import commands as c
 from tvist_server.gateways.ur.realtime import RealtimeSession, package

@@ -19,8 +19,9 @@ from tests.protocol.test_fuzz import changed, damaged, fields, keys, values
 
 from tvist_controller.loopback import LoopbackHost
 from tvist_protocol.codec import decode_reply, decode_state, encode
-from tvist_protocol.commands import ReleaseControl, SimulationReset, Stop, TakeControl
+from tvist_protocol.commands import ReleaseControl, Stop, TakeControl
 from tvist_protocol.replies import Accepted, Refused
+from tvist_protocol.simulation import SimulationReset
 
 from .robots import Q1, setup
 

@@ -9,6 +9,7 @@ from tvist_controller.session import NoControlError, Session
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.simulation import SimulationInject, SimulationReset
 from tvist_protocol.transitions import TRANSITIONS, Activity, Control, after
 from tvist_protocol.values import Payload
 from tvist_shaping.catalogue import SHAPERS
@@ -34,7 +35,7 @@ def at(activity: Activity) -> Robot:
     """A robot that does this, brought there by commands."""
     robot = Robot()
     if activity in {Activity.POWER_OFF, Activity.IDLE}:
-        robot.send(c.SimulationReset, mode=activity.value)
+        robot.send(SimulationReset, mode=activity.value)
     elif activity in {Activity.STREAMING, Activity.ENDING}:
         robot.send(c.ServoStart)
         for k in range(200):
@@ -43,7 +44,7 @@ def at(activity: Activity) -> Robot:
         if activity is Activity.ENDING:
             robot.send(c.ServoStop)
     elif activity is Activity.PROTECTIVE_STOP:
-        robot.send(c.SimulationInject, fault="protective_stop")
+        robot.send(SimulationInject, fault="protective_stop")
     elif activity is not Activity.REST:
         robot.send(c.MoveJ, q=Q3_)
         robot.tick(300)
@@ -51,8 +52,8 @@ def at(activity: Activity) -> Robot:
             Activity.PAUSED: (c.Pause, {}),
             Activity.STOPPING: (c.Stop, {}),
             Activity.POWERING_OFF: (c.PowerOff, {}),
-            Activity.PROTECTIVE_STOPPING: (c.SimulationInject, {"fault": "protective_stop"}),
-            Activity.BRAKING: (c.SimulationInject, {"fault": "power_loss"}),
+            Activity.PROTECTIVE_STOPPING: (SimulationInject, {"fault": "protective_stop"}),
+            Activity.BRAKING: (SimulationInject, {"fault": "power_loss"}),
         }
         if activity in ends:
             robot.send(ends[activity][0], **ends[activity][1])
@@ -109,7 +110,7 @@ def test_the_state_says_the_modes_of_what_it_does(activity):
 @pytest.mark.parametrize("mode", ["RUNNING", "IDLE", "POWER_OFF", None])
 def test_a_reset_puts_it_into_any_mode_from_everywhere(activity, mode):
     robot = at(activity)
-    assert isinstance(robot.send(c.SimulationReset, mode=mode, q=Q2_), Done)
+    assert isinstance(robot.send(SimulationReset, mode=mode, q=Q2_), Done)
     state = robot.tick(2)
     named = {"RUNNING": RobotMode.RUNNING, "IDLE": RobotMode.IDLE, "POWER_OFF": RobotMode.POWER_OFF}
     assert state.robot_mode == (activity.robot_mode if mode is None else named[mode])
@@ -189,7 +190,7 @@ def test_power_off_stops_what_moves_before_the_power_goes():
 
 def test_a_protective_stop_is_controlled_and_holds_until_it_is_unlocked():
     robot = at(Activity.MOVING)
-    assert robot.send(c.SimulationInject, fault="protective_stop") == Done()
+    assert robot.send(SimulationInject, fault="protective_stop") == Done()
     assert robot.tick().safety_mode == SafetyMode.PROTECTIVE_STOP
     assert robot.kinds() == ["motion_started", "protective_stop", "motion_stopped"]
     assert robot.send(c.UnlockProtectiveStop).code == "wrong_mode"
@@ -213,7 +214,7 @@ def longest_run(true) -> int:
 def test_a_push_is_a_protective_stop_only_when_a_drive_is_beyond_its_limit_for_long(push, stops):
     robot = Robot()
     robot.tick(10)
-    robot.send(c.SimulationInject, fault="torque", joint=1, value=push, seconds=0.004)
+    robot.send(SimulationInject, fault="torque", joint=1, value=push, seconds=0.004)
     robot.tick(100)
     beyond = np.abs(robot.column("actual_moment")) > np.array(UR5E.limits.torque)
     assert beyond.any()
@@ -265,7 +266,7 @@ def test_overload_counts_each_joint_and_only_without_a_gap():
 @pytest.mark.parametrize("activity", Activity)
 def test_an_arm_that_is_no_longer_finite_is_put_at_rest_and_the_robot_goes_on(activity):
     robot = at(activity)
-    assert robot.send(c.SimulationInject, fault="nan") == Done()
+    assert robot.send(SimulationInject, fault="nan") == Done()
     state = robot.tick()
     assert [(e.kind, e.code) for e in robot.events if e.code == "plant_failure"][-1][0] == "protective_stop"
     powerless = {Activity.POWER_OFF, Activity.IDLE, Activity.BRAKING, Activity.POWERING_OFF}
@@ -286,7 +287,7 @@ def test_an_arm_that_is_no_longer_finite_is_put_at_rest_and_the_robot_goes_on(ac
 
 def test_a_push_as_strong_as_a_collapse_is_survived():
     robot = at(Activity.MOVING)
-    robot.send(c.SimulationInject, fault="torque", joint=3, value=1e6, seconds=10.0)
+    robot.send(SimulationInject, fault="torque", joint=3, value=1e6, seconds=10.0)
     robot.tick(500)
     assert np.isfinite(robot.column("actual_q")).all()
     assert robot.states[-1].safety_mode == SafetyMode.PROTECTIVE_STOP
@@ -306,7 +307,7 @@ def test_a_motion_is_slowed_on_its_way_and_hurried_again(shaper, ticks):
     robot = Robot(shaper=shaper)
     robot.send(c.MoveJ, q=Q3_)
     robot.tick(ticks)
-    robot.send(c.SimulationInject, fault="reduced", seconds=2.0)
+    robot.send(SimulationInject, fault="reduced", seconds=2.0)
     assert robot.tick().safety_mode == SafetyMode.REDUCED
     robot.tick(400)
     assert speeds(robot, ticks + 300).max() <= FASTEST * (1 + 1e-3)
@@ -322,17 +323,17 @@ def test_a_motion_is_slowed_on_its_way_and_hurried_again(shaper, ticks):
 
 def test_a_new_motion_keeps_to_the_reduced_speed():
     robot = Robot()
-    robot.send(c.SimulationInject, fault="reduced")
+    robot.send(SimulationInject, fault="reduced")
     robot.send(c.MoveJ, q=Q3_)
     robot.until_rest(20000)
     assert 0.9 * FASTEST < speeds(robot).max() <= FASTEST * (1 + 1e-3)
-    assert robot.send(c.SimulationInject, fault="normal") == Done()
+    assert robot.send(SimulationInject, fault="normal") == Done()
     assert robot.tick().safety_mode == SafetyMode.NORMAL
 
 
 def test_a_stream_that_may_be_faster_is_stopped_and_not_started():
     robot = at(Activity.STREAMING)
-    robot.send(c.SimulationInject, fault="reduced")
+    robot.send(SimulationInject, fault="reduced")
     robot.until_rest()
     stopped = [event for event in robot.events if event.kind == "stream_stopped"]
     assert [event.code for event in stopped] == ["limit_velocity"]
@@ -343,8 +344,8 @@ def test_a_stream_that_may_be_faster_is_stopped_and_not_started():
 
 def test_a_reset_ends_a_reduction_that_was_to_last_no_longer_than_some_time():
     robot = Robot()
-    robot.send(c.SimulationInject, fault="reduced", seconds=1.0)
+    robot.send(SimulationInject, fault="reduced", seconds=1.0)
     robot.tick()
-    robot.send(c.SimulationReset, q=Q2_)
+    robot.send(SimulationReset, q=Q2_)
     robot.tick(600)
     assert robot.states[-1].safety_mode == SafetyMode.NORMAL

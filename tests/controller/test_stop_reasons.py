@@ -6,12 +6,13 @@ from tvist_controller.about import info_of
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.replies import Done
+from tvist_protocol.simulation import SimulationInject, SimulationReset
 
 from .robots import Q2, Robot
 
 
 def inject(robot, fault, **fields):
-    assert robot.send(c.SimulationInject, fault=fault, **fields) == Done()
+    assert robot.send(SimulationInject, fault=fault, **fields) == Done()
 
 
 def said(robot):
@@ -120,10 +121,10 @@ def test_modes_are_said_before_the_first_tick():
 
 def test_a_robot_that_was_put_into_a_mode_is_stopped_by_nothing_of_before():
     robot = Robot()
-    robot.send(c.SimulationInject, fault="violation")
+    robot.send(SimulationInject, fault="violation")
     robot.tick(5)
     assert info_of(robot.controller).stop is not None
-    robot.send(c.SimulationReset, mode="RUNNING")
+    robot.send(SimulationReset, mode="RUNNING")
     robot.send(c.PowerOff)
     robot.tick(200)
     assert info_of(robot.controller).stop is None

@@ -11,6 +11,7 @@ from tvist_controller.programs.built_in import built_in
 from tvist_protocol import commands as c
 from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramStop
 from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.simulation import SimulationInject, SimulationReset
 
 from .robots import Q1, Q2, Q3, UR5E, Robot
 
@@ -155,8 +156,8 @@ def test_a_move_that_cannot_be_made_ends_it_with_its_line(robot):
 
 @pytest.mark.parametrize(
     ("kind", "fields"),
-    [(c.Stop, {}), (c.PowerOff, {}), (c.ReleaseControl, {}), (c.SimulationReset, {"q": tuple(Q1)})]
-    + [(c.SimulationInject, {"fault": fault}) for fault in ("emergency_stop", "power_loss", "violation")],
+    [(c.Stop, {}), (c.PowerOff, {}), (c.ReleaseControl, {}), (SimulationReset, {"q": tuple(Q1)})]
+    + [(SimulationInject, {"fault": fault}) for fault in ("emergency_stop", "power_loss", "violation")],
 )
 def test_what_ends_a_motion_for_good_ends_the_program(robot, kind, fields):
     play(robot, "paper.urp")
@@ -171,7 +172,7 @@ def test_what_ends_a_motion_for_good_ends_the_program(robot, kind, fields):
 
 @pytest.mark.parametrize(
     ("kind", "fields"),
-    [(c.PowerOff, {}), (c.ReleaseControl, {}), (c.SimulationReset, {}), (ProgramStop, {})],
+    [(c.PowerOff, {}), (c.ReleaseControl, {}), (SimulationReset, {}), (ProgramStop, {})],
 )
 def test_a_program_that_waits_ends_with_power_and_control_too(robot, kind, fields):
     play(robot, "wait_program.urp")
@@ -243,7 +244,7 @@ def test_a_protective_stop_pauses_it_and_playing_goes_on_with_the_line_that_was_
     play(robot, "paper.urp")
     until(robot, lambda: len(reached(robot)) == 1)
     robot.tick(300)
-    robot.send(c.SimulationInject, fault=fault)
+    robot.send(SimulationInject, fault=fault)
     robot.tick(LONG)
     assert state(robot) == ("paper.urp", "PAUSED", 2)
     refused = robot.send(ProgramPlay)
@@ -290,10 +291,10 @@ def test_a_motion_that_ends_while_it_is_paused_leaves_the_next_line_to_play(robo
 def test_a_safeguard_holds_the_motion_and_the_program_waits_with_it(robot):
     play(robot, "Q2.urp")
     robot.tick(200)
-    robot.send(c.SimulationInject, fault="safeguard_stop")
+    robot.send(SimulationInject, fault="safeguard_stop")
     robot.tick(1000)
     assert state(robot)[1] == "PLAYING"
-    robot.send(c.SimulationInject, fault="normal")
+    robot.send(SimulationInject, fault="normal")
     until(robot, stopped(robot))
     assert reached(robot) == [Q2.tolist()]
 
@@ -302,10 +303,10 @@ def test_a_safeguard_between_two_lines_has_the_next_one_wait(robot):
     play(robot, "paper.urp")
     until(robot, lambda: len(reached(robot)) == 1)
     assert robot.controller.cycle.at_rest
-    robot.send(c.SimulationInject, fault="safeguard_stop")
+    robot.send(SimulationInject, fault="safeguard_stop")
     robot.tick(100)
     assert state(robot) == ("paper.urp", "PLAYING", 2)
-    robot.send(c.SimulationInject, fault="normal")
+    robot.send(SimulationInject, fault="normal")
     until(robot, stopped(robot))
     assert reached(robot) == [q.tolist() for q in (Q1, Q2, Q3, Q2, Q1)]
 
@@ -354,9 +355,9 @@ COMMANDS = {
     "motion resume": (c.Resume, {}),
     "motion stop": (c.Stop, {}),
     "move": (c.MoveJ, {"q": tuple(Q2)}),
-    "protective": (c.SimulationInject, {"fault": "protective_stop"}),
-    "safeguard": (c.SimulationInject, {"fault": "safeguard_stop"}),
-    "normal": (c.SimulationInject, {"fault": "normal"}),
+    "protective": (SimulationInject, {"fault": "protective_stop"}),
+    "safeguard": (SimulationInject, {"fault": "safeguard_stop"}),
+    "normal": (SimulationInject, {"fault": "normal"}),
     "unlock": (c.UnlockProtectiveStop, {}),
     "power off": (c.PowerOff, {}),
     "power on": (c.PowerOn, {}),
@@ -391,7 +392,7 @@ def test_whatever_happens_every_motion_ends_once_and_only_a_playing_program_begi
             if robot.states[-1].robot_mode != 7:
                 assert state(robot)[1] == "STOPPED" or playing
     robot.send(ProgramStop)
-    if isinstance(robot.send(c.SimulationReset), Refused):
+    if isinstance(robot.send(SimulationReset), Refused):
         robot.controller.receive(c.Stop())
     robot.tick(LONG)
     ended = [event.id for event in robot.events if event.kind in {"motion_done", "motion_stopped"}]

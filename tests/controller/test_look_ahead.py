@@ -14,6 +14,7 @@ from tvist_lab.safety import changes, streams
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.simulation import SimulationReset
 
 from .robots import FITTING, PAPER, Q3, UR5E, H, Robot, without_arm
 
@@ -77,7 +78,7 @@ def test_a_payload_that_would_meet_the_floor_on_the_rest_of_the_way_is_refused_a
     robot, plain = Robot(), Robot()
     start, target = (0.0, -1.57, 0.0, -1.57, 0.0, 0.0), (0.0, -0.3, 0.0, -1.57, 0.0, 0.0)
     for one in (robot, plain):
-        one.send(c.SimulationReset, q=start)
+        one.send(SimulationReset, q=start)
         one.send(c.MoveJ, q=target)
         one.tick(200)
     moment = (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)
@@ -93,7 +94,7 @@ def test_a_payload_that_would_meet_the_floor_on_the_rest_of_the_way_is_refused_a
 
 def test_at_rest_any_payload_may_be_declared():
     robot = Robot()
-    robot.send(c.SimulationReset, q=(0.0, -0.3, 0.0, -1.57, 0.0, 0.0))
+    robot.send(SimulationReset, q=(0.0, -0.3, 0.0, -1.57, 0.0, 0.0))
     moment = (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)
     assert robot.send(c.SetPayload, mass=3.0, com=(0.3, 0.0, 0.3), inertia=moment) == Done()
 
@@ -103,7 +104,7 @@ def test_a_stream_whose_end_through_the_filter_would_meet_is_stopped_instead(sha
     """With its own low acceleration the stream would come to rest in the floor; a hard stop does not."""
     robot, start = Robot(), np.array([0.0, -1.6, 0.0, -1.57, 0.0, 0.0])
     robot.send(c.SetShaper, name=shaper)
-    robot.send(c.SimulationReset, q=tuple(start))
+    robot.send(SimulationReset, q=tuple(start))
     robot.send(c.ServoStart, velocity=1.5, acceleration=1.0, jerk=100.0)
     q, speed, sequence = start.copy(), 0.0, 0
     while q[1] < -0.2:
@@ -154,7 +155,7 @@ def test_a_stream_that_is_refused_from_standstill_ends_and_says_so():
             q = middle
         else:
             low = float(middle[1])
-    robot.send(c.SimulationReset, q=tuple(q))
+    robot.send(SimulationReset, q=tuple(q))
     assert robot.send(c.ServoStart) == Done()
     for sequence in range(100):
         robot.setpoint(sequence, q + np.array([0.0, 1e-5 * sequence**2, 0.0, 0.0, 0.0, 0.0]))

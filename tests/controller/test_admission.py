@@ -10,6 +10,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.codec import MAX_BYTES, encode
 from tvist_protocol.explain import EXPLAINED_BYTES
 from tvist_protocol.replies import Refused
+from tvist_protocol.simulation import SimulationStep, StepSetpoint
 
 LEASE = Lease("anna", "anna#1", 30.0, 30.0, None)
 Q = (0.0,) * 6
@@ -72,8 +73,8 @@ def test_a_long_sentence_of_the_sender_s_is_cut():
 
 
 def test_a_step_of_a_thousand_setpoints_is_admitted():
-    setpoints = tuple(c.StepSetpoint(sequence=n, q=(3.0,) * 7) for n in range(1000))
-    command = c.SimulationStep(token="anna#1", ticks=1000, setpoints=setpoints)
+    setpoints = tuple(StepSetpoint(sequence=n, q=(3.0,) * 7) for n in range(1000))
+    command = SimulationStep(token="anna#1", ticks=1000, setpoints=setpoints)
     assert admit(encode(command), LEASE).command == command
 
 

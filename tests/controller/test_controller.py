@@ -12,6 +12,7 @@ from tvist_controller.streaming import TIMEOUT
 from tvist_protocol import commands as c
 from tvist_protocol.codec import check, encode
 from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.simulation import SimulationInject, SimulationReset, SimulationStep, StepSetpoint
 from tvist_protocol.stream import Telemetry
 from tvist_protocol.values import Payload
 
@@ -203,7 +204,7 @@ def test_a_calibration_for_another_payload_is_a_warning_and_stands_in_info():
 def test_a_reset_puts_the_arm_elsewhere_and_keeps_lease_and_tick():
     robot = Robot()
     robot.tick(10)
-    assert robot.send(c.SimulationReset, q=Q3_, shaper="none") == Done(tick=10)
+    assert robot.send(SimulationReset, q=Q3_, shaper="none") == Done(tick=10)
     state = robot.tick()
     assert state.tick == 11
     assert state.target_q == list(Q3_)
@@ -214,7 +215,7 @@ def test_a_reset_puts_the_arm_elsewhere_and_keeps_lease_and_tick():
 def test_a_reset_in_mid_motion_stops_it_and_everything_is_as_new():
     robot, fresh = Robot(), Robot(q=Q3_, seed=5)
     motion = moving(robot)
-    robot.send(c.SimulationReset, q=Q3_, seed=5)
+    robot.send(SimulationReset, q=Q3_, seed=5)
     robot.states.clear()
     for each in (robot, fresh):
         each.send(c.MoveJ, q=Q2_)
@@ -231,7 +232,7 @@ def test_a_reset_in_mid_motion_stops_it_and_everything_is_as_new():
 def test_a_reset_without_a_pose_stays_where_it_is():
     robot = Robot()
     moving(robot)
-    robot.send(c.SimulationReset)
+    robot.send(SimulationReset)
     assert robot.tick().target_q == pytest.approx(robot.states[-2].target_q, abs=1.5 * H * 2)
     assert robot.controller.cycle.at_rest
 
@@ -240,7 +241,7 @@ def test_a_reset_keeps_the_seed_that_was_chosen_last():
     robot = Robot()
     noise = []
     for seed in (7, None):
-        robot.send(c.SimulationReset, q=Q1_, seed=seed)
+        robot.send(SimulationReset, q=Q1_, seed=seed)
         noise.append(robot.tick().actual_tool_accelerometer)
     assert noise[0] == noise[1]
 
@@ -248,7 +249,7 @@ def test_a_reset_keeps_the_seed_that_was_chosen_last():
 def test_a_reset_ends_a_stream():
     robot = Robot()
     streaming(robot)
-    robot.send(c.SimulationReset)
+    robot.send(SimulationReset)
     robot.tick()
     assert robot.kinds() == ["stream_stopped"]
     assert robot.send(c.MoveJ, q=Q2_) == Accepted(id=1)
@@ -257,7 +258,7 @@ def test_a_reset_ends_a_stream():
 def test_a_reset_changes_what_is_carried_and_not_what_is_declared():
     robot = Robot()
     declared = robot.tick().target_moment
-    robot.send(c.SimulationReset, payload=HEAVY)
+    robot.send(SimulationReset, payload=HEAVY)
     state = robot.tick()
     assert state.target_moment == declared
     assert robot.controller.cycle.plant.payload.mass == HEAVY.mass
@@ -267,10 +268,10 @@ def test_a_reset_changes_what_is_carried_and_not_what_is_declared():
 def test_a_step_is_granted_with_its_last_tick():
     robot = Robot()
     robot.tick(3)
-    assert robot.send(c.SimulationStep, ticks=10) == Done(tick=13)
+    assert robot.send(SimulationStep, ticks=10) == Done(tick=13)
     robot.send(c.ServoStart)
-    setpoints = (c.StepSetpoint(sequence=0, q=Q1_),)
-    assert robot.send(c.SimulationStep, ticks=1, setpoints=setpoints) == Done(tick=4)
+    setpoints = (StepSetpoint(sequence=0, q=Q1_),)
+    assert robot.send(SimulationStep, ticks=1, setpoints=setpoints) == Done(tick=4)
 
 
 # ---------------------------------------------------------------- refusals
@@ -285,12 +286,12 @@ WITH_TOKEN = [
     (c.SetShaper, {"name": "ei"}),
     (c.SetEstimator, {"name": "fixed", "f_d": (8.0,), "zeta": (0.1,)}),
     (c.SetPayload, {"mass": 1.0, "com": DISC.com, "inertia": DISC.inertia}),
-    (c.SimulationReset, {"q": Q2_}),
-    (c.SimulationStep, {"ticks": 1}),
+    (SimulationReset, {"q": Q2_}),
+    (SimulationStep, {"ticks": 1}),
     (c.PowerOn, {}),
     (c.PowerOff, {}),
     (c.UnlockProtectiveStop, {}),
-    (c.SimulationInject, {"fault": "protective_stop"}),
+    (SimulationInject, {"fault": "protective_stop"}),
 ]
 WRONG = [
     (c.TakeControl, {"client": "b"}, "no_control", "token"),
@@ -315,19 +316,19 @@ WRONG = [
     (c.SetEstimator, {"name": "polynomial", "calibration": "x"}, "unknown_calibration", "calibration"),
     (c.SetPayload, {"mass": 5.1, "com": DISC.com, "inertia": DISC.inertia}, "out_of_range", "mass"),
     (c.SetPayload, {"mass": 1.0, "com": DISC.com, "inertia": IMPOSSIBLE}, "out_of_range", "inertia"),
-    (c.SimulationReset, {"q": Q2_[:2]}, "out_of_range", "q"),
-    (c.SimulationReset, {"q": Q2_, "shaper": "zvv"}, "unknown_shaper", "shaper"),
+    (SimulationReset, {"q": Q2_[:2]}, "out_of_range", "q"),
+    (SimulationReset, {"q": Q2_, "shaper": "zvv"}, "unknown_shaper", "shaper"),
     (
-        c.SimulationReset,
+        SimulationReset,
         {"q": Q2_, "payload": msgspec.structs.replace(HEAVY, inertia=IMPOSSIBLE)},
         "out_of_range",
         "payload.inertia",
     ),
-    (c.SimulationInject, {"fault": "gravity"}, "unknown_fault", "fault"),
-    (c.SimulationInject, {"fault": "nan", "value": 1.0}, "out_of_range", "value"),
-    (c.SimulationInject, {"fault": "torque", "value": 1.0, "seconds": 0.1}, "missing_field", "joint"),
+    (SimulationInject, {"fault": "gravity"}, "unknown_fault", "fault"),
+    (SimulationInject, {"fault": "nan", "value": 1.0}, "out_of_range", "value"),
+    (SimulationInject, {"fault": "torque", "value": 1.0, "seconds": 0.1}, "missing_field", "joint"),
     (
-        c.SimulationInject,
+        SimulationInject,
         {"fault": "torque", "joint": 6, "value": 1.0, "seconds": 0.1},
         "out_of_range",
         "joint",
@@ -416,23 +417,23 @@ def test_a_stream_that_waits_for_its_first_set_point_is_busy():
 def test_without_a_stream_there_is_none_to_stop_or_to_step():
     robot = Robot()
     assert robot.send(c.ServoStop).code == "wrong_mode"
-    setpoints = (c.StepSetpoint(sequence=0, q=Q1_),)
-    reply = robot.send(c.SimulationStep, ticks=1, setpoints=setpoints)
+    setpoints = (StepSetpoint(sequence=0, q=Q1_),)
+    reply = robot.send(SimulationStep, ticks=1, setpoints=setpoints)
     assert (reply.code, reply.where) == ("wrong_mode", "setpoints")
 
 
 def test_a_step_s_set_points_are_checked():
     robot = Robot()
     robot.send(c.ServoStart)
-    good, bad = c.StepSetpoint(sequence=0, q=Q1_), c.StepSetpoint(sequence=1, q=(9.0, *Q1_[1:]))
-    reply = robot.send(c.SimulationStep, ticks=2, setpoints=(good, bad))
+    good, bad = StepSetpoint(sequence=0, q=Q1_), StepSetpoint(sequence=1, q=(9.0, *Q1_[1:]))
+    reply = robot.send(SimulationStep, ticks=2, setpoints=(good, bad))
     assert (reply.code, reply.where) == ("limit_position", "setpoints[1].q[0]")
-    reply = robot.send(c.SimulationStep, ticks=1, setpoints=(good, good))
+    reply = robot.send(SimulationStep, ticks=1, setpoints=(good, good))
     assert (reply.code, reply.where, reply.limit) == ("out_of_range", "setpoints", 1)
 
 
 def test_in_real_time_no_client_steps():
-    reply = Robot(clock="realtime").send(c.SimulationStep, ticks=1)
+    reply = Robot(clock="realtime").send(SimulationStep, ticks=1)
     assert (reply.code, reply.where) == ("wrong_mode", "type")
 
 
@@ -707,7 +708,7 @@ def test_a_robot_of_any_number_of_joints_works_throughout(joints):
     robot.tick(100)
     assert robot.send(c.Stop) == Done()
     robot.until_rest()
-    assert robot.send(c.SimulationReset, q=target) == Done(tick=robot.states[-1].tick)
+    assert robot.send(SimulationReset, q=target) == Done(tick=robot.states[-1].tick)
     state = robot.tick()
     assert len(state.actual_q) == len(state.target_moment) == joints
     assert len(state.actual_TCP_pose) == 6
@@ -760,10 +761,10 @@ def anything(random: np.random.Generator, robot: Robot):
         (c.SetEstimator, {"name": "fixed", "f_d": f_d, "zeta": (float(random.random()),)}),
         (c.SetEstimator, {"name": "polynomial", "calibration": msgspec.to_builtins(calibration())}),
         (c.SetPayload, {"mass": float(random.uniform(0, 6))} | body_),
-        (c.SimulationReset, {"q": q, "seed": int(random.integers(0, 2**63))}),
-        (c.SimulationReset, {"payload": Payload(mass=float(random.uniform(0, 20)), **body_)}),
-        (c.SimulationReset, {"shaper": "mzv"}),
-        (c.SimulationStep, {"ticks": 5, "setpoints": (c.StepSetpoint(sequence=1, q=q),)}),
+        (SimulationReset, {"q": q, "seed": int(random.integers(0, 2**63))}),
+        (SimulationReset, {"payload": Payload(mass=float(random.uniform(0, 20)), **body_)}),
+        (SimulationReset, {"shaper": "mzv"}),
+        (SimulationStep, {"ticks": 5, "setpoints": (StepSetpoint(sequence=1, q=q),)}),
         (c.HandOver, {"client": "b"}),
         (c.Pause, {}),
         *[(c.Resume, {})] * 2,
@@ -773,9 +774,9 @@ def anything(random: np.random.Generator, robot: Robot):
     ]
     rare = [
         (c.PowerOff, {}),
-        (c.SimulationInject, {"fault": str(random.choice(["protective_stop", "reduced", "normal", "nan"]))}),
+        (SimulationInject, {"fault": str(random.choice(["protective_stop", "reduced", "normal", "nan"]))}),
         (
-            c.SimulationInject,
+            SimulationInject,
             {
                 "fault": "torque",
                 "joint": int(random.integers(0, 6)),

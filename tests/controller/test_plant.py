@@ -12,6 +12,7 @@ from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import Measurement, PlantError
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.simulation import SimulationInject, SimulationReset
 
 from .robots import Q2, UR5E, NoArm, Robot, setup
 
@@ -44,7 +45,7 @@ def test_a_given_flexible_arm_is_the_default_to_the_last_bit():
     for robot in robots:
         assert isinstance(robot.send(c.MoveJ, q=tuple(Q2.tolist())), Accepted)
         robot.tick(200)
-        assert robot.send(c.SimulationInject, **PUSH) == Done()
+        assert robot.send(SimulationInject, **PUSH) == Done()
         robot.until_rest()
     assert robots[0].states == robots[1].states
     assert robots[1].controller.cycle.plant is given
@@ -69,7 +70,7 @@ def test_a_plant_of_ones_own_is_what_moves():
 @pytest.mark.parametrize(("fields", "method"), [(PUSH, "push"), ({"fault": "nan"}, "make_nan")])
 def test_a_fault_that_the_plant_cannot_have_is_refused_by_name_and_changes_nothing(fields, method):
     robot, other = Robot(plant=NoArm()), Robot(plant=NoArm())
-    refused = robot.send(c.SimulationInject, **fields)
+    refused = robot.send(SimulationInject, **fields)
     assert isinstance(refused, Refused)
     assert refused.code == "unknown_fault"
     assert "NoArm" in refused.why
@@ -81,10 +82,10 @@ def test_a_fault_that_the_plant_cannot_have_is_refused_by_name_and_changes_nothi
 
 def test_faults_of_the_robot_need_nothing_of_the_plant():
     robot = Robot(plant=NoArm())
-    assert robot.send(c.SimulationInject, fault="protective_stop") == Done()
+    assert robot.send(SimulationInject, fault="protective_stop") == Done()
     robot.tick()
     assert "protective_stop" in robot.kinds()
-    assert isinstance(robot.send(c.SimulationReset), Done)  # lets go of what was pushed, where that can be
+    assert isinstance(robot.send(SimulationReset), Done)  # lets go of what was pushed, where that can be
 
 
 def test_a_plant_that_fails_makes_a_protective_stop_and_is_reset():
@@ -93,7 +94,7 @@ def test_a_plant_that_fails_makes_a_protective_stop_and_is_reset():
     robot.send(c.MoveJ, q=tuple(Q2.tolist()))
     robot.tick(100)
     before = plant.resets
-    assert robot.send(c.SimulationInject, fault="nan") == Done()
+    assert robot.send(SimulationInject, fault="nan") == Done()
     robot.tick()
     assert plant.resets == before + 1
     event = next(event for event in robot.events if event.kind == "protective_stop")

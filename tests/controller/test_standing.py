@@ -3,8 +3,8 @@
 import pytest
 
 from tvist_lab.in_process import free_setup, robot_in_process
-from tvist_protocol import commands as c
 from tvist_protocol.codec import decode_io, decode_state
+from tvist_protocol.simulation import SimulationReset
 
 from .robots import UR5E, Robot
 
@@ -31,7 +31,7 @@ def test_before_the_first_tick_the_state_is_that_of_the_arm_at_rest_where_it_sta
 def test_an_arm_that_was_put_elsewhere_is_told_to_stand_there_at_the_same_tick():
     robot = Robot()
     robot.tick(5)
-    assert robot.send(c.SimulationReset, q=Q2, mode="POWER_OFF").tick == 5
+    assert robot.send(SimulationReset, q=Q2, mode="POWER_OFF").tick == 5
     told = robot.controller.latest
     assert (told.tick, told.target_q, told.robot_mode) == (5, list(Q2), robot.tick().robot_mode)
 

@@ -13,6 +13,7 @@ from tvist_plant.description import Payload
 from tvist_plant.model import link_frame, rigid_model
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.simulation import SimulationReset
 
 from .robots import UR5E, Robot
 
@@ -112,7 +113,7 @@ def test_a_move_that_would_collide_is_refused_with_the_pair_and_the_time():
 
 def test_an_arm_that_is_in_a_meeting_may_move_out_of_it_and_not_further_in():
     robot = Robot()
-    assert isinstance(robot.send(c.SimulationReset, q=tuple(DOWN)), Done)
+    assert isinstance(robot.send(SimulationReset, q=tuple(DOWN)), Done)
     deeper = DOWN + np.array([0.0, 0.2, 0.0, 0.0, 0.0, 0.0])
     assert robot.send(c.MoveJ, q=tuple(deeper)).code == "collision"
     assert robot.send(c.MoveJ, q=(0.0, -0.5, 0.0, -1.57, 0.0, 0.0)) == Accepted(id=1)
@@ -121,7 +122,7 @@ def test_an_arm_that_is_in_a_meeting_may_move_out_of_it_and_not_further_in():
 def test_a_stream_that_would_collide_is_stopped_before_it_does():
     robot = Robot()
     start = np.array([0.0, -1.0, 0.0, -1.57, 0.0, 0.0])
-    robot.send(c.SimulationReset, q=tuple(start))
+    robot.send(SimulationReset, q=tuple(start))
     assert robot.send(c.ServoStart) == Done()
     q = start.copy()
     for sequence in range(2000):

@@ -7,6 +7,7 @@ from tvist_controller.calibrations import load
 from tvist_controller.setup import paper_payload
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Done
+from tvist_protocol.simulation import SimulationReset
 from tvist_protocol.values import Payload
 
 from .robots import PAPER, Q1, Q2, Q3, UR5E, H, Robot
@@ -121,7 +122,7 @@ def test_a_payload_that_no_calibration_saw():
     robot = Robot(calibration=POLYNOMIAL, shaper="auto")
     odd = Payload(mass=3.3, com=(0.02, -0.03, 0.09), inertia=(0.01, 0.0, 0.0, 0.012, 0.0, 0.008))
     assert robot.send(c.SetPayload, mass=odd.mass, com=odd.com, inertia=odd.inertia) == Done()
-    assert robot.send(c.SimulationReset, payload=odd, q=tuple(Q1)).tick is not None
+    assert robot.send(SimulationReset, payload=odd, q=tuple(Q1)).tick is not None
     robot.send(c.MoveJ, q=tuple(Q3))
     robot.until_rest()
     assert ringing(robot) < 0.1

@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 
 from tvist_controller.peripherals import Peripherals
 from tvist_controller.setup import paper_payload
-from tvist_protocol.commands import PowerOff, PowerOn, SimulationInject, SimulationReset
+from tvist_protocol.commands import PowerOff, PowerOn
 from tvist_protocol.io import BITS, NUMBERS, SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Done, Refused
+from tvist_protocol.simulation import SimulationInject, SimulationReset
 
 from .robots import Q1, UR5E, Robot
 

@@ -10,6 +10,7 @@ from tvist_controller.setup import body, paper_payload
 from tvist_protocol import commands as c
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.simulation import SimulationInject, SimulationReset
 
 from .robots import Q1, Q2, Q3, UR5E, H, Robot
 
@@ -17,7 +18,7 @@ MOVE = {"q": tuple(Q3)}
 
 
 def inject(robot, fault, **fields):
-    assert robot.send(c.SimulationInject, fault=fault, **fields) == Done()
+    assert robot.send(SimulationInject, fault=fault, **fields) == Done()
 
 
 def told(robot, kind):
@@ -172,7 +173,7 @@ def test_a_reset_to_a_mode_ends_every_stop():
         robot = moving()
         inject(robot, fault)
         robot.tick(2)
-        assert isinstance(robot.send(c.SimulationReset, q=tuple(Q2), mode="RUNNING"), Done)
+        assert isinstance(robot.send(SimulationReset, q=tuple(Q2), mode="RUNNING"), Done)
         assert robot.tick().safety_mode == SafetyMode.NORMAL
         assert isinstance(robot.send(c.MoveJ, **MOVE), Accepted)
 

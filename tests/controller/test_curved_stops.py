@@ -17,6 +17,7 @@ from tvist_plant.description import Payload
 from tvist_protocol import commands as c
 from tvist_protocol import values
 from tvist_protocol.replies import Accepted, Done
+from tvist_protocol.simulation import SimulationInject
 
 from .curved import DISC, EXCESS, ON, curve_of, moving, played, random_limits, start
 from .curves import Arc, progress, random_arc
@@ -185,11 +186,11 @@ def test_brakes_leave_the_curve_and_the_next_motion_begins_where_they_held():
     curve = curve_of(2)
     robot = moving(curve, "zv", MotionLimits(3.0, 8.0, 2000.0))
     robot.tick(200)
-    robot.send(c.SimulationInject, fault="power_loss")
+    robot.send(SimulationInject, fault="power_loss")
     q = played(robot)
     assert np.abs(np.diff(q, axis=0)).max() < 4.0 * H
     held = q[-1]
-    robot.send(c.SimulationInject, fault="normal")
+    robot.send(SimulationInject, fault="normal")
     robot.send(c.RestartSafety)
     robot.send(c.PowerOn)
     back = Arc(held, -curve.u, curve.v, 0.3, 0.5)

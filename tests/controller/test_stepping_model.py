@@ -21,6 +21,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
 from tvist_protocol.io import SetRegisters
 from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.simulation import SimulationStep, StepSetpoint
 
 from .robots import setup
 
@@ -135,7 +136,7 @@ class Steps(RuleBasedStateMachine):
             reply = self.host.carry_out(admitted, attend=attend)
         else:
             reply = admitted
-        if not isinstance(command, c.SimulationStep):
+        if not isinstance(command, SimulationStep):
             assert self.robot.tick_number == before, "nothing but a step lets time pass"
         return reply
 
@@ -236,7 +237,7 @@ class Steps(RuleBasedStateMachine):
     def do_step(self, _, whose):
         if self.in_step:  # within a step of a host without a queue: in a callback of its caller's
             token = self.token(whose)
-            reply = self.send(c.SimulationStep(token=token, ticks=1))
+            reply = self.send(SimulationStep(token=token, ticks=1))
             assert reply.code == (self.refused_step(token, None, 0) or ("busy",))[0]
         else:
             self.step(whose, None, 1, 0, {})
@@ -255,8 +256,8 @@ class Steps(RuleBasedStateMachine):
     def step(self, whose, motion, ticks, count, within):
         token, count = self.token(whose), min(count, ticks)
         motion_token = None if motion is None else self.token(motion)
-        setpoints = tuple(c.StepSetpoint(sequence=self.sequence + n, q=self.here()) for n in range(count))
-        command = c.SimulationStep(
+        setpoints = tuple(StepSetpoint(sequence=self.sequence + n, q=self.here()) for n in range(count))
+        command = SimulationStep(
             token=token, ticks=ticks, setpoints=setpoints or None, motion_token=motion_token
         )
         refusal = self.refused_step(token, motion_token, count)

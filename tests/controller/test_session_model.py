@@ -23,6 +23,7 @@ from tvist_controller.streaming import TIMEOUT
 from tvist_protocol import commands as c
 from tvist_protocol.modes import SafetyMode
 from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.simulation import SimulationInject, SimulationReset, SimulationStep
 from tvist_protocol.transitions import Activity, after
 
 from .robots import Q1, setup
@@ -207,7 +208,7 @@ class Sessions(RuleBasedStateMachine):
         """Time passes by itself here, whoever asks."""
         before = self.robot.tick_number
         replies = [self.robot.receive(c.TakeClock(client=client), session=self.session(client))]
-        stepped = self.send(c.SimulationStep, whose, ticks=ticks)
+        stepped = self.send(SimulationStep, whose, ticks=ticks)
         replies += [] if stepped is None else [stepped]
         assert {(reply.code, reply.where) for reply in replies} == {("wrong_mode", "type")}
         released = self.robot.receive(c.ReleaseClock(token=self.token(whose)))
@@ -282,7 +283,7 @@ class Sessions(RuleBasedStateMachine):
 
     @rule(whose=TOKENS, fault=st.sampled_from(["protective_stop", "nan", "reduced", "normal"]))
     def inject(self, whose, fault):
-        if self.send(c.SimulationInject, whose, fault=fault) is None:
+        if self.send(SimulationInject, whose, fault=fault) is None:
             return
         if fault == "protective_stop" and after(self.activity, fault) is not None:
             self.told.append("protective_stop")
@@ -293,7 +294,7 @@ class Sessions(RuleBasedStateMachine):
     @precondition(lambda self: self.activity is not Activity.REST)
     @rule(whose=TOKENS, mode=st.sampled_from(["RUNNING", "IDLE", "POWER_OFF", None]))
     def reset(self, whose, mode):
-        if self.send(c.SimulationReset, whose, mode=mode, q=tuple(Q1) if mode else None) is None:
+        if self.send(SimulationReset, whose, mode=mode, q=tuple(Q1) if mode else None) is None:
             return
         self.spoilt = False
         if mode is not None:

@@ -7,6 +7,7 @@ from tvist_controller.trajectory import JointLine, JointStop, MotionLimits, Path
 from tvist_lab.safety.stops import draw, judge
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted
+from tvist_protocol.simulation import SimulationInject, SimulationReset
 
 from .robots import PAPER, Q1, Q2, Q3, ROUNDING, UR5E, H, Robot, calibration, stop, without_arm
 
@@ -38,18 +39,18 @@ def test_every_kind_of_stop_stays_on_the_way_behind_the_motion_and_rests_no_late
 def test_a_stop_that_torque_would_let_go_through_the_floor_is_no_later_than_the_move():
     """Where no rung of decelerations keeps the torque, the move itself is the stop."""
     robot = Robot()
-    robot.send(c.SimulationReset, q=(0.0, -1.57, 0.0, -1.57, 0.0, 0.0))
+    robot.send(SimulationReset, q=(0.0, -1.57, 0.0, -1.57, 0.0, 0.0))
     limits = {"velocity": 3.14, "acceleration": 4.0, "jerk": 2000.0}
     target = (0.0, -0.2, 0.0, -1.57, 0.0, 0.0)
     lasted = []
     for end in (
         lambda: None,
         lambda: robot.controller.client_gone("a", "1f"),
-        lambda: robot.send(c.SimulationInject, fault="protective_stop"),
+        lambda: robot.send(SimulationInject, fault="protective_stop"),
         lambda: robot.send(c.PowerOff),
     ):
         robot.token = robot.controller.receive(c.TakeControl(client="a"), session="1f").token
-        robot.send(c.SimulationReset, q=(0.0, -1.57, 0.0, -1.57, 0.0, 0.0), mode="RUNNING")
+        robot.send(SimulationReset, q=(0.0, -1.57, 0.0, -1.57, 0.0, 0.0), mode="RUNNING")
         started = robot.controller.tick_number
         assert isinstance(robot.send(c.MoveJ, q=target, **limits), Accepted)
         robot.tick(250)
@@ -62,7 +63,7 @@ def test_a_stop_that_torque_would_let_go_through_the_floor_is_no_later_than_the_
 def test_a_move_whose_torque_passes_a_limit_says_by_how_much():
     robot = Robot()
     robot.send(c.SetShaper, name="none")
-    robot.send(c.SimulationReset, q=(0.0, -0.9, 0.0, -1.57, 0.0, 0.0))
+    robot.send(SimulationReset, q=(0.0, -0.9, 0.0, -1.57, 0.0, 0.0))
     robot.send(c.MoveJ, q=(0.0, -0.3, 0.0, -1.57, 0.0, 0.0), velocity=3.0, acceleration=8.0, jerk=500.0)
     robot.until_rest()
     told = [event for event in robot.events if event.kind == "warning" and event.code == "limit_torque"]
@@ -232,7 +233,7 @@ def test_a_stop_is_not_ahead_of_a_motion_that_negative_impulses_let_turn_back(na
     robot.send(c.SetEstimator, name="fixed", f_d=(5.0,), zeta=(0.1,))
     robot.send(c.SetShaper, name=name)
     for moment in range(8, 80, 2):
-        robot.send(c.SimulationReset, q=tuple(Q1), mode="RUNNING")
+        robot.send(SimulationReset, q=tuple(Q1), mode="RUNNING")
         robot.tick(3)
         assert isinstance(robot.send(c.MoveJ, q=target, velocity=0.5, acceleration=2.0, jerk=50.0), Accepted)
         robot.tick(moment)

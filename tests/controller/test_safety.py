@@ -17,6 +17,7 @@ from tvist_controller.stops import STEP, StopPlanner
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_plant.description import Payload
 from tvist_protocol import commands as c
+from tvist_protocol.simulation import SimulationReset
 
 from .robots import Q1, Q3, UR5E, H, Robot
 
@@ -85,7 +86,7 @@ def test_a_stop_is_no_protective_stop(seed):
     random = np.random.default_rng(seed)
     robot = Robot(seed=seed)
     if seed % 2:
-        robot.send(c.SimulationReset, q=tuple(Q3))
+        robot.send(SimulationReset, q=tuple(Q3))
     start = np.array(robot.tick().target_q)
     robot.send(c.ServoStart)
     swing, pace = random.uniform(-0.3, 0.3, 6), random.uniform(1.5, 3.0)

@@ -1,0 +1,186 @@
+"""Ring-downs fitted, judged and written as a calibration."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+
+import numpy as np
+
+from tvist_controller.setup import paper_payload
+from tvist_lab.identification.fit import spread
+from tvist_lab.identification.identify import IdentificationError
+from tvist_lab.identification.modal_fit import (
+    MODES,
+    ModalFit,
+    OwnPoles,
+    describe,
+    fit_from_many,
+    fit_modal,
+    own_poles,
+)
+from tvist_lab.identification.modal_plan import LEAST, ModalPlan
+from tvist_lab.identification.ring_downs import Ringing
+from tvist_lab.identification.unknowns import ArmModes
+from tvist_lab.workspace import IDENTIFIED
+from tvist_protocol.calibration import Calibration, ModalModel, Provenance, RingDownFit, Spread
+from tvist_protocol.info import Info
+
+CONTRADICTION = 0.2
+"""Share of a ring-down that its own poles explain and the others' do not, from which on it contradicts them ... [-]"""
+SIGNIFICANT = 60.0
+"""... where noise alone does not make that; see `OwnPoles.significance` [-]."""
+SUSPECTS = 3
+"""Ring-downs that are left out for a trial."""
+GUILTY = 3
+"""More than one in so many, and it cannot be said which are wrong."""
+TOLD = 3
+"""Modes whose errors are told."""
+CERTAIN = (0.05, 0.2)
+"""Deviation of a ring-down's own f_d and ζ up to which a model is judged by them [-]."""
+WORKSPACE = 200
+"""Configurations in which the range of the modes is looked for."""
+MARGIN = 0.85
+"""Margin on the lowest frequency found over the workspace, and on the distance to the highest damping ratio [-]."""
+
+
+@dataclass(frozen=True)
+class ModeErrors:
+    """Errors of one mode [%]."""
+
+    f_d: Spread
+    zeta: Spread
+
+
+def calibrate(
+    arm: ArmModes,
+    ringings: Sequence[Ringing],
+    info: Info,
+    plan: ModalPlan,
+    rejected: int,
+    *,
+    name: str,
+    command: str,
+) -> Calibration:
+    """Fit, judge and put down.
+
+    Raises:
+        IdentificationError: The ring-downs contradict each other.
+    """
+    _check_contradictions(arm, ringings, fit_modal(arm, ringings))
+    fit = fit_from_many(arm, ringings)
+    unseen = _cross_validate(arm, ringings, fit)
+    first = np.array(
+        [np.ravel(describe(fit.drivetrain.poles(arm.mass(r.q, r.payload))[0][:1])) for r in ringings]
+    )
+    noise = float(np.sqrt(np.mean([r.noise**2 for r in ringings])))
+    f_d_min, zeta_max = _range(arm, fit, info.limits.payload)
+    model = ModalModel(
+        parameters=arm.parameters(fit.logarithms, fit.deviations),
+        f_d_min=f_d_min,
+        zeta_max=zeta_max,
+        payloads=arm.payloads,
+        ring_downs=tuple(
+            RingDownFit(q=tuple(r.q.tolist()), payload=r.payload, rms=r.rms, residual_to_noise=float(ratio))
+            for r, ratio in zip(ringings, fit.residual_to_noise, strict=True)
+        ),
+        noise=noise,
+        residual_to_noise=float(np.sqrt(np.mean(fit.residual_to_noise**2))),
+        cross_validated_f_d_percent=tuple(None if mode is None else mode.f_d for mode in unseen),
+        cross_validated_zeta_percent=tuple(None if mode is None else mode.zeta for mode in unseen),
+    )
+    (low_f, low_z), (high_f, high_z) = first.min(axis=0).tolist(), first.max(axis=0).tolist()
+    return Calibration(
+        name=name,
+        robot=info.model,
+        payload=max(arm.payloads, key=lambda payload: payload.mass),
+        modal=model,
+        provenance=Provenance(
+            command=command,
+            version=version("tvist"),
+            seed=plan.seed,
+            configurations=len({r.q.tobytes() for r in ringings}),
+            ring_downs=len(ringings),
+            rejected=rejected,
+            measured_f_d_range=(low_f, high_f),
+            measured_zeta_range=(low_z, high_z),
+            arm=info.arm,
+        ),
+    )
+
+
+def _check_contradictions(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> None:
+    """Find what no springs and drives can explain together.
+
+    A ring-down that is wrong spoils the fit of the others, too. So of those that are explained worst the one is left
+    out without which the rest fits best, until all that is left agrees.
+    """
+    rest = list(range(len(ringings)))
+    guilty: list[int] = []
+    while len(guilty) <= len(ringings) // GUILTY:
+        explained = {number: _own(arm, ringings[number], fit) for number in rest}
+        worst = sorted(rest, key=lambda number: -explained[number].share)[:SUSPECTS]
+        if all(own.share < CONTRADICTION or own.significance < SIGNIFICANT for own in explained.values()):
+            break
+        without = {
+            number: fit_modal(arm, [ringings[other] for other in rest if other != number], fit.logarithms)
+            for number in worst
+        }
+        removed = min(worst, key=lambda number: without[number].cost)
+        guilty.append(removed)
+        rest.remove(removed)
+        fit = without[removed]
+    else:
+        raise IdentificationError(
+            f"the {len(ringings)} ring-downs contradict each other: no springs and drives explain them together. Was "
+            "the payload the declared one each time, is the robot the one of the file, and did nothing shake it?"
+        )
+    if guilty:
+        names = "; ".join(
+            f"number {number + 1} with {arm.payloads[ringings[number].payload].mass:g} kg at q = "
+            f"{ringings[number].q.round(2).tolist()}"
+            for number in sorted(guilty)
+        )
+        raise IdentificationError(
+            f"ring-downs that contradict the other {len(rest)}: {names}. Was the payload the declared one, and was "
+            "the arm free? Check this and measure again, or use another seed for other configurations"
+        )
+
+
+def _own(arm: ArmModes, ringing: Ringing, fit: ModalFit) -> OwnPoles:
+    """A ring-down's own poles beside those of a fit."""
+    return own_poles(arm, ringing, fit.drivetrain.poles(arm.mass(ringing.q, ringing.payload))[0][:MODES])
+
+
+def _cross_validate(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> list[ModeErrors | None]:
+    """Errors of each mode by fits that did not see a configuration, where its own ring-down is certain enough."""
+    pairs: list[list[tuple[float, float, float, float]]] = [[] for _ in range(TOLD)]
+    for place in {r.q.tobytes() for r in ringings}:
+        others = [r for r in ringings if r.q.tobytes() != place]
+        unseen = fit_modal(arm, others, fit.logarithms)
+        for ringing in (r for r in ringings if r.q.tobytes() == place):
+            f_d, zeta = describe(unseen.drivetrain.poles(arm.mass(ringing.q, ringing.payload))[0][:MODES])
+            own = _own(arm, ringing, unseen)
+            for mode in range(TOLD):
+                if own.f_d_error[mode] < CERTAIN[0] and own.zeta_error[mode] < CERTAIN[1]:
+                    pairs[mode].append((f_d[mode], own.f_d[mode], zeta[mode], own.zeta[mode]))
+    errors: list[ModeErrors | None] = []
+    for pair in pairs:
+        if len(pair) < LEAST - 1:
+            errors.append(None)
+            continue
+        f_d, own_f_d, zeta, own_zeta = np.array(pair).T
+        errors.append(ModeErrors(spread(f_d, own_f_d), spread(zeta, own_zeta)))
+    return errors
+
+
+def _range(arm: ArmModes, fit: ModalFit, rated: float) -> tuple[float, float]:
+    """Lowest f_d and highest ζ that a filter has to count on, with some room."""
+    description = arm.description
+    everywhere = IDENTIFIED.spread(WORKSPACE, description.joints, 0)
+    lowest, highest = np.inf, 0.0
+    whole = ArmModes(description, (paper_payload(description, 0.0), paper_payload(description, rated)))
+    for payload in range(2):
+        for q in everywhere:
+            f_d, zeta = describe(fit.drivetrain.poles(whole.mass(q, payload))[0][:MODES])
+            lowest, highest = min(lowest, float(f_d.min())), max(highest, float(zeta.max()))
+    return MARGIN * lowest, 1.0 - MARGIN * (1.0 - highest)

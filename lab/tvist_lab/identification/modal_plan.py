@@ -1,0 +1,60 @@
+"""What is measured for a modal calibration, and where."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from tvist_controller.collision import CollisionModel
+from tvist_controller.setup import body
+from tvist_lab.identification.identify import IdentificationError
+from tvist_lab.identification.ring_downs import Jog
+from tvist_lab.recordings import Floats
+from tvist_lab.workspace import IDENTIFIED
+from tvist_plant.description import RobotDescription
+from tvist_protocol.values import Payload
+
+RING_DOWNS = 12
+LEAST = 4
+"""Ring-downs below which the model is little more than its guesses."""
+
+
+@dataclass(frozen=True)
+class ModalPlan:
+    """What to measure."""
+
+    ring_downs: int = RING_DOWNS
+    """In all, the same number with each payload, one more where it does not divide."""
+    payloads: tuple[Payload, ...] = ()
+    """Carried one after the other by a simulated arm; none: what it carries, which is what is declared."""
+    seed: int = 0
+    """Seed of the candidates."""
+    jog: Jog = field(default_factory=Jog)
+
+
+def check(plan: ModalPlan, payloads: int) -> None:
+    """Check that there are enough ring-downs, before the arm moves.
+
+    Raises:
+        IdentificationError: There are not.
+    """
+    least = max(LEAST, payloads)
+    if plan.ring_downs < least:
+        raise IdentificationError(
+            f"{plan.ring_downs} ring-downs with {payloads} payloads are too few for springs and drives: "
+            f"at least {least} are needed, 12 are recommended"
+        )
+
+
+def free_configurations(
+    description: RobotDescription, payloads: Sequence[Payload], count: int, plan: ModalPlan
+) -> list[Floats]:
+    """Configurations in which the arm meets nothing, at either end of the jog, whatever it carries."""
+    joints = description.joints
+    models = [CollisionModel(description, body(payload)) for payload in payloads]
+    jog = plan.jog.of(joints)
+    found: list[Floats] = []
+    for q in IDENTIFIED.spread(20 * count, joints, plan.seed):
+        if len(found) == count:
+            break
+        if all(model.meeting(end) is None for model in models for end in (q, q - jog)):
+            found.append(q)
+    return found

@@ -1,0 +1,168 @@
+"""Poles followed from one configuration to the next, by Newton's method for the nonlinear eigenvalue problem.
+
+The equations are in `tvist_shaping.estimators.modal`; eigenvalues that enter nonlinearly: Ruhe 1973.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from tvist_shaping._compiled import compiled
+from tvist_shaping._types import Floats
+
+Complex = npt.NDArray[np.complex128]
+
+LOWEST = 0.5
+"""Frequency below which a pole is no vibration [Hz]."""
+DAMPED = 0.9
+"""Damping ratio above which a pole is no vibration [-]."""
+STEPS = 12
+"""Newton steps for a mode; two or three do from one tick to the next."""
+TURNED = 0.01
+"""Square of the change of a shape, of largest entry 1, above which a step is not the last [-]."""
+CONVERGED = 1e-5
+"""Newton step of a pole against its size that is the last: what is left is that squared [-]."""
+APART = 1e-7
+"""Distance against their size below which two poles followed are suspected of being one [-]."""
+
+
+@compiled
+def follow(mass: Floats, rows: Floats, poles: Complex, shapes: Complex, scratch: Complex) -> bool:
+    """Newton's method for every pole, from where it was; poles and shapes are changed in place.
+
+    Args:
+        mass: M, shape (L, L).
+        rows: `Drivetrain.rows`.
+        poles: Shape (k,).
+        shapes: Shape (k, L), largest entry 1.
+        scratch: Shape (L + k, L + 1).
+
+    Returns:
+        Whether all converged, to poles of their own; where not, all are left as they were.
+    """
+    L = mass.shape[0]
+    before = scratch[L:]
+    before[:, 0] = poles
+    before[:, 1:] = shapes
+    if _converge(mass, rows, poles, shapes, scratch[:L]):
+        return True
+    poles[:] = before[:, 0]
+    shapes[:] = before[:, 1:]
+    return False
+
+
+@compiled
+def _converge(  # noqa: C901, PLR0912 - one kernel: its branches are loops over coordinates
+    mass: Floats, rows: Floats, poles: Complex, shapes: Complex, matrix: Complex
+) -> bool:
+    """Do the same as `follow`; if it fails, poles and shapes are not usable."""
+    L = mass.shape[0]
+    for k in range(poles.shape[0]):
+        s = poles[k]
+        found = False
+        for _ in range(STEPS):
+            # F is symmetric, so the pole that belongs to a shape v solves vᵀ F(s) v = 0: the error of v enters
+            # squared.
+            for _ in range(STEPS):
+                residual, slope = 0.0j, 0.0j
+                for i in range(L):
+                    along = 0.0j
+                    for j in range(L):
+                        along += mass[i, j] * shapes[k, j]
+                    spring, change = _spring(rows, i, s)
+                    v = shapes[k, i]
+                    residual += v * (along * s * s + spring * v)
+                    slope += v * (2.0 * along * s + change * v)
+                if slope == 0.0:
+                    return False
+                step = residual / slope
+                s -= step
+                if not abs(step) > CONVERGED * abs(s):
+                    break
+            if not abs(s) < 1e9:
+                return False
+            # The shape that belongs to the pole, by inverse iteration: F(s) x = F'(s) v.
+            for i in range(L):
+                right = 0.0j
+                for j in range(L):
+                    entry = mass[i, j] * s
+                    matrix[i, j] = entry * s
+                    right += entry * shapes[k, j]
+                spring, change = _spring(rows, i, s)
+                matrix[i, i] += spring
+                matrix[i, L] = 2.0 * right + change * shapes[k, i]
+            if not _solve(matrix):
+                found = True  # s is the pole to the last bit
+                break
+            largest = 0
+            for i in range(1, L):
+                if abs(matrix[i, L]) > abs(matrix[largest, L]):
+                    largest = i
+            scale = matrix[largest, L]
+            # Newton's next step of the pole itself.
+            step = shapes[k, largest] / scale
+            s -= step
+            turn = 1.0 / scale
+            turned = 0.0
+            for i in range(L):
+                v = matrix[i, L] * turn
+                turned += abs(v - shapes[k, i]) ** 2
+                shapes[k, i] = v
+            # The step says nothing where the shape is another one than it was: two modes that are almost one.
+            if abs(step) <= CONVERGED * abs(s) and turned <= TURNED:
+                found = True
+                break
+        if not found or s.imag <= 2.0 * np.pi * LOWEST or -s.real >= DAMPED * abs(s):
+            return False
+        poles[k] = s
+    for k in range(poles.shape[0]):
+        for m in range(k):
+            if abs(poles[k] - poles[m]) < APART * abs(poles[k]):
+                # One pole twice has one shape; two that cross have two.
+                along = 0.0j
+                first, second = 0.0, 0.0
+                for i in range(L):
+                    along += shapes[k, i] * np.conj(shapes[m, i])
+                    first += abs(shapes[k, i]) ** 2
+                    second += abs(shapes[m, i]) ** 2
+                if abs(along) ** 2 > (1.0 - 1e-6) * first * second:
+                    return False
+    return True
+
+
+@compiled
+def _spring(rows: Floats, i: int, s: complex) -> tuple[complex, complex]:
+    """κ(s) of a coordinate, and its derivative."""
+    D = rows[4, i]
+    k = rows[0, i] + D * s
+    if rows[1, i] == 0.0:
+        return k, D + 0.0j
+    z = rows[1, i] * s * s + rows[2, i] * (s + rows[3, i])
+    of_gear, of_motor = k / (k + z), z / (k + z)
+    return k * of_motor, of_gear * of_gear * (2.0 * rows[1, i] * s + rows[2, i]) + of_motor * of_motor * D
+
+
+@compiled
+def _solve(matrix: Complex) -> bool:  # noqa: C901 - likewise
+    """Gaussian elimination with pivots; the solution takes the place of the last column."""
+    L = matrix.shape[0]
+    for i in range(L):
+        pivot = i
+        for j in range(i + 1, L):
+            if abs(matrix[j, i]) > abs(matrix[pivot, i]):
+                pivot = j
+        if matrix[pivot, i] == 0.0:
+            return False
+        if pivot != i:
+            for c in range(i, L + 1):
+                matrix[i, c], matrix[pivot, c] = matrix[pivot, c], matrix[i, c]
+        turn = 1.0 / matrix[i, i]
+        for j in range(i + 1, L):
+            factor = matrix[j, i] * turn
+            for c in range(i + 1, L + 1):
+                matrix[j, c] -= factor * matrix[i, c]
+    for i in range(L - 1, -1, -1):
+        value = matrix[i, L]
+        for c in range(i + 1, L):
+            value -= matrix[i, c] * matrix[c, L]
+        matrix[i, L] = value / matrix[i, i]
+    return True
