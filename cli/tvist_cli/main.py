@@ -37,6 +37,13 @@ def main() -> None:
         sys.exit(130)
 
 
+def _default(value: object) -> str | None:
+    """The default as a help text shows it: none for a switch that is off."""
+    if value is None or value is False:
+        return None
+    return "on" if value is True else f"{value:g}" if isinstance(value, float) else str(value)
+
+
 def _run() -> None:
     if sys.argv[1:2] == ["serve"]:
         # Nothing is served yet, so a signal can end the process at once. As the first process of a container,
@@ -59,12 +66,17 @@ def _run() -> None:
         name="tvist",
         help="A robot controller for a flexible arm in simulation, with time-varying input shaping.",
         version=version("tvist"),
-        help_format="plaintext",
-        default_parameter=cyclopts.Parameter(negative=(), validator=finite),
+        help_format="markdown",  # joins the lines of a docstring
+        default_parameter=cyclopts.Parameter(negative=(), validator=finite, show_default=_default),
         config=check_whole,
     )
     for place, (name, what) in enumerate(COMMANDS.items()):
-        app.command(f"tvist_cli.commands.{name}:{name}", name=name, help=what, sort_key=place)
+        whole = sys.argv[1:2] == [
+            name
+        ]  # its own help is its docstring, the list of all commands has the short one
+        app.command(
+            f"tvist_cli.commands.{name}:{name}", name=name, help=None if whole else what, sort_key=place
+        )
     try:
         with told(OSError):  # a folder for figures that is none, mostly
             app(readable(sys.argv[1:]), exit_on_error=False, print_error=False)

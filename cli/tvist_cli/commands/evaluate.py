@@ -56,7 +56,8 @@ def evaluate(
         shaper: Name of a shaper; or of a filter for several modes: auto, short, or auto-target, which is given the
             target of each move; or FILE.py:NAME, which runs that file, for your own shaper.
         modes: Number of modes that the shaper suppresses; more than one needs a modal calibration.
-        calibration: Name of a calibration that comes with the package, or path of a calibration file.
+        calibration: Name of a calibration that comes with the package, or path of a calibration file
+            [ur5e_5kg; for several modes, ur5e_modal].
         robot: Name of a robot that comes with the package, or path of a robot file.
         seed: Seed of random moves, payloads and gear errors.
         wrists: Let random moves turn the two outer wrist joints as well.

@@ -58,7 +58,7 @@ def serve(
         shaper: Any name that tvist shapers lists, such as none, zv or ei3; or auto, short or auto-target; or
             FILE.py:NAME, which runs that file and adds your own shaper to those that clients can choose [zv].
         calibration: Name of a calibration that comes with the package, or path of a calibration file; none for a robot
-            that is yet to be identified.
+            that is yet to be identified [ur5e_5kg].
         clock: realtime, or lockstep, in which a client steps the simulation [realtime].
         speed: Simulation speed relative to real time [1].
         realtime_priority: Run the control loop with real-time priority (SCHED_FIFO), if the system permits it.

@@ -46,7 +46,7 @@ def shaperbench(
         against: Names of the shapers and baselines to run, in addition to waiting; default: all.
         seed: Seed of moves, payloads, gear errors and parameter scatter.
         calibration: Name of a calibration that comes with the package, or path of a calibration file; it needs a modal
-            model.
+            model [ur5e_modal].
         output: JSON file to write the leaderboard to.
         figures: Folder to write a figure of settling time against residual vibration to.
         markdown: File to write a page with the tables to.
