@@ -7,8 +7,7 @@ from msgspec.structs import replace
 
 from tvist_client.robot import Robot
 from tvist_client.transports.loopback import LoopbackTransport
-from tvist_controller.loopback import LoopbackHost
-from tvist_controller.setup import Setup
+from tvist_controller.api import LoopbackHost, Setup
 from tvist_server.config import ServeConfig
 
 

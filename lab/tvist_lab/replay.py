@@ -5,10 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tvist_controller.controller import Controller
-from tvist_controller.own_shapers import OwnShaper, RecordedShaper
-from tvist_controller.presence import Presence
-from tvist_controller.setup import Setup
+from tvist_controller.api import Controller, OwnShaper, Presence, RecordedShaper, Setup
 from tvist_lab.mcap_file import RecordingFile
 from tvist_protocol.commands import HandOver, Setpoint, TakeControl
 from tvist_protocol.content import checked

@@ -6,11 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from tvist_controller.control.inverse_dynamics import InverseDynamics
-from tvist_controller.cycle import ControlCycle
-from tvist_controller.loopback import LoopbackHost
-from tvist_controller.setup import Setup, body
-from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
+from tvist_controller.api import (
+    ControlCycle,
+    InverseDynamics,
+    JointLine,
+    LoopbackHost,
+    MotionLimits,
+    Setup,
+    body,
+    quickest_motion,
+)
 from tvist_lab.in_process import free_setup
 from tvist_lab.paper.published import pose
 from tvist_lab.second_opinion import SecondOpinion

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tvist_controller.setup import body, paper_payload
+from tvist_controller.api import body, paper_payload
 from tvist_lab.evaluation.baselines import Baseline
 from tvist_lab.evaluation.line import PAPER, control_line, point_to_point, shape, simulate
 from tvist_lab.evaluation.moves import Move

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tvist_controller.setup import paper_payload
-from tvist_controller.trajectory import MotionLimits
+from tvist_controller.api import MotionLimits, paper_payload
 from tvist_lab.evaluation.candidates import Candidate, Task
 from tvist_lab.evaluation.line import PAPER
 from tvist_lab.evaluation.recipes import Recipe

@@ -10,10 +10,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from tvist_controller.control.differentiator import Target
-from tvist_controller.cycle import STILL, ControlCycle
-from tvist_controller.reporting import truth_of
-from tvist_controller.trajectory import JointLine, MotionLimits, Trajectory, quickest_motion
+from tvist_controller.api import (
+    STILL,
+    ControlCycle,
+    JointLine,
+    MotionLimits,
+    Target,
+    Trajectory,
+    quickest_motion,
+    truth_of,
+)
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import PERIOD, Plant

@@ -2,11 +2,14 @@
 
 from dataclasses import dataclass, replace
 
-from tvist_controller.choices import choose_filter, wanted_modes
-from tvist_controller.mode_source import ModeSource
-from tvist_controller.own_shapers import OwnShaper
-from tvist_controller.setup import paper_payload
-from tvist_controller.trajectory import MotionLimits
+from tvist_controller.api import (
+    ModeSource,
+    MotionLimits,
+    OwnShaper,
+    choose_filter,
+    paper_payload,
+    wanted_modes,
+)
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from tvist_controller.cycle import STILL
+from tvist_controller.api import STILL
 from tvist_lab.evaluation.line import LONGEST
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
-from tvist_controller.setup import body, paper_payload
+from tvist_controller.api import body, paper_payload
 from tvist_lab.evaluation.arms import ARMS
 from tvist_lab.evaluation.candidates import Candidate, Task
 from tvist_lab.evaluation.causality import check_causal

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from tvist_controller.own_shapers import OwnShaper
+from tvist_controller.api import OwnShaper
 from tvist_lab.evaluation.baselines import baselines, longest_mean_delay
 from tvist_lab.evaluation.candidates import Candidate, Held, Longer, Named, Shaping
 from tvist_lab.evaluation.foreign import FromFile

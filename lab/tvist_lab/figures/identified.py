@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tvist_controller.calibrations import estimator_of
+from tvist_controller.api import estimator_of
 from tvist_lab.figures.style import SHAPED, THIRD, UNSHAPED, legend, panels, title
 from tvist_lab.recordings import Floats
 from tvist_protocol.calibration import Calibration

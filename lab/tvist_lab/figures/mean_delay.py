@@ -3,10 +3,14 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tvist_controller import calibrations
-from tvist_controller.calibrations.modal import modal_estimator
-from tvist_controller.setup import paper_payload
-from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
+from tvist_controller.api import (
+    JointLine,
+    MotionLimits,
+    load_calibration,
+    modal_estimator,
+    paper_payload,
+    quickest_motion,
+)
 from tvist_lab.figures.style import INK, SHAPED, UNSHAPED, legend, panels
 from tvist_lab.recordings import Floats
 from tvist_plant.description import load
@@ -28,7 +32,7 @@ def mean_delay_figure() -> Figure:
     Top: the mean delay. Middle and bottom: velocity and acceleration, with the reference's limits.
     """
     description = load("ur5e")
-    payload, calibration = paper_payload(description), calibrations.load("ur5e_modal")
+    payload, calibration = paper_payload(description), load_calibration("ur5e_modal")
     joints = description.joints
     filters = [
         BUILT_IN.make_filter(

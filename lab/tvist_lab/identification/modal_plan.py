@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from tvist_controller.collision import CollisionModel
-from tvist_controller.setup import body
+from tvist_controller.api import CollisionModel, body
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.ring_downs import Jog
 from tvist_lab.recordings import Floats

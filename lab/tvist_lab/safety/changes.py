@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.collision import CLEARANCE, CollisionModel
-from tvist_controller.setup import body, paper_payload
+from tvist_controller.api import CLEARANCE, CollisionModel, body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_lab.safety import stops, streams
 from tvist_lab.safety.subject import Subject

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from tvist_controller.collision import CLEARANCE, FAR
-from tvist_controller.stopping import stopping
+from tvist_controller.api import CLEARANCE, FAR, stopping
 from tvist_plant.description import load
 
 

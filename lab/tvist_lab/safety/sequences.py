@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.collision import CLEARANCE, CollisionModel
-from tvist_controller.cycle import STILL
-from tvist_controller.setup import body, paper_payload
+from tvist_controller.api import CLEARANCE, STILL, CollisionModel, body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_lab.safety.changes import far_payload
 from tvist_lab.safety.stops import SHAPERS

@@ -5,11 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.ahead import resting_after
-from tvist_controller.collision import CLEARANCE, CollisionModel
-from tvist_controller.safety import TORQUE_SHARE
-from tvist_controller.setup import body, paper_payload
-from tvist_controller.trajectory import JointLine
+from tvist_controller.api import (
+    CLEARANCE,
+    TORQUE_SHARE,
+    CollisionModel,
+    JointLine,
+    body,
+    paper_payload,
+    resting_after,
+)
 from tvist_lab.recordings import Floats
 from tvist_lab.safety.subject import CLIENT, SESSION, Subject, refused, torques
 from tvist_lab.workspace import WORKSPACE

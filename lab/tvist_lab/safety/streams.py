@@ -5,9 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.collision import CLEARANCE, CollisionModel
-from tvist_controller.setup import body, paper_payload
-from tvist_controller.trajectory import JointLine
+from tvist_controller.api import CLEARANCE, CollisionModel, JointLine, body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_lab.safety.stops import SHAPERS, two_postures
 from tvist_lab.safety.subject import CLIENT, SESSION, Subject, refused

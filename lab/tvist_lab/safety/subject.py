@@ -5,12 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from tvist_controller.calibrations import load
-from tvist_controller.control.differentiator import central_differences
-from tvist_controller.control.inverse_dynamics import InverseDynamics
-from tvist_controller.controller import Controller
-from tvist_controller.cycle import STILL
-from tvist_controller.setup import Setup, body
+from tvist_controller.api import (
+    STILL,
+    Controller,
+    InverseDynamics,
+    Setup,
+    body,
+    central_differences,
+    load_calibration,
+)
 from tvist_lab.recordings import Floats
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
@@ -87,7 +90,7 @@ class Subject:
             description=self.description,
             q=tuple(self.q.tolist()),
             payload=self.payload,
-            calibration=load("ur5e_5kg"),
+            calibration=load_calibration("ur5e_5kg"),
             shaper="none" if undamped else self.shaper,
             clock=self.clock,
         )

@@ -1,0 +1,61 @@
+"""The controller's public face: what studies, experiments and evaluations use of it.
+
+The modules behind it may change; `tvist_lab` imports nothing else of this package.
+"""
+
+from tvist_controller.ahead import resting_after
+from tvist_controller.calibrations import DEFAULT as DEFAULT_CALIBRATION
+from tvist_controller.calibrations import estimator_of
+from tvist_controller.calibrations import load as load_calibration
+from tvist_controller.calibrations.modal import drivetrain, mass_matrix, modal_estimator
+from tvist_controller.choices import choose_filter, wanted_modes
+from tvist_controller.collision import CLEARANCE, FAR, CollisionModel
+from tvist_controller.control.differentiator import Target, central_differences
+from tvist_controller.control.inverse_dynamics import InverseDynamics
+from tvist_controller.controller import Controller
+from tvist_controller.cycle import STILL, ControlCycle
+from tvist_controller.loopback import LoopbackHost
+from tvist_controller.mode_source import ModeSource
+from tvist_controller.own_shapers import OwnShaper, RecordedShaper
+from tvist_controller.presence import Presence
+from tvist_controller.reporting import truth_of
+from tvist_controller.safety import TORQUE_SHARE
+from tvist_controller.setup import Setup, body, paper_payload
+from tvist_controller.stopping import stopping
+from tvist_controller.trajectory import JointLine, MotionLimits, Trajectory, quickest_motion
+
+__all__ = [
+    "CLEARANCE",
+    "DEFAULT_CALIBRATION",
+    "FAR",
+    "STILL",
+    "TORQUE_SHARE",
+    "CollisionModel",
+    "ControlCycle",
+    "Controller",
+    "InverseDynamics",
+    "JointLine",
+    "LoopbackHost",
+    "ModeSource",
+    "MotionLimits",
+    "OwnShaper",
+    "Presence",
+    "RecordedShaper",
+    "Setup",
+    "Target",
+    "Trajectory",
+    "body",
+    "central_differences",
+    "choose_filter",
+    "drivetrain",
+    "estimator_of",
+    "load_calibration",
+    "mass_matrix",
+    "modal_estimator",
+    "paper_payload",
+    "quickest_motion",
+    "resting_after",
+    "stopping",
+    "truth_of",
+    "wanted_modes",
+]
