@@ -1,6 +1,7 @@
 """What all tests share: which of them `make test` runs, which run alone, and figures that they measure."""
 
 import asyncio
+import signal
 from pathlib import Path
 
 import pytest
@@ -22,7 +23,12 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_sessionstart(session):
-    """Compile the kernels before tests run side by side: numba's cache is not made for several that write at once."""
+    """Compile the kernels before tests run side by side: numba's cache is not made for several that write at once.
+
+    Programs that tests start hear SIGHUP also under nohup, as a handler, unlike SIG_IGN, is not inherited.
+    """
+    if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, lambda *_: None)
     if getattr(session.config.option, "numprocesses", None):
         compile_kernels()
 

@@ -48,7 +48,7 @@ from tvist_protocol.replies import Accepted
 from tvist_protocol.stream import Event
 
 if TYPE_CHECKING:
-    from tvist_client.robot import Robot
+    from tvist_client.commanded import CommandedRobot
 
 log = logging.getLogger(__name__)
 
@@ -310,7 +310,7 @@ class Arm(Terminals, Simulation):
 
 @contextlib.asynccontextmanager
 async def hold_control(
-    robot: "Robot", transport: Transport, client: str, lease_s: float
+    robot: "CommandedRobot", transport: Transport, client: str, lease_s: float
 ) -> AsyncIterator[Arm]:
     """Hold control for as long as the block lasts; see `Robot.control`.
 
@@ -325,7 +325,7 @@ async def hold_control(
     clock = await robot.clock()
     take = TakeControl(client=client, lease_s=seconds)
     async with granted(robot, transport, take, lambda token: ReleaseControl(token=token)) as grant:
-        arm = robot.arm = Arm(robot, grant.token)
+        arm = Arm(robot, grant.token)
         alive = None
         if clock == "realtime":
             alive = asyncio.create_task(arm.keep_alive_every((grant.lease_s or seconds) / 3))
@@ -335,8 +335,6 @@ async def hold_control(
             if alive is not None:
                 alive.cancel()
                 await asyncio.wait([alive])
-            if robot.arm is arm:
-                robot.arm = None
 
 
 def _modes(values: float | Iterable[float] | None, where: str) -> tuple[float, ...] | None:

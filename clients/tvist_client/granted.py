@@ -12,7 +12,7 @@ from tvist_protocol.errors import RefusedError
 from tvist_protocol.replies import Accepted
 
 if TYPE_CHECKING:
-    from tvist_client.robot import Robot
+    from tvist_client.commanded import CommandedRobot
 
 
 class Grant(NamedTuple):
@@ -25,7 +25,10 @@ class Grant(NamedTuple):
 
 @contextlib.asynccontextmanager
 async def granted(
-    robot: "Robot", transport: Transport, take: TakeControl | TakeClock, release: Callable[[str], Command]
+    robot: "CommandedRobot",
+    transport: Transport,
+    take: TakeControl | TakeClock,
+    release: Callable[[str], Command],
 ) -> AsyncIterator[Grant]:
     """Hold a right for as long as the block lasts.
 

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tvist_client.robot import Robot
+    from tvist_client.commanded import CommandedRobot
 
 
 class Leased:
@@ -14,6 +14,6 @@ class Leased:
         token: Token of the lease, sent with every command.
     """
 
-    def __init__(self, robot: "Robot", token: str) -> None:
+    def __init__(self, robot: "CommandedRobot", token: str) -> None:
         self.robot = robot
         self.token = token

@@ -1,12 +1,12 @@
 """A robot as a client sees it: what it is, what it tells, and control over it."""
 
-from collections.abc import Callable
-from contextlib import AbstractAsyncContextManager
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from types import TracebackType
-from typing import Self, TypeVar
+from typing import Self
 
 from tvist_client.arm import Arm, hold_control
-from tvist_client.errors import MisuseError, NotConnectedError, UnexpectedReplyError
+from tvist_client.errors import MisuseError, NotConnectedError
 from tvist_client.feed import Feed
 from tvist_client.motion import Motion, MotionsByNumber
 from tvist_client.stepper import MAX_STEP, Stepper, hold_clock
@@ -14,6 +14,7 @@ from tvist_client.stream import Stream
 from tvist_client.transports.base import Transport
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.zenoh import ZenohTransport
+from tvist_client.understood import understood
 from tvist_client.values import whole
 from tvist_protocol.codec import (
     decode_event,
@@ -26,7 +27,7 @@ from tvist_protocol.codec import (
     encode,
 )
 from tvist_protocol.commands import Command, Stop
-from tvist_protocol.errors import ProtocolError, RefusedError
+from tvist_protocol.errors import RefusedError
 from tvist_protocol.info import Clock, Info
 from tvist_protocol.io import Io
 from tvist_protocol.modes import RuntimeState
@@ -118,7 +119,7 @@ class Robot:
 
     async def info(self) -> Info:
         """Request the robot's description and settings."""
-        info = _understood(decode_info, await self._transport.info())
+        info = understood(decode_info, await self._transport.info())
         self._clock = info.clock
         return info
 
@@ -202,7 +203,7 @@ class Robot:
             AnswerTimeoutError: No answer came in time.
             ProtocolError: The command holds what cannot be sent.
         """
-        reply = _understood(decode_reply, await self._transport.request(encode(command), timeout_s))
+        reply = understood(decode_reply, await self._transport.request(encode(command), timeout_s))
         if isinstance(reply, Refused):
             raise RefusedError(reply)
         return reply
@@ -219,7 +220,8 @@ class Robot:
         """Bring the arm to rest now; anyone may, without control."""
         await self.request(Stop())
 
-    def control(self, client: str, *, lease_s: float = 30.0) -> AbstractAsyncContextManager[Arm]:
+    @asynccontextmanager
+    async def control(self, client: str, *, lease_s: float = 30.0) -> AsyncIterator[Arm]:
         """Hold control for as long as the block lasts.
 
         The client's presence is announced first, so that its going ends control at once; in real time the
@@ -233,11 +235,17 @@ class Robot:
             RefusedError: Another client holds control; its name is in the sentence.
             ProtocolError: `client` cannot be a client's name.
         """
-        return hold_control(self, self._transport, client, lease_s)
+        async with hold_control(self, self._transport, client, lease_s) as arm:
+            self.arm = arm
+            try:
+                yield arm
+            finally:
+                self.arm = None if self.arm is arm else self.arm
 
     # ------------------------------------------------------------------ time
 
-    def clock_control(self, client: str) -> AbstractAsyncContextManager[Stepper]:
+    @asynccontextmanager
+    async def clock_control(self, client: str) -> AsyncIterator[Stepper]:
         """Hold the clock for as long as the block lasts: time passes by this client's steps alone.
 
         In lockstep and free. It is another right than control, which another client may have meanwhile.
@@ -249,7 +257,17 @@ class Robot:
             RefusedError: Another client holds the clock, whose name is in the sentence; or time passes by itself.
             ProtocolError: `client` cannot be a client's name.
         """
-        return hold_clock(self, self._transport, client)
+        async with hold_clock(self, self._transport, client) as stepper:
+            self.stepper = stepper
+            try:
+                yield stepper
+            finally:
+                self.stepper = None if self.stepper is stepper else self.stepper
+
+    @property
+    def clock_token(self) -> str | None:
+        """Token of the clock; None while this client does not hold it."""
+        return None if self.stepper is None else self.stepper.token
 
     async def advance(self, ticks: int) -> int:
         """Let ticks pass: by steps in lockstep and free, by waiting in real time.
@@ -324,14 +342,3 @@ class Robot:
         for feed in self._feeds:
             feed.fail(error)
         self.motions.fail(error)
-
-
-T = TypeVar("T")
-
-
-def _understood(decode: Callable[[bytes], T], data: bytes) -> T:
-    try:
-        return decode(data)
-    except ProtocolError as error:
-        why = f"the robot's answer is invalid, perhaps because it uses a newer protocol: update the client ({error})"
-        raise UnexpectedReplyError(why) from error

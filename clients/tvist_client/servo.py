@@ -13,7 +13,7 @@ from tvist_protocol.simulation import StepSetpoint
 from tvist_protocol.stream import Event
 
 if TYPE_CHECKING:
-    from tvist_client.arm import Arm
+    from tvist_client.simulation import Simulation
 
 TICK = 0.002
 """Control period [s]."""
@@ -32,7 +32,7 @@ class Servo:
         sequence: Number of the next set-point.
     """
 
-    def __init__(self, arm: "Arm", period: float, joints: JointRange) -> None:
+    def __init__(self, arm: "Simulation", period: float, joints: JointRange) -> None:
         self.period = period
         self.sequence = 0
         self._arm = arm

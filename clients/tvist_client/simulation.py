@@ -59,11 +59,11 @@ class Simulation(Leased):
         Returns:
             The last tick that passed; its state has arrived.
         """
-        stepper = self.robot.stepper
-        if stepper is None:
+        clock_token = self.robot.clock_token
+        if clock_token is None:
             return await step(self.robot, self.token, ticks, setpoints)
         motion_token = None if setpoints is None else self.token
-        return await step(self.robot, stepper.token, ticks, setpoints, motion_token)
+        return await step(self.robot, clock_token, ticks, setpoints, motion_token)
 
     async def inject(
         self,

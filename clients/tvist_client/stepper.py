@@ -14,7 +14,7 @@ from tvist_protocol.replies import Done
 from tvist_protocol.simulation import SimulationStep, StepSetpoint
 
 if TYPE_CHECKING:
-    from tvist_client.robot import Robot
+    from tvist_client.commanded import CommandedRobot
 
 MAX_STEP = 1000
 """Set-points that one `simulation.step` may have, and ticks that every server takes at once."""
@@ -32,7 +32,7 @@ class Stepper:
         token: Token of the clock.
     """
 
-    def __init__(self, robot: "Robot", token: str) -> None:
+    def __init__(self, robot: "CommandedRobot", token: str) -> None:
         self.robot = robot
         self.token = token
 
@@ -56,7 +56,7 @@ class Stepper:
 
 
 @contextlib.asynccontextmanager
-async def hold_clock(robot: "Robot", transport: Transport, client: str) -> AsyncIterator[Stepper]:
+async def hold_clock(robot: "CommandedRobot", transport: Transport, client: str) -> AsyncIterator[Stepper]:
     """Hold the clock for as long as the block lasts; see `Robot.clock_control`.
 
     Args:
@@ -68,16 +68,11 @@ async def hold_clock(robot: "Robot", transport: Transport, client: str) -> Async
     async with granted(
         robot, transport, TakeClock(client=client), lambda token: ReleaseClock(token=token)
     ) as grant:
-        stepper = robot.stepper = Stepper(robot, grant.token)
-        try:
-            yield stepper
-        finally:
-            if robot.stepper is stepper:
-                robot.stepper = None
+        yield Stepper(robot, grant.token)
 
 
 async def step(
-    robot: "Robot",
+    robot: "CommandedRobot",
     token: str,
     ticks: int,
     setpoints: Sequence[StepSetpoint] | None = None,

@@ -45,7 +45,6 @@ class Served:
         self.lines = []
         named = () if name is None else ("--name", name)
         self._news = threading.Condition()
-        hangup = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # tests may run under nohup
         self.process = subprocess.Popen(
             [sys.executable, *self.program, "--listen", self.endpoint, *named, *options],
             stdout=subprocess.DEVNULL,
@@ -53,7 +52,6 @@ class Served:
             text=True,
             env={**os.environ, "PYTHONUNBUFFERED": "1"},
         )
-        signal.signal(signal.SIGHUP, hangup)
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 

@@ -8,8 +8,8 @@ import numpy as np
 from tvist_lab.evaluation.line import lengthened, shape
 from tvist_lab.evaluation.moves import Move
 from tvist_lab.evaluation.recipes import Recipe
-from tvist_lab.paper.methods import robust_over
 from tvist_lab.recordings import Floats
+from tvist_lab.robust import robust_over
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import RobotDescription
 from tvist_shaping.catalogue import shaper

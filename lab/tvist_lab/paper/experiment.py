@@ -24,10 +24,10 @@ from tvist_lab.paper.methods import (
     Method,
     TimeVarying,
     Unshaped,
-    robust_over,
 )
 from tvist_lab.paper.published import MOTIONS, pose
 from tvist_lab.recordings import Recording
+from tvist_lab.robust import robust_over
 from tvist_protocol.info import Info
 
 BEFORE = 0.1

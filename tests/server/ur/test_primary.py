@@ -14,8 +14,7 @@ from tvist_protocol.programs import ProgramStop
 from tvist_protocol.replies import Refused
 from tvist_protocol.simulation import SimulationInject
 from tvist_protocol.stream import Event
-from tvist_server.gateways.ur import version
-from tvist_server.gateways.ur.primary import messages
+from tvist_server.gateways.ur import messages, version
 from tvist_server.gateways.ur.primary.packages import robot_state
 from tvist_server.gateways.ur.primary.scripts import LONGEST, Intake
 from tvist_server.gateways.ur.primary.session import PrimarySession

@@ -12,8 +12,8 @@ from tests.examples import share
 from tvist_protocol.commands import SetSpeed
 from tvist_protocol.io import SetIo, SetRegisters
 from tvist_server.gateways.ur import version
+from tvist_server.gateways.ur.input_owners import InputOwners
 from tvist_server.gateways.ur.rtde.codec import PackageReader
-from tvist_server.gateways.ur.rtde.owners import InputOwners
 from tvist_server.gateways.ur.rtde.session import RtdeSession, ticks_between
 
 from . import rtde_client as client

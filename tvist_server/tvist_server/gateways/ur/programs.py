@@ -10,8 +10,8 @@ from tvist_protocol.io import Io
 from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramState, ProgramStop
 from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import Event
+from tvist_server.gateways.ur import messages
 from tvist_server.gateways.ur.base import ControllerAccess
-from tvist_server.gateways.ur.primary import messages
 
 FOLDER = "/programs"
 """Folder in which a controller keeps programs; every other folder is accepted as well."""

@@ -6,8 +6,8 @@ from zlib import crc32
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_controller.programs.built_in import built_in
 from tvist_plant.description import RobotDescription
+from tvist_server.gateways.ur.input_owners import InputOwners
 from tvist_server.gateways.ur.programs import Programs
-from tvist_server.gateways.ur.rtde.owners import InputOwners
 
 NO_MODE = "NONE"
 """Operational mode while nobody has set one."""

@@ -7,9 +7,8 @@ from typing import Final
 
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.replies import Refused
-from tvist_server.gateways.ur import power, version
+from tvist_server.gateways.ur import messages, power, version
 from tvist_server.gateways.ur.base import ControllerAccess
-from tvist_server.gateways.ur.primary import messages
 from tvist_server.gateways.ur.robot import NO_MODE, UrRobot
 
 UNNAMED: Final = "<unnamed>"

@@ -4,10 +4,9 @@ from collections.abc import Callable
 from typing import Final
 
 from tvist_protocol.replies import Refused
-from tvist_server.gateways.ur import power
+from tvist_server.gateways.ur import messages, power
 from tvist_server.gateways.ur.base import ControllerAccess
-from tvist_server.gateways.ur.primary import messages
-from tvist_server.gateways.ur.primary.messages import ErrorLevel
+from tvist_server.gateways.ur.messages import ErrorLevel
 from tvist_server.gateways.ur.primary.scripts import LONGEST, Unit
 from tvist_server.gateways.ur.robot import UrRobot
 

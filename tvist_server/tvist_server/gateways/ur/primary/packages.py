@@ -11,7 +11,7 @@ from typing import Final
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_plant.description import RobotDescription
 from tvist_protocol.modes import RuntimeState, SafetyMode
-from tvist_server.gateways.ur.primary import messages
+from tvist_server.gateways.ur import messages
 
 ROBOT_STATE: Final = 16
 JOINTS: Final = 6

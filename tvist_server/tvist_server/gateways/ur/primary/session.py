@@ -4,10 +4,9 @@ from typing import Final
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.stream import Event
-from tvist_server.gateways.ur import version
+from tvist_server.gateways.ur import messages, version
 from tvist_server.gateways.ur.base import ControllerAccess, PortSession, Send
-from tvist_server.gateways.ur.primary import messages
-from tvist_server.gateways.ur.primary.messages import ErrorLevel
+from tvist_server.gateways.ur.messages import ErrorLevel
 from tvist_server.gateways.ur.primary.orders import Orders
 from tvist_server.gateways.ur.primary.packages import robot_state
 from tvist_server.gateways.ur.primary.scripts import Intake

@@ -1,0 +1,56 @@
+"""What control of a robot and its clock need of it: commands, replies and time."""
+
+from collections.abc import Callable
+from typing import Protocol
+
+from tvist_client.motion import MotionsByNumber
+from tvist_protocol.commands import Command
+from tvist_protocol.info import Clock, Info
+from tvist_protocol.replies import Accepted, Done
+from tvist_protocol.stream import Event, State
+
+
+class CommandedRobot(Protocol):
+    """A robot that takes commands; `tvist_client.robot.Robot` is one, and says what each of these does."""
+
+    motions: MotionsByNumber
+
+    @property
+    def clock_token(self) -> str | None:
+        """Token of the clock; None while this client does not hold it."""
+
+    async def info(self) -> Info:
+        """Request the robot's description and settings."""
+        ...
+
+    async def clock(self) -> Clock:
+        """What advances simulation time."""
+        ...
+
+    async def request(self, command: Command, timeout_s: float = ...) -> Accepted | Done:
+        """Send a command."""
+        ...
+
+    def put_setpoint(self, data: bytes) -> None:
+        """Send an encoded set-point."""
+        ...
+
+    def on_event(self, callback: Callable[[Event], object]) -> Callable[[], None]:
+        """Call a function with every event; the function returned ends that."""
+        ...
+
+    def watch(self) -> None:
+        """Begin to listen to the states."""
+        ...
+
+    async def until(self, tick: int) -> State:
+        """Wait until the state of a tick has arrived."""
+        ...
+
+    async def advance(self, ticks: int) -> int:
+        """Let ticks pass."""
+        ...
+
+    async def rest(self) -> State:
+        """Wait until the shaped reference is at rest, stepping time if it is this client's to step."""
+        ...
