@@ -3,6 +3,7 @@
 import msgspec
 import numpy as np
 import pytest
+from tests.plant.arms import frames
 
 from tvist_controller.control.differentiator import Differentiator, Target
 from tvist_controller.control.inverse_dynamics import InverseDynamics
@@ -61,23 +62,6 @@ def test_at_rest_it_is_zero_to_the_bit():
 
 
 # ---------------------------------------------------------------- an arm by the textbook
-
-
-def frames(description, q):
-    """Frames of base and links by products of Denavit-Hartenberg matrices."""
-    kinematics, pose = description.kinematics, np.eye(4)
-    out = [pose]
-    for theta, a, d, alpha in zip(q, kinematics.a, kinematics.d, kinematics.alpha, strict=True):
-        ct, st, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
-        link = [
-            [ct, -st * ca, st * sa, a * ct],
-            [st, ct * ca, -ct * sa, a * st],
-            [0, sa, ca, d],
-            [0, 0, 0, 1],
-        ]
-        pose = pose @ np.array(link)
-        out.append(pose)
-    return out
 
 
 def tensor(values):

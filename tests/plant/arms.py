@@ -95,9 +95,9 @@ def chain(joints: int) -> RobotDescription:
     )
 
 
-def forward_kinematics(description: RobotDescription, q) -> np.ndarray:
-    """Pose of the flange, 4x4, by the textbook's product of Denavit-Hartenberg matrices."""
-    kinematics, pose = description.kinematics, np.eye(4)
+def frames(description: RobotDescription, q) -> list[np.ndarray]:
+    """Frames of base and links, 4x4 each, by the textbook's products of Denavit-Hartenberg matrices."""
+    kinematics, found = description.kinematics, [np.eye(4)]
     for theta, a, d, alpha in zip(q, kinematics.a, kinematics.d, kinematics.alpha, strict=True):
         ct, st, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
         link = [
@@ -106,5 +106,10 @@ def forward_kinematics(description: RobotDescription, q) -> np.ndarray:
             [0, sa, ca, d],
             [0, 0, 0, 1],
         ]
-        pose = pose @ np.array(link)
-    return pose
+        found.append(found[-1] @ np.array(link))
+    return found
+
+
+def forward_kinematics(description: RobotDescription, q) -> np.ndarray:
+    """Pose of the flange, 4x4."""
+    return frames(description, q)[-1]

@@ -1,10 +1,15 @@
 """Served robots, each a process of its own, and sessions with them."""
 
 import gc
+import subprocess
+import sys
 
 import pytest
-from tests.conformance.served import Served
+from tests.conformance.conftest import live, lockstep, realtime  # noqa: F401  fixtures
+from tests.conformance.served import PATIENCE
 from tests.conformance.wire import Wire
+
+from .bystander import Bystander
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -16,22 +21,28 @@ def collected():
     gc.unfreeze()
 
 
-@pytest.fixture(scope="module")
-def realtime():
-    """A robot in real time."""
-    with Served() as served:
-        yield served
-
-
-@pytest.fixture(scope="module")
-def lockstep():
-    """A robot whose time a client steps."""
-    with Served("--clock", "lockstep", "--truth") as served:
-        yield served
+@pytest.fixture
+def bystander(realtime):  # noqa: F811  the fixture
+    """Somebody else, and the arm at Q1."""
+    with Wire(realtime.endpoint) as home, home.control("home"):
+        pass
+    with Bystander(realtime.endpoint) as bystander:
+        yield bystander
 
 
 @pytest.fixture
-def live(realtime):
-    """A session with the robot in real time."""
-    with Wire(realtime.endpoint) as wire:
-        yield wire
+def start():
+    """Start a client process; it says when it does what it was asked to."""
+    processes = []
+
+    def start(*arguments):
+        process = subprocess.Popen([sys.executable, *map(str, arguments)], stdout=subprocess.PIPE)
+        processes.append(process)
+        assert process.stdout.readline() == b"under way\n"
+        return process
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.wait(PATIENCE)
+        process.stdout.close()

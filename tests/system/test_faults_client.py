@@ -4,13 +4,11 @@ A client killed in mid-move or mid-stream is `test_lease`'s.
 """
 
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from tests.conformance.served import PATIENCE, Served, free_endpoint
-from tests.conformance.wire import STOPPED, TICK, Wire
+from tests.conformance.served import Served, free_endpoint
+from tests.conformance.wire import STOPPED, TICK
 
 from .bystander import Bystander
 
@@ -33,33 +31,6 @@ while "asking" in sys.argv:
     asleep.wait(0.001)
 asleep.wait()
 """
-
-
-@pytest.fixture
-def bystander(realtime):
-    """Somebody else, and the arm at Q1."""
-    with Wire(realtime.endpoint) as home, home.control("home"):
-        pass
-    with Bystander(realtime.endpoint) as bystander:
-        yield bystander
-
-
-@pytest.fixture
-def start():
-    """Start a client process; it says when it does what it was asked to."""
-    processes = []
-
-    def start(*arguments):
-        process = subprocess.Popen([sys.executable, *map(str, arguments)], stdout=subprocess.PIPE)
-        processes.append(process)
-        assert process.stdout.readline() == b"under way\n"
-        return process
-
-    yield start
-    for process in processes:
-        process.kill()
-        process.wait(PATIENCE)
-        process.stdout.close()
 
 
 def test_a_client_frozen_in_mid_stream_is_stopped_and_what_it_sends_when_it_thaws_moves_nothing(

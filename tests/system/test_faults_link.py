@@ -14,7 +14,6 @@ from tests.conformance.wire import Q1, STOPPED, TICK, Wire
 from tvist_client import NotConnectedError
 from tvist_client.blocking import Robot
 
-from .bystander import Bystander
 from .proxy import Proxy
 
 pytestmark = pytest.mark.realtime
@@ -22,15 +21,6 @@ pytestmark = pytest.mark.realtime
 FAR = [2.0, *Q1[1:]]
 DOWN = 1500
 """Ticks for which a link is down: 3 s."""
-
-
-@pytest.fixture
-def bystander(realtime):
-    """Somebody else, and the arm at Q1."""
-    with Wire(realtime.endpoint) as home, home.control("home"):
-        pass
-    with Bystander(realtime.endpoint) as bystander:
-        yield bystander
 
 
 @pytest.fixture

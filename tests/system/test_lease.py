@@ -1,7 +1,6 @@
 """Control by lease, when its holder dies: the arm stops, everybody is told, and control is free again."""
 
-import subprocess
-import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -13,23 +12,9 @@ FAR = [2.0, *Q1[1:]]
 
 
 @pytest.fixture
-def client(realtime):
-    """Start a client process; it says when it does what it was asked to."""
-    processes = []
-
-    def start(*arguments):
-        process = subprocess.Popen(
-            [sys.executable, CLIENT, realtime.endpoint, *arguments], stdout=subprocess.PIPE
-        )
-        processes.append(process)
-        assert process.stdout.readline() == b"under way\n"
-        return process
-
-    yield start
-    for process in processes:
-        process.kill()
-        process.wait(PATIENCE)
-        process.stdout.close()
+def client(realtime, start):
+    """Start a client of the robot."""
+    return partial(start, CLIENT, realtime.endpoint)
 
 
 @pytest.fixture(autouse=True)
