@@ -55,15 +55,10 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
     old: Floats,
     new: Floats,
     out: Floats,
-    share: float,
-    rate: float,
-    slope: float,
-    velocity: float,
-    acceleration: float,
-    jerk: float,
+    progress: tuple[float, float, float],
+    limits: tuple[float, float, float],
     period: float,
-    later: float,
-    drift: float,
+    lag: tuple[float, float],
 ) -> tuple[float, float, float]:
     """One tick of a fade.
 
@@ -71,19 +66,18 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
         old: The old filter's output two ticks ago, one tick ago and now [rad], shape (3, joints).
         new: The new filter's, likewise.
         out: What was given out, likewise; its last row is written.
-        share: s of the tick before [-], 0 to 1.
-        rate: ṡ [1/s], >= 0.
-        slope: s̈ that ṡ was wanted to change at [1/s²].
-        velocity: Limit for every joint [rad/s].
-        acceleration: Limit for every joint [rad/s²].
-        jerk: How fast the motion's acceleration changes at most [rad/s³].
+        progress: Of the tick before: s [-], 0 to 1; ṡ [1/s], >= 0; s̈ that ṡ was wanted to change at [1/s²].
+        limits: For every joint: velocity [rad/s], acceleration [rad/s²], and how fast the motion's acceleration
+            changes at most [rad/s³].
         period: Tick [s].
-        later: How much longer the new filter's mean delay is than the old one's [s].
-        drift: Its rate of change [-].
+        lag: How much longer the new filter's mean delay is than the old one's [s], and its rate of change [-].
 
     Returns:
         s, ṡ and s̈ of this tick; s is 1 where the fade is over.
     """
+    share, rate, slope = progress
+    velocity, acceleration, jerk = limits
+    later, drift = lag
     joints = old.shape[1]
     apart, widest, first = 0.0, NEGLIGIBLE, 0
     for k in range(joints):
@@ -221,7 +215,7 @@ class Fade:
             raise FilterError("period", new.period, f"{old.period:g} s, as the filter's it takes over from")
         new.take_over(old)
         self.old, self.new, self.share = old, new, 0.0
-        self._limits = (float(velocity), float(acceleration), float(jerk), float(old.period))
+        self._limits = (float(velocity), float(acceleration), float(jerk))
         self._rate, self._slope, self._later = 0.0, 0.0, 0.0
         self._history: Floats = np.zeros((3, 3, old.width))
         self._ticks = 0
@@ -268,7 +262,8 @@ class Fade:
         else:
             later = self.new.mean_delay - self.old.mean_delay
             drift, self._later = (later - self._later) / self.new.period, later
+            progress = (self.share, self._rate, self._slope)
             self.share, self._rate, self._slope = blend(
-                old, new, out, self.share, self._rate, self._slope, *self._limits, later, drift
+                old, new, out, progress, self._limits, self.new.period, (later, drift)
             )
         return np.array(out[2])

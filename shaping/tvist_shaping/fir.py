@@ -16,6 +16,7 @@ T follows slowly: longer where more remains than is allowed, shorter where less 
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -85,20 +86,52 @@ class FirDesign:
         return 2 + 2 * sum(2 if spread > 0.0 else 1 for spread in self.spread)
 
 
+class Programme(NamedTuple):
+    """One design's quadratic programme of R rows: what it wants, its last solution, and room to solve it in."""
+
+    spread: Floats
+    """`spread` of `FirDesign`, shape (modes,)."""
+    weight: Floats
+    """`weight` of `FirDesign`, shape (modes,)."""
+    dual: Floats
+    """Unknowns of the dual, shape (R,): where to begin; the solution afterwards."""
+    taps: Floats
+    """Result, shape (N,), sum 1."""
+    remains: Floats
+    """What remains of each mode, root of the sum of squares over its rows [-], shape (modes,)."""
+    rows: Floats
+    """Scratch, shape (R, N)."""
+    hessian: Floats
+    """Scratch, shape (R, R + 2)."""
+
+    @classmethod
+    def of(cls, wanted: FirDesign, taps: int) -> "Programme":
+        """The programme of a design, without a solution."""
+        R = wanted.rows
+        return cls(
+            spread=np.array(wanted.spread, dtype=float),
+            weight=np.array(wanted.weight, dtype=float),
+            dual=np.zeros(R),
+            taps=np.zeros(taps),
+            remains=np.zeros(wanted.modes),
+            rows=np.zeros((R, taps)),
+            hessian=np.zeros((R, R + 2)),
+        )
+
+    def fork(self) -> "Programme":
+        """A copy with the present solution."""
+        return self._replace(
+            dual=self.dual.copy(),
+            taps=self.taps.copy(),
+            remains=self.remains.copy(),
+            rows=np.empty_like(self.rows),
+            hessian=np.empty_like(self.hessian),
+        )
+
+
 @compiled
-def solve(  # noqa: C901, PLR0912 - one kernel: its branches are loops over rows and weights
-    f_d: Floats,
-    zeta: Floats,
-    length: float,
-    mean: float,
-    period: float,
-    spread: Floats,
-    weight: Floats,
-    dual: Floats,
-    rows: Floats,
-    hessian: Floats,
-    taps: Floats,
-    remains: Floats,
+def solve(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops over rows and weights
+    f_d: Floats, zeta: Floats, length: float, mean: float, period: float, programme: Programme
 ) -> bool:
     """The weights for modes and a length.
 
@@ -108,17 +141,12 @@ def solve(  # noqa: C901, PLR0912 - one kernel: its branches are loops over rows
         length: T [s].
         mean: Mean delay D [s].
         period: h₀ [s].
-        spread: `spread` of `FirDesign`, shape (modes,).
-        weight: `weight` of `FirDesign`, shape (modes,).
-        dual: Unknowns of the dual, shape (rows,): where to begin; the solution afterwards.
-        rows: Scratch, shape (rows, N).
-        hessian: Scratch, shape (rows, rows + 2).
-        taps: Result, shape (N,), sum 1.
-        remains: What remains of each mode, root of the sum of squares over its rows [-], shape (modes,).
+        programme: What is wanted; its `dual`, `taps` and `remains` are changed.
 
     Returns:
         Whether it was solved; otherwise taps are the best there are.
     """
+    spread, weight, dual, taps, remains, rows, hessian = programme
     R, N, modes = dual.shape[0], taps.shape[0], f_d.shape[0]
     room = np.zeros(N)
     price = np.zeros(R)

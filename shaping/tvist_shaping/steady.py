@@ -21,7 +21,7 @@ from tvist_shaping.base import Filter
 from tvist_shaping.errors import FilterError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.failures import FAILURES, failure
-from tvist_shaping.fir import EDGE, GAIN, QUICKEST, FirDesign, solve
+from tvist_shaping.fir import EDGE, GAIN, QUICKEST, FirDesign, Programme, solve
 from tvist_shaping.taps import average, length, product_taps
 
 EVERY = 4
@@ -135,15 +135,10 @@ class ShortDesign(Design):
         _check_times(mean_delay, wanted.shortest - EDGE, period)
         self.name, self.modes, self.mean_delay = name, wanted.modes, mean_delay
         self.wanted, self.period = wanted, period
-        self.taps = N = math.ceil(wanted.longest / period) + 1
-        self._spread, self._weight, self._residual = (
-            np.array(values, dtype=float) for values in (wanted.spread, wanted.weight, wanted.residual)
-        )
-        self._length = 0.0
-        self._dual = np.zeros(wanted.rows)
-        self._rows, self._hessian = np.zeros((wanted.rows, N)), np.zeros((wanted.rows, wanted.rows + 2))
-        self._remains = np.zeros(wanted.modes)
-        self._found, self._solved = np.zeros(N), False
+        self.taps = math.ceil(wanted.longest / period) + 1
+        self._residual = np.array(wanted.residual, dtype=float)
+        self._programme = Programme.of(wanted, self.taps)
+        self._length, self._solved = 0.0, False
 
     def __repr__(self) -> str:
         return f"ShortDesign(mean_delay={self.mean_delay:g}, wanted={self.wanted!r})"
@@ -157,7 +152,7 @@ class ShortDesign(Design):
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
         """Taps of the shortest length at which no more remains than may; as `go_on`."""
         shortest, longest = self.wanted.shortest, self.wanted.longest
-        self._dual[:] = 0.0
+        self._programme.dual[:] = 0.0
         for _ in range(11):  # what remains falls with the length: halve the interval
             self._length = 0.5 * (shortest + longest)
             self._solve(f_d, zeta, taps)
@@ -168,7 +163,7 @@ class ShortDesign(Design):
         self._length = longest
         self._solve(f_d, zeta, taps)
         if not self._solved:
-            taps[:] = self._found
+            taps[:] = self._programme.taps
         return self._solved and self._excess() <= 0.0
 
     def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:
@@ -179,21 +174,17 @@ class ShortDesign(Design):
         return self._solved and (self._length < self.wanted.longest or self._excess() <= 0.0)
 
     def _part(self) -> None:
-        self._dual, self._found, self._remains = self._dual.copy(), self._found.copy(), self._remains.copy()
-        self._rows, self._hessian = np.empty_like(self._rows), np.empty_like(self._hessian)
+        self._programme = self._programme.fork()
 
     def _solve(self, f_d: Floats, zeta: Floats, taps: Floats) -> None:
         """New taps; where none are found the old ones stand, whose mean delay is the right one."""
-        self._solved = solve(
-            f_d, zeta, self._length, self.mean_delay, self.period, self._spread, self._weight,
-            self._dual, self._rows, self._hessian, self._found, self._remains,
-        )  # fmt: skip
+        self._solved = solve(f_d, zeta, self._length, self.mean_delay, self.period, self._programme)
         if self._solved:
-            taps[:] = self._found
+            taps[:] = self._programme.taps
 
     def _excess(self) -> float:
         """What remains against what may: logarithm, so that it is 0 where they are equal."""
-        return 0.5 * math.log(float(((self._remains / self._residual) ** 2).sum()) + 1e-12)
+        return 0.5 * math.log(float(((self._programme.remains / self._residual) ** 2).sum()) + 1e-12)
 
 
 class SteadyFilter(Filter):

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from tvist_shaping import FilterError
+from tvist_shaping import FilterError, fir
 from tvist_shaping.fir import EDGE, ENERGY, SCALE, FirDesign, solve
 
 H = 0.002
@@ -34,13 +34,11 @@ class Programme:
         self.dual = np.zeros(WANTED.rows)
 
     def solve(self):
-        taps, remains = np.empty(N), np.empty(4)
-        solved = solve(
-            self.f_d, self.zeta, self.length, self.mean, H,
-            np.array(WANTED.spread), np.array(WANTED.weight),
-            self.dual, np.empty((WANTED.rows, N)), np.empty((WANTED.rows, WANTED.rows + 2)), taps, remains,
-        )  # fmt: skip
-        return taps, remains, solved
+        programme = fir.Programme.of(WANTED, N)
+        programme.dual[:] = self.dual
+        solved = solve(self.f_d, self.zeta, self.length, self.mean, H, programme)
+        self.dual[:] = programme.dual
+        return programme.taps, programme.remains, solved
 
     def cost(self, taps):
         used = self.room > 0.0
