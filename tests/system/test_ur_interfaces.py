@@ -53,8 +53,8 @@ def test_without_the_option_nothing_listens():
 @pytest.mark.parametrize(
     ("options", "code", "named"),
     [
-        (["--ur-port", "rtde"], 2, "DOOR=PORT"),
-        (["--ur-port", "rtde=x"], 2, "DOOR=PORT"),
+        (["--ur-port", "rtde"], 2, "INTERFACE=PORT"),
+        (["--ur-port", "rtde=x"], 2, "INTERFACE=PORT"),
         (["--ur-port", "rtdee=30004"], 2, "rtdee"),
         (["--ur-address", "192.168.0.1"], 2, "--insecure"),
         (["--ur-address", "203.0.113.7", "--insecure"], 1, "does not have this address"),

@@ -108,7 +108,7 @@ MISUSE = [
     (("serve", "--robots", "ur5e", "--name", "x"), ["exclude each other"]),
     (("serve", "--payload", "-1"), ["payload is -1", "at least 0"]),
     (("serve", "--speed", "0"), ["speed is 0", "more than 0"]),
-    (("serve", "--ur-port", "rtde"), ["DOOR=PORT"]),
+    (("serve", "--ur-port", "rtde"), ["INTERFACE=PORT"]),
     (("keys", "ring", "--robot", "UPPER", "--host", "x"), ["robot is 'UPPER'"]),
     # files
     (("serve", "--config", "nope.toml"), ["nope.toml", "No such file"]),

@@ -27,7 +27,7 @@ from tvist_server.gateways.ur.rtde.session import RtdeSession
 from . import rtde_client
 from .decoders import split
 
-DOORS = {
+INTERFACES = {
     "rtde": RtdeSession,
     "primary": PrimarySession,
     "realtime": RealtimeSession,
@@ -107,7 +107,7 @@ class Client:
         self.house, self.interface = house, interface
         self.stream, self.sampled, self.rest = bytearray(), b"", b""
         self.control = ConnectionControl(house.leases[host])
-        self.session = DOORS[interface](house.robot, self.control, self.take)
+        self.session = INTERFACES[interface](house.robot, self.control, self.take)
         house.clients.append(self)
         self.session.opened()
 
@@ -271,7 +271,7 @@ def attack(house, interface, random, packages):
 @pytest.mark.parametrize(
     "packages", [1_000, pytest.param(100_000, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
 )
-@pytest.mark.parametrize("interface", DOORS)
+@pytest.mark.parametrize("interface", INTERFACES)
 def test_a_door_stands_and_nobody_else_notices(interface, packages):
     house, random = House(), Random(packages)
     house.host.tick()

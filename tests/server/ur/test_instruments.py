@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 from tests.controller.robots import UR5E, cut
 from tests.plant.arms import chain
-from tests.server.ur.rtde_client import OUTPUT_TYPES
+from .rtde_client import OUTPUT_TYPES
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_controller.setup import body, paper_payload
