@@ -1,0 +1,1 @@
+"""The live page: a robot in three dimensions, its plots and its controls, as one more client."""
