@@ -10,10 +10,10 @@ PAGE = Path(__file__).parents[2] / "docs" / "reference" / "shaping-library.md"
 """Path of the page in a checkout."""
 HEAD = """# The shaping library
 
-What `tvist_shaping` exports, made of its docstrings by `python -m tvist_shaping.reference`; a test compares. The
-[README](../../shaping/README.md) says what it is for, with examples, and another page
-[how to make a shaper of your own](../how-to/change-a-shaper.md). Everything that is not listed here may change without
-notice.
+This page lists everything that `tvist_shaping` exports. `python -m tvist_shaping.reference` makes it from the
+docstrings, and a test compares them. The [README](../../shaping/README.md) introduces the library with examples, and
+another page shows [how to make a shaper of your own](../how-to/change-a-shaper.md). Anything not listed here may
+change without notice.
 
 """
 PARTS: dict[str, tuple[str, ...]] = {
@@ -42,9 +42,9 @@ PARTS: dict[str, tuple[str, ...]] = {
     ),
 }
 VALUES = {
-    "SHAPERS": "The catalogue, shortest first: every `Shaper` that comes with the package, by its name.",
-    "DESIGNS": "What makes each `Design` that goes by a name as a shaper does: `auto`, `short`, `auto-target`.",
-    "BUILT_IN": "The `Registry` of what comes with the package alone.",
+    "SHAPERS": "The catalogue: every `Shaper` that comes with the package, by its name, shortest first.",
+    "DESIGNS": "Constructors of the designs that have a name, as shapers do: `auto`, `short`, `auto-target`.",
+    "BUILT_IN": "The `Registry` of the shapers and designs that come with the package.",
 }
 """Exported values, which have no docstring at run time."""
 

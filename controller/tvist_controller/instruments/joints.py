@@ -62,7 +62,7 @@ class JointValues(Reading):
 
     @cached_property
     def actual_current_window(self) -> list[float]:
-        """Constant: current of a tenth of the joint's largest torque, by which the two currents may differ [A]."""
+        """Constant: allowed difference of the two currents, from a tenth of the joint's largest torque [A]."""
         return [rating.window for rating in self._ratings]
 
     @property

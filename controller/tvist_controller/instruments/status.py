@@ -52,7 +52,7 @@ class StatusValues(Reading):
 
     @property
     def actual_execution_time(self) -> float:
-        """Constant: 0; how long a tick took is told by telemetry, outside what is repeatable [ms]."""
+        """Constant: 0; telemetry has the duration of a tick, which differs between equal runs [ms]."""
         return 0.0
 
     @property
@@ -78,7 +78,7 @@ class StatusValues(Reading):
 
     @property
     def safety_status(self) -> int:
-        """State: the safety mode again; the numbers that it has beyond it do not occur."""
+        """State: the safety mode again; the additional numbers of RTDE do not occur."""
         return self.state.safety_mode
 
     @property
@@ -88,12 +88,12 @@ class StatusValues(Reading):
 
     @property
     def robot_status_bits(self) -> int:
-        """Computed: from the modes; bit 0 power is on, bit 1 something runs; there are no buttons for bits 2 and 3."""
+        """Computed: from the modes; bit 0 is power on, bit 1 running; bits 2 and 3, of two buttons, are 0."""
         return int(self.powered) | (self.state.runtime_state in _RUNNING) << 1
 
     @property
     def safety_status_bits(self) -> int:
-        """Computed: from the safety mode, its own bit; with stops bit 10, with emergency stops bit 7."""
+        """Computed: from the safety mode, which has a bit of its own; stops also set bit 10, emergency stops bit 7."""
         return _SAFETY_BITS.get(self.state.safety_mode, 0)
 
     @property
@@ -108,7 +108,7 @@ class StatusValues(Reading):
 
     @property
     def time_scale_source(self) -> int:
-        """Constant: 0; what slows a motion down is not told apart."""
+        """Constant: 0; the cause of a slower motion is not distinguished."""
         return 0
 
     @property
@@ -138,5 +138,5 @@ class StatusValues(Reading):
 
     @property
     def actual_robot_braking_energy_dissipated(self) -> float:
-        """Computed: integral of what braking gives back beyond the motors' heat, since the first tick [J]."""
+        """Computed: integral of the braking power that exceeds the motors' heat, since the first tick [J]."""
         return self._dissipated

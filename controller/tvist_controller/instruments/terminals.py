@@ -26,17 +26,17 @@ class TerminalValues(Reading):
 
     @property
     def actual_digital_output_bits(self) -> int:
-        """Io: digital outputs, likewise."""
+        """Io: digital outputs, with the same bits."""
         return self.io.actual_digital_output_bits
 
     @property
     def actual_configurable_digital_input_bits(self) -> int:
-        """Io: bits 8–15 of the digital inputs, where they are."""
+        """Io: bits 8–15 of the digital inputs, not shifted."""
         return self.io.actual_digital_input_bits & CONFIGURABLE
 
     @property
     def actual_configurable_digital_output_bits(self) -> int:
-        """Io: bits 8–15 of the digital outputs, where they are."""
+        """Io: bits 8–15 of the digital outputs, not shifted."""
         return self.io.actual_digital_output_bits & CONFIGURABLE
 
     @property
@@ -71,7 +71,7 @@ class TerminalValues(Reading):
 
     @property
     def tool_mode(self) -> int:
-        """Computed: from the robot's mode, as the joints' modes."""
+        """Computed: from the robot's mode, with the numbers of `joint_mode`."""
         return JOINT_MODES.get(self.state.robot_mode, JOINT_IDLE)
 
     @property
@@ -101,7 +101,7 @@ class TerminalValues(Reading):
 
     @property
     def tool_temperature(self) -> float:
-        """Computed: the last joint's temperature, on which the tool's electronics sit [°C]."""
+        """Computed: temperature of the last joint, which holds the tool's electronics [°C]."""
         return self._temperatures[-1]
 
     @property

@@ -84,7 +84,7 @@ class ToolValues(Reading):
 
     @property
     def wrench_calc_from_currents(self) -> list[float]:
-        """Computed: the TCP force again, which is made from currents here [N, N m]."""
+        """Computed: the TCP force again, since it is computed from currents here [N, N m]."""
         return self.actual_TCP_force
 
     @cached_property
@@ -114,9 +114,9 @@ class ToolValues(Reading):
 
     @property
     def elbow_position(self) -> list[float]:
-        """Computed: where upper arm and forearm meet, on the elbow's axis, as measured [m].
+        """Computed: measured position where upper arm and forearm meet on the elbow's axis [m].
 
-        An arm with fewer than three joints has its flange there.
+        For an arm with fewer than three joints, it is the flange.
         """
         return self._elbow[0]
 
@@ -143,7 +143,7 @@ class ToolValues(Reading):
 
     @property
     def target_gravity(self) -> list[float]:
-        """Constant: 0 0 9.81, the acceleration that stands for gravity of a robot on the floor [m/s²]."""
+        """Constant: 0 0 9.81, the acceleration that is equivalent to gravity, for a robot on the floor [m/s²]."""
         return [0.0, 0.0, GRAVITY]
 
     @property

@@ -80,7 +80,7 @@ def _mujoco(description: RobotDescription, carried: Payload, seed: int) -> Mujoc
 ARMS = (
     ArmVariant("calibrated", "as described", _calibrated),
     ArmVariant("coulomb", "friction that changes sign within a fifth of the speed", _coulomb),
-    ArmVariant("stribeck", "friction half as high again at breakaway", _stribeck),
+    ArmVariant("stribeck", "friction 50 % higher at breakaway", _stribeck),
     ArmVariant(
         "hysteresis",
         "gears with hysteresis: 30 % stiffer when turning back, 2 % of the torque lost",
@@ -89,9 +89,9 @@ ARMS = (
     ArmVariant("piecewise", "gears 25 % softer below a tenth of the torque", _piecewise),
     ArmVariant(
         "scattered",
-        "stiffness and gains of every joint and link off by 15 %, up or down by chance",
+        "stiffness and gains of every joint and link changed by 15 %, up or down at random",
         _scattered,
     ),
-    ArmVariant("base", "a base that yields, 150 kN m/rad about two axes", _on_base),
-    ArmVariant("mujoco", "built in MuJoCo alone, no gear error", _mujoco),
+    ArmVariant("base", "a flexible base, 150 kN m/rad about two axes", _on_base),
+    ArmVariant("mujoco", "simulated in MuJoCo, without gear error", _mujoco),
 )

@@ -15,7 +15,7 @@ def page(result: dict[str, Any]) -> str:
     arms = list(result["arms"])
     return f"""# ShaperBench
 
-Made by
+This page was made by
 
 ```sh
 {
@@ -23,14 +23,14 @@ Made by
     } --output docs/reference/leaderboard.json --markdown docs/reference/shaperbench.md --figures docs/images
 ```
 
-which writes the numbers with all their digits into [leaderboard.json](leaderboard.json). {
+The command also writes the numbers with all digits to [leaderboard.json](leaderboard.json). The bench has {
         result["moves"]
-    } random moves,
-seed {
+    } random
+moves, seed {
         result["seed"]
-    }, with payloads of 0 to 5 kg, of which the controller knows 100, 110 and 90 %; eight arms; calibration
-`{result["calibration"]}`, which is of the first of them. How to put a shaper of yours on it:
-[Evaluate a shaper](../how-to/evaluate-a-shaper.md).
+    }, with payloads of 0 to 5 kg, of which 100, 110 and 90 % are declared to the controller, and eight arms.
+The calibration is `{result["calibration"]}`, which was made for the first of these.
+[Evaluate a shaper](../how-to/evaluate-a-shaper.md) says how to add a shaper of your own.
 
 {
         _table(
@@ -42,34 +42,38 @@ seed {
         )
     }
 
-Bold: it keeps the limits, and no other that does is better in both *still* and *ring*. All are medians over moves,
-arms and payload errors, but the peaks and *bend*, which are the largest.{_told(ranked)}
+A shaper in bold keeps the limits, and no other shaper that keeps them is better in both *still* and *ring*. All figures
+are medians over moves, arms and payload errors, except for the peaks and *bend*, which are maxima.{
+        _told(ranked)
+    }
 
-![Time until still against what rings](../images/pareto.png)
+![Time until still against residual vibration](../images/pareto.png)
 
-- *still*: last time |α|, the true acceleration of the tool, exceeds 0.1 m/s², from the stop of the **unshaped**
-  reference;
-- *ring*: envelope of α within 3 to 60 Hz after the shaped reference's own stop; *less*: than waiting leaves, where
-  that is at least 0.2 m/s²;
-- *in motion*: rms of α against the rigid arm, over that of waiting;
-- *q̈/limit*, *q̇/limit*: of the shaped reference over the limits that the reference uses to the full. A robot asks a
-  little less of the reference where that is above 1 (`move_j` with `auto` and `short`), the bench does not;
-- *bend*: largest distance in joint space of a path round a corner from where it was asked to go;
-- *µs*: processor time of a tick with its estimates, on the machine that made this page, which had other work, too.
+- *still*: last time at which |α|, the true acceleration of the tool, exceeds 0.1 m/s², from the stop of the
+  **unshaped** reference;
+- *ring*: envelope of α from 3 to 60 Hz after the shaped reference's own stop; *less*: reduction of *ring* compared with
+  waiting, for moves where waiting leaves at least 0.2 m/s²;
+- *in motion*: rms of the difference between α and that of the rigid arm, divided by the value for waiting;
+- *q̈/limit*, *q̇/limit*: peaks of the shaped reference divided by the limits, which the unshaped reference uses fully. A
+  robot plans its motions with less acceleration if a shaper exceeds 1 (`move_j` with `auto` and `short`); the bench
+  does not;
+- *bend*: largest distance in joint space between a path round a corner and the commanded path;
+- *µs*: processor time per tick with its estimates, on the machine that made this page, under other load.
 
-| name | what it is |
+| name | description |
 |---|---|
 {chr(10).join(f"| {row['name']} | {row['label']} |" for row in result["shapers"])}
 
-## Where which loses
+## Results by arm and payload error
 
-Time until still in ms, median, on each arm and with each payload error; bold: the best of the column.
+The first two tables show the median time until still in ms, on each arm and with each payload error. The best of each
+column is in bold.
 
 {_by(ranked, "by_arm", arms, ("time_until_still_ms", "median"), 0)}
 
 {_by(ranked, "by_payload_error", list(ranked[0]["by_payload_error"]), ("time_until_still_ms", "median"), 0)}
 
-What rings in m/s², median.
+The other two tables show the median of *ring* in m/s².
 
 {_by(ranked, "by_arm", arms, ("residual_m_s2", "median"), 3)}
 
@@ -77,7 +81,7 @@ What rings in m/s², median.
 
 ## The arms
 
-| name | what it has |
+| name | properties |
 |---|---|
 {chr(10).join(f"| {name} | {label} |" for name, label in result["arms"].items())}
 """
@@ -90,9 +94,10 @@ def _told(ranked: Sequence[dict[str, Any]]) -> str:
         return ""
     return f"""
 
-Told before each move begins where it will end, and checked for causality given that:
-{", ".join(names)}. In a stream, where nobody knows the end,
-the double S and what is frozen are not to be had, and `auto-target` goes by where the arm is, as `auto` does."""
+These shapers are given the end of each move before it begins, and are checked for causality with this knowledge:
+{", ".join(names)}. The end of a stream is unknown,
+so the double S and frozen shapers cannot be used there, and `auto-target` uses the present position of the arm, as
+`auto` does."""
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

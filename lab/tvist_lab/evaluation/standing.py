@@ -18,7 +18,7 @@ OWN = (
     ("ei", 1, "TVIST-EI, lowest mode"),
     ("auto", 1, "constant mean delay, auto"),
     ("short", 1, "constant mean delay, short"),
-    ("auto-target", 1, "constant mean delay, told where a move ends"),
+    ("auto-target", 1, "constant mean delay, given the end of each move"),
 )
 """Our shapers: name, modes, what they are."""
 PRODUCT_MODES = 3

@@ -24,25 +24,26 @@ METHOD_COLUMNS = {
 
 
 RV = """\
-RV is measured as in the paper: an exponential through the peaks of the tool's acceleration after the stop.
-After shaping there are often fewer than two peaks; then it is the largest value, which sensor noise of 0.03 m/s²
-an axis alone lifts to about 0.1."""
+RV is measured as in the paper, by an exponential through the peaks of the tool's acceleration after the stop. After
+shaping there are often fewer than two peaks. RV is then the largest value; sensor noise of 0.03 m/s² per axis alone
+raises this to about 0.1."""
 COMMON_CLOCK = """\
-From the start of the unshaped reference; peak is true (without noise), later than 10 ms after the reference's own
-stop. The arm is still when the true tool acceleration stays below 0.1 m/s². In bold: who is still first."""
+Times are measured from the start of the unshaped reference. The peak is that of the true acceleration (without noise)
+from 10 ms after the reference's own stop. The arm is still when the true acceleration of the tool stays below 0.1 m/s².
+The method that is still first is in bold."""
 
 
 def page(result: dict[str, Any], command: str) -> str:
     """Tables 1 and 2 beside the paper's, the baselines, and where each figure comes from."""
     made = (
-        f"Made by `{command}`; do not edit. Simulated: {result['runs']} runs a motion, each with noise and gear errors "
-        f"of its own, seed {result['seed']}, calibration `{result['calibration']}`. The paper is Thomsen et al., "
-        "ICINCO 2019, doi 10.5220/0007834504880498."
+        f"This page was made by `{command}`; do not edit it. Each motion was simulated {result['runs']} times, each "
+        f"time with other noise and gear errors, with seed {result['seed']} and calibration `{result['calibration']}`. "
+        "The paper is Thomsen et al., ICINCO 2019, doi 10.5220/0007834504880498."
     )
     parts = [
-        "# The paper's experiment here",
+        "# The paper's experiment in this simulation",
         made,
-        "## Table 2 beside the paper's",
+        "## Table 2, ours and the paper's",
         _table_2(result["table_2"]),
         RV,
         "## Every method on a common clock",
@@ -52,9 +53,9 @@ def page(result: dict[str, Any], command: str) -> str:
             for motion, rows in result["baselines"].items()
             for part in (f"### {motion}", _methods(result, rows))
         ),
-        "## Which figure comes from where",
+        "## Origin of each figure",
         *(f"- **{word}**: {meaning}" for word, meaning in MEANINGS.items()),
-        _table(("figure", "paper", "here", "origin", "by what"), origins(result)),
+        _table(("figure", "paper", "here", "origin", "remark"), origins(result)),
     ]
     return "\n\n".join(parts).replace("\n\n- **", "\n- **") + "\n"
 

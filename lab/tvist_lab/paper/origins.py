@@ -10,10 +10,10 @@ PREDICTED = "predicted"
 NOT_MATCHED = "not matched"
 
 MEANINGS = {
-    FITTED: "a parameter of the arm was solved for so that this comes out",
-    TUNED: "a parameter was tried by hand until this came out near",
-    PREDICTED: "nothing was adjusted for it",
-    NOT_MATCHED: "it differs, and we say by how much",
+    FITTED: "a parameter of the arm was solved for to match this figure",
+    TUNED: "a parameter was adjusted by hand until this figure was near the paper's",
+    PREDICTED: "no parameter was adjusted for this figure",
+    NOT_MATCHED: "the figure differs, and the table shows by how much",
 }
 
 
@@ -35,7 +35,7 @@ def origins(result: dict[str, Any]) -> list[tuple[str, str, str, str, str]]:
     low, high = result["f_d_range_hz"]
     rows.append((
         "span of f_d over the workspace", "6 to 15 Hz", f"{low:.1f} to {high:.1f} Hz", NOT_MATCHED,
-        "the lower end is; bent poses of this arm are stiffer than the paper's highest",
+        "only the lower end matches; bent poses of this arm are stiffer than the paper's stiffest",
     ))  # fmt: skip
     for motion, ours in result["table_2"].items():
         rows += _of_motion(motion, theirs["table_2"][motion], ours)
@@ -63,11 +63,11 @@ def _of_motion(
         ),
         (
             f"{motion}, RV reduced by", *pair("impact_percent", "residual_vibration", "{:.1f} %"), TUNED,
-            "width and share of fed-forward friction; the shaper itself was not touched",
+            "width and share of fed-forward friction; the shaper itself was not changed",
         ),
         (
             f"{motion}, cycle time", *pair("impact_percent", "cycle", "{:+.1f} %"), NOT_MATCHED,
-            "the direction is tuned with friction; the paper's tails of 0.5 to 1 s are not there",
+            "the direction is tuned with friction; the paper's tails of 0.5 to 1 s do not occur here",
         ),
         (
             f"{motion}, stabilisation", *pair("impact_percent", "stabilisation", "{:+.1f} %"), NOT_MATCHED,

@@ -16,10 +16,10 @@ def page(result: dict[str, Any], command: str) -> str:
     lines = [
         "# Stops",
         "",
-        f"Made by `{command}`.",
-        "What is searched for, and why it should hold: [decision 13](../decisions/0013-stops-stay-on-the-way.md).",
+        f"This page was made by `{command}`.",
+        "[Decision 13](../decisions/0013-stops-stay-on-the-way.md) says what a stop promises, and why it should hold.",
         "",
-        "## What was tried",
+        "## What was tested",
         "",
         "| search | cases | promises broken |",
         "|---|---|---|",
@@ -39,8 +39,8 @@ def page(result: dict[str, Any], command: str) -> str:
             "",
             "## Changes in motion",
             "",
-            f"Of {part['count']} changes of payload, shaper, estimator, speed and tool {part['refused']} were refused",
-            "with `collision`: the arm with the payload declared would have met something on the rest of its way.",
+            f"Of {part['count']} changes of payload, shaper, estimator, speed and tool, {part['refused']} were refused",
+            "with `collision`: the arm with the declared payload would have hit something on the rest of its path.",
         ]
     return "\n".join([*lines, *_info(result["robot"]), ""])
 
@@ -48,8 +48,8 @@ def page(result: dict[str, Any], command: str) -> str:
 _WHAT = {
     "stops": "stops of every kind at random moments of accepted moves, limits from 1.5 rad/s and 2 rad/s² to 3.14 and "
     "8, payload 0 to 5 kg, plain and shaped",
-    "streams": "streams of set-points at the floor, at the arm itself and at limits, cut or ended at random",
-    "changes": "changes in mid-motion",
+    "streams": "streams of set-points towards the floor, the arm itself and the limits, cut or ended at random",
+    "changes": "changes during a motion",
     "sequences": "sequences of 40 random commands",
 }
 
@@ -58,21 +58,21 @@ def _stops(part: dict[str, Any]) -> list[str]:
     deep = part["worst_penetration_of_the_flexible_arm_m"]
     lines = [
         "",
-        "## Stops in mid-motion",
+        "## Stops during a motion",
         "",
-        f"At worst a stop was {1e9 * max(part['worst_ahead_rad'], 0.0):.2g} nrad ahead of what the motion would have",
-        f"done, {1e9 * part['worst_off_rad']:.2g} nrad off its line and {part['worst_late_ticks']} ticks later at",
-        f"rest; the rigid torque was {100 * part['worst_torque_share']:.2f} % beyond the larger of 90 % of the limit",
-        "and what the motion would have asked.",
+        f"In the worst case, a stop was {1e9 * max(part['worst_ahead_rad'], 0.0):.2g} nrad ahead of the motion,",
+        f"{1e9 * part['worst_off_rad']:.2g} nrad off its line and {part['worst_late_ticks']} ticks later at rest. The",
+        f"rigid torque was {100 * part['worst_torque_share']:.2f} % above the larger of 90 % of the limit and the",
+        "torque that the motion would have needed.",
     ]
     if deep is not None:
         lines.append(
-            f"The flexible arm swings beyond its reference: at worst it was {_depth(deep)}, where the reference "
+            f"The flexible arm swings beyond its reference: in the worst case it was {_depth(deep)}, and the reference "
             f"was {_depth(part['worst_below_clearance_m'])}."
         )
     lines += [
         "",
-        "| kind | cases | takes, median [s] | at most [s] | of what was left of the motion, median | let run out |",
+        "| kind | cases | duration, median [s] | maximum [s] | share of the time left, median | motion ran out |",
         "|---|---|---|---|---|---|",
     ]
     return lines + [
@@ -88,8 +88,8 @@ def _streams(part: dict[str, Any]) -> list[str]:
         "",
         "## Streams",
         "",
-        f"{part['stopped_by_the_robot']} of {part['count']} were stopped by the robot itself. At worst the reference",
-        f"was {_depth(part['worst_below_clearance_m'])}.",
+        f"The robot itself stopped {part['stopped_by_the_robot']} of {part['count']} streams. In the worst case, the",
+        f"reference was {_depth(part['worst_below_clearance_m'])}.",
     ]
     if deep is not None:
         lines.append(f"The flexible arm was {_depth(deep)}.")
@@ -115,9 +115,10 @@ def _info(robot: str) -> list[str]:
         "",
         "## How long stops last and how far they go",
         "",
-        "As `info` tells it: the arm stretched out, the joint that takes longest, from a share of its velocity limit.",
+        "These are the values in `info`, for the stretched arm and the joint that takes longest to stop,",
+        "from a share of its velocity limit.",
         "",
-        "| payload [kg] | speed | joint | takes [s] | goes [rad] |",
+        "| payload [kg] | speed | joint | duration [s] | distance [rad] |",
         "|---|---|---|---|---|",
         *rows,
     ]

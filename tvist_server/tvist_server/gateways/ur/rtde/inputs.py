@@ -30,7 +30,7 @@ NAMED: dict[str, tuple[Wire, str]] = {
     "standard_analog_output_1": (Wire.DOUBLE, "Value of analogue output 1 as a share of its range, 0 to 1."),
     "external_force_torque": (
         Wire.VECTOR6D,
-        "Ignored, as UR does without ft_rtde_input_enable.",
+        "Ignored, as on a UR robot without ft_rtde_input_enable.",
     ),
 }
 """All but the registers, with what they are for."""

@@ -18,17 +18,17 @@ Made by `python -m tvist_server.gateways.ur.rtde.table > docs/reference/rtde-var
 
 Nothing here was measured on a robot. Each output has one of four sources:
 
-- **state**: what every client gets in [`state`](../../protocol/README.md#state), to the last bit;
-- **io**: terminals, registers and set-up of the tool;
-- **computed**: from these, as said, when a client asks for it;
-- **constant**: stands in for something that is not simulated.
+- **state**: the value that every client gets in [`state`](../../protocol/README.md#state), equal to the last bit;
+- **io**: terminals, registers and the setup of the tool;
+- **computed**: computed from state and io, as the last column says, when a client asks for it;
+- **constant**: takes the place of something that is not simulated.
 
-Torque constants, resistances and thermal figures of the motors are guesses of the right size for a UR5e: two sizes of
-joint, 10 and 7.9 N m/A on the joint's side. Temperatures and energies add up from the first tick on, whether or not
-somebody reads.
+Torque constants, resistances and thermal parameters of the motors are guesses of the right size for a UR5e, which has
+two sizes of joint: 10 and 7.9 N m/A on the joint's side. Temperatures and energies are integrated from the first tick
+on, even if no client reads them.
 
-Vectors of joints have six entries: those of an arm with fewer joints are filled with zeros, those of one with more
-are cut. All variables are offered, also those that a controller of the reported version would not have yet.
+Vectors of joints have six entries: an arm with fewer joints has zeros in the rest, and an arm with more is cut.
+All variables are offered, including those that a controller of the reported version would not have yet.
 """
 REGISTER_ROWS = (
     ("{bank}_bit_registers0_to_31", Wire.UINT32, "bits 0–31"),
@@ -50,8 +50,9 @@ def page() -> str:
 
 ## Inputs
 
-A variable belongs to the connection that asked for it first, until that is closed; to others it is `IN_USE`. Speed
-and outputs are `IN_USE` too while somebody else has control. A value is passed on when it is news.
+A variable belongs to the first connection that asked for it until that connection is closed; for all others it is
+`IN_USE`. The speed slider and the outputs are also `IN_USE` while another client has control. A value is passed on only
+if it has changed.
 
 {inputs}
 """
