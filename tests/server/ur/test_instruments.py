@@ -7,13 +7,14 @@ import pinocchio as pin
 import pytest
 from tests.controller.robots import UR5E, cut
 from tests.plant.arms import chain
-from .rtde_client import OUTPUT_TYPES
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_controller.setup import body, paper_payload
 from tvist_plant.model import FLANGE, rigid_model
 from tvist_protocol import commands as c
 from tvist_protocol.values import Payload
+
+from .rtde_client import OUTPUT_TYPES
 
 ELBOW_UP = (0.3, -1.3, 1.6, -1.9, -1.4, 0.2)
 """A posture far from singular ones."""
