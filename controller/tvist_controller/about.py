@@ -5,8 +5,10 @@ from importlib.metadata import version
 from tvist_controller.calibrations import available, fits
 from tvist_controller.controller import Controller
 from tvist_controller.stopping import stopping
+from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol.channels import COMMANDS, tag
+from tvist_protocol.geometry import Capsule, Geometry
 from tvist_protocol.info import CalibrationInfo, Info, Limits
 from tvist_protocol.values import PROTOCOL_VERSION
 
@@ -65,4 +67,23 @@ def info_of(controller: Controller) -> Info:
         stop=controller.stop_reason,
         arm=controller.arm,
         programs=sorted(controller.programs.known),
+        geometry=geometry_of(setup.description),
+    )
+
+
+def geometry_of(description: RobotDescription) -> Geometry:
+    """Kinematics and shape of an arm, for clients that draw it."""
+    kinematics, collision = description.kinematics, description.collision
+    return Geometry(
+        a=list(kinematics.a),
+        d=list(kinematics.d),
+        alpha=list(kinematics.alpha),
+        bending=sorted(description.link_flexibility.links),
+        capsules=[
+            Capsule(name=body.name, link=body.link, start=body.start, end=body.end, radius=body.radius)
+            for body in collision.bodies
+        ],
+        payload_radius=collision.payload_radius,
+        floor=collision.floor,
+        poses={name: list(q) for name, q in description.poses.items()},
     )

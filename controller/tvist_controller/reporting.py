@@ -3,6 +3,7 @@
 from tvist_controller.control.kinematics import ForwardKinematics, rotation_vector
 from tvist_controller.cycle import Sample
 from tvist_plant.description import RobotDescription
+from tvist_plant.model import Floats
 from tvist_plant.plant import PERIOD, ModalPlant, Plant, PlantTruth
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.stream import State, Truth
@@ -94,6 +95,8 @@ class Reporter:
             link_deflection=truth.link_deflection.tolist(),
             flange_pose=truth.flange_position.tolist() + rotation_vector(truth.flange_rotation),
             tool_acceleration=truth.specific_force.tolist(),
+            static_gear_deflection=_listed(truth.static_gear_deflection),
+            static_link_deflection=_listed(truth.static_link_deflection),
             **self._true_modes,
         )
 
@@ -114,3 +117,7 @@ def truth_of(plant: Plant) -> PlantTruth:
             f"truth is on, but the plant {type(plant).__name__} cannot report it: turn truth off"
         )
     return truth
+
+
+def _listed(values: Floats | None) -> list[float]:
+    return [] if values is None else list(values.tolist())

@@ -4,6 +4,7 @@ from typing import Literal
 
 from msgspec import Struct
 
+from tvist_protocol.geometry import Geometry
 from tvist_protocol.replies import Code
 from tvist_protocol.values import Payload
 
@@ -126,3 +127,5 @@ class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=F
     """Client that holds the clock and alone may step time; null: the client that has control may step it."""
     commands: dict[str, list[str]] = {}
     """Fields of each command that the server knows; empty from older servers."""
+    geometry: Geometry | None = None
+    """Kinematics and shape of the arm; null from older servers."""

@@ -134,6 +134,10 @@ class Truth(Struct, frozen=True, kw_only=True, tag_field="type", tag="truth", gc
     """Damping ratio of each true mode, when last computed [-]."""
     participation: list[float]
     """Share of each true mode in the tool's motion, when last computed [-]."""
+    static_gear_deflection: list[float] = []
+    """Part of `gear_deflection` that remains at rest in this pose; empty if unknown [rad]."""
+    static_link_deflection: list[float] = []
+    """Part of `link_deflection` that remains at rest in this pose; empty if unknown [rad]."""
 
 
 class Telemetry(Struct, frozen=True, kw_only=True, tag_field="type", tag="telemetry", gc=False):

@@ -73,6 +73,7 @@ class FlexibleArm:
         self._flexible: FlexibleModel = flexible if base is None else on_base(flexible, base)
         self._outside = Outside(self._flexible)
         self._data: pin.Data = self._flexible.model.createData()
+        self._scratch: pin.Data = self._flexible.model.createData()
         self._gravity: Floats = np.array(self._flexible.model.gravity.linear)
         self._linear = LinearPart.of(self._flexible, self.description.drives)
         links, n = self._flexible.model.nv, self.description.joints
@@ -108,10 +109,10 @@ class FlexibleArm:
 
     def _settle(self, command: DriveCommand) -> None:
         """Static equilibrium by fixed point: deflections are small, so gravity hardly depends on them."""
-        joints, flexes, nonlinear = self._flexible.joints, self._flexible.flexes, self._nonlinear
+        joints, flexes = self._flexible.joints, self._flexible.flexes
         q = np.zeros_like(self._q)
         q[joints] = command.q
-        error = nonlinear.gear_error * np.sin(nonlinear.gear_waves * command.q + self._phase)
+        error = self._gear_error(command.q)
         for _ in range(50):
             gravity = pin.computeGeneralizedGravity(self._flexible.model, self._data, q)
             new = np.zeros_like(q)
@@ -128,6 +129,19 @@ class FlexibleArm:
         self._s[:] = np.divide(wanted, gain, out=np.zeros_like(wanted), where=gain > 0.0)
         self._evaluate()
         self._dynamics[LAST] = self._dynamics[NOW]
+
+    def _gear_error(self, motor: Floats) -> Floats:
+        """Kinematic errors of the gears at motor angles [rad]."""
+        nonlinear = self._nonlinear
+        return np.asarray(nonlinear.gear_error * np.sin(nonlinear.gear_waves * motor + self._phase))
+
+    def _static_deflections(self) -> tuple[Floats, Floats]:
+        """Deflections of gears and of links that remain where the arm rests as it stands now [rad]."""
+        joints, flexes = self._flexible.joints, self._flexible.flexes
+        # In data of its own: that of the present state still has velocities and accelerations.
+        gravity = pin.computeGeneralizedGravity(self._flexible.model, self._scratch, self._q)
+        gears = self._gear_error(self._motor) - self._law.twist(gravity[joints])
+        return gears, -gravity[flexes] / self._flexible.flex_stiffness
 
     def step(self, command: DriveCommand) -> Measurement:
         """Move the arm by one period, its drives going linearly from the last command to this one.
@@ -229,6 +243,7 @@ class FlexibleArm:
         """What no robot can know, at the present state."""
         placement = self._data.oMf[self._flexible.flange]
         joints = self._flexible.joints
+        static_gears, static_links = self._static_deflections()
         return PlantTruth(
             motor_q=self._motor.copy(),
             motor_qd=self._speed.copy(),
@@ -237,6 +252,8 @@ class FlexibleArm:
             flange_position=placement.translation.copy(),
             flange_rotation=placement.rotation.copy(),
             specific_force=self._specific_force,
+            static_gear_deflection=static_gears,
+            static_link_deflection=static_links,
         )
 
     def modes(self, q: Floats | None = None) -> Modes:

@@ -55,6 +55,10 @@ class PlantTruth:
     """Orientation of the flange, deflections included, shape (3, 3)."""
     specific_force: Floats
     """Specific force in the flange frame without noise, shape (3,) [m/s^2]."""
+    static_gear_deflection: Floats | None = None
+    """Part of `gear_deflection` that remains at rest in this pose, shape (n,); None: unknown [rad]."""
+    static_link_deflection: Floats | None = None
+    """Part of `link_deflection` that remains at rest in this pose; None: unknown [rad]."""
 
 
 class Plant(Protocol):

@@ -1,0 +1,46 @@
+"""What an arm looks like and how it is built, so that a client can draw it."""
+
+from msgspec import Struct
+
+from tvist_protocol.values import Vec3
+
+GEOMETRY_VERSION = 1
+
+
+class Capsule(Struct, frozen=True, kw_only=True, gc=False):
+    """A capsule that contains a part of the arm."""
+
+    name: str
+    """Name of the part."""
+    link: int
+    """Index of the link in whose Denavit-Hartenberg frame the capsule stands; -1 for the base frame."""
+    start: Vec3
+    """One end of its axis [m]."""
+    end: Vec3
+    """Other end of its axis [m]."""
+    radius: float
+    """Radius [m]."""
+
+
+class Geometry(Struct, frozen=True, kw_only=True, gc=False):
+    """Kinematics and shape of the arm. Joint i turns about z, then follows Tz(d) Tx(a) Rx(alpha)."""
+
+    version: int = GEOMETRY_VERSION
+    """Version of this description; a client that does not know it draws nothing."""
+    a: list[float]
+    """Denavit-Hartenberg link lengths, one per joint [m]."""
+    d: list[float]
+    """Denavit-Hartenberg link offsets, one per joint [m]."""
+    alpha: list[float]
+    """Denavit-Hartenberg link twists, one per joint [rad]."""
+    bending: list[int] = []
+    """Indices of the links that bend, in order. Each has two values in `link_deflection` of `truth`: rotations about y
+    and then z, in the middle of the link, after Tx(a/2) Tz(d) from its joint."""
+    capsules: list[Capsule] = []
+    """Parts of the arm, from the base on."""
+    payload_radius: float = 0.05
+    """Radius of the capsule from the flange through the centre of mass of the payload to twice its distance [m]."""
+    floor: float = 0.0
+    """Height of the floor [m]."""
+    poses: dict[str, list[float]] = {}
+    """Named poses, one angle per joint [rad]."""
