@@ -13,6 +13,7 @@ COMMANDS = {
     "unlock": "Make a stopped robot ready to be moved again; exit code 0 if it is.",
     "move": "Move a served robot to a pose.",
     "watch": "Show live what a served robot is doing.",
+    "view": "Show a robot on a web page, its vibration magnified.",
     "record": "Record a served robot as MCAP.",
     "analyze": "Measure the motions of a recording.",
     "replay": "Run a recording's commands again and compare bit by bit.",

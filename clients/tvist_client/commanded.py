@@ -27,6 +27,10 @@ class CommandedRobot(Protocol):
         """What advances simulation time."""
         ...
 
+    async def state(self) -> State:
+        """The present state."""
+        ...
+
     async def request(self, command: Command, timeout_s: float = ...) -> Accepted | Done:
         """Send a command."""
         ...

@@ -1,0 +1,242 @@
+"""The page of a robot on the network: a client that takes the latest state and never holds up the robot."""
+
+import asyncio
+import logging
+import os
+from collections.abc import Coroutine
+from pathlib import Path
+from typing import Any
+
+from viser import ClientHandle, ViserServer
+
+from tvist_client.errors import ClientError
+from tvist_client.robot import Robot
+from tvist_protocol.errors import RefusedError
+from tvist_protocol.info import Info
+from tvist_protocol.modes import RobotMode, SafetyMode
+from tvist_protocol.stream import Event, State, Truth
+from tvist_view.appearance import Appearance
+from tvist_view.chain import GeometryError
+from tvist_view.cockpit import Cockpit
+from tvist_view.pilot import Pilot
+from tvist_view.plots import Plots
+from tvist_view.scene import DrawnRobot, Moment
+from tvist_view.signals import History
+from tvist_view.stage import look_at
+
+log = logging.getLogger("tvist.view")
+
+FRAME_S = 1.0 / 30.0
+"""Time between two pictures [s]."""
+PLOT_EVERY = 3
+"""Pictures between two drawings of the plots."""
+INFO_EVERY = 30
+"""Pictures between two looks at who has control."""
+RETRY_S = 2.0
+"""Time between two attempts to find the robot [s]."""
+NO_TRUTH = (
+    "This robot does not publish its deflections, so the arm is drawn stiff. "
+    "Serve it with `tvist serve --truth` to see it bend."
+)
+
+
+async def show_robot(
+    server: ViserServer, endpoint: str, name: str, security: Path | None, *, factor: float = 1.0
+) -> None:
+    """Show a robot until cancelled; while there is none the page says so, and waits for it.
+
+    Args:
+        server: Server of the page.
+        endpoint: Zenoh endpoint of the robot.
+        name: Name of the robot.
+        security: Folder with a certificate for the robot's server.
+        factor: Magnification to begin with.
+    """
+    status = server.gui.add_markdown(f"Looking for robot **{name}** at {endpoint} …", order=0.0)
+    said = ""
+    while True:
+        try:
+            robot = await Robot.connect(endpoint, name, security=security)
+        except ClientError as error:
+            if str(error) != said:
+                said = str(error)
+                log.warning("%s; waiting for it", said)
+                status.content = f"**No robot.** {said}. The page waits for it."
+            await asyncio.sleep(RETRY_S)
+            continue
+        said = ""
+        try:
+            async with robot:
+                status.visible = False
+                await LivePage(server, robot, await robot.info(), factor=factor).run()
+        except GeometryError as error:
+            status.content, status.visible = f"**The robot cannot be drawn.** {error}", True
+            log.warning("%s", error)
+            await asyncio.sleep(RETRY_S)
+        except (ClientError, RefusedError) as error:
+            log.warning("%s; waiting for the robot", error)
+            status.content, status.visible = f"**The robot has gone.** {error}. The page waits for it.", True
+            await asyncio.sleep(RETRY_S)
+
+
+class LivePage:
+    """One robot for as long as it is there.
+
+    Args:
+        server: Server of the page.
+        robot: The robot.
+        info: What it says of itself.
+        factor: Magnification to begin with.
+
+    Raises:
+        GeometryError: The robot does not tell its geometry, or in a version that is not known.
+    """
+
+    def __init__(self, server: ViserServer, robot: Robot, info: Info, *, factor: float = 1.0) -> None:
+        if info.geometry is None:
+            raise GeometryError(
+                f"its server is of version {info.version}, which does not tell the arm's geometry: update the server"
+            )
+        self._server, self._robot, self._info = server, robot, info
+        self._loop = asyncio.get_running_loop()
+        self._pilot = Pilot(robot, f"view-{os.getpid()}", self._say)
+        self._history = History(len(info.joints), 2000)
+        self._state: State | None = None
+        self._truths: dict[int, Truth] = {}
+        self._cockpits: dict[int, Cockpit] = {}
+        self._posted: set[asyncio.Task[Any]] = set()
+        gui = server.gui
+        self._folder = gui.add_folder(None, order=10.0)
+        with self._folder:
+            self._status = gui.add_markdown(f"**{info.name}**: no state yet")
+            stop = gui.add_button("STOP", color="red", hint="Stop the arm now; this needs no control.")
+            stop.on_click(lambda _: self._post(self._pilot.stop()))
+            self._plots = Plots(gui)
+            with gui.add_folder("View", order=40.0):
+                self._appearance = Appearance(gui, truth=False, why_not=NO_TRUTH, factor=factor)
+        self._factor = factor
+        self._drawn = DrawnRobot(server.scene, "/robot", info.geometry, info.payload)
+
+    async def run(self) -> None:
+        """Show the robot until it has gone.
+
+        Raises:
+            ClientError: It has.
+        """
+        look_at(self._server, (0.0, 0.0, 0.45), 1.9)
+        robot, server = self._robot, self._server
+        ends = [
+            robot.on_state(self._on_state),
+            robot.on_truth(self._on_truth),
+            robot.on_event(self._on_event),
+        ]
+        for client in server.get_clients().values():
+            self._came(client)
+        server.on_client_connect(self._came)
+        server.on_client_disconnect(self._went)
+        try:
+            await self._frames()
+        finally:
+            for end in ends:
+                end()
+            for callbacks in (server._client_connect_cb, server._client_disconnect_cb):  # noqa: SLF001
+                callbacks.clear()
+            if self._pilot.holder is not None:
+                await self._pilot.give_back(self._pilot.holder)
+            self._folder.remove()
+            for client in server.get_clients().values():
+                client.gui.reset()
+            server.scene.remove_by_name("/robot")
+
+    async def _frames(self) -> None:
+        count, due = 0, self._loop.time()
+        while True:
+            if self._state is not None:
+                truth = self._truth_of(self._state)
+                with self._server.atomic():
+                    self._drawn.show(Moment(self._state, truth), self._appearance)
+                if count % PLOT_EVERY == 0:
+                    self._plots.show((self._history.signals(),), self._state.timestamp)
+                    self._tell(self._state)
+            if count % INFO_EVERY == 0:
+                self._info = await self._robot.info()
+                for cockpit in self._cockpits.values():
+                    cockpit.refresh(self._info.control)
+            count += 1
+            due = max(due + FRAME_S, self._loop.time())
+            await asyncio.sleep(due - self._loop.time())
+
+    def _tell(self, state: State) -> None:
+        robot, safety = _word(RobotMode, state.robot_mode), _word(SafetyMode, state.safety_mode)
+        stop = self._info.stop
+        why = f" — {stop.why}" if stop is not None and safety != "NORMAL" else ""
+        words = (
+            f"**{self._info.name}** {robot}, {safety}{why} · shaper **{self._info.shaper}** · "
+            f"{state.timestamp:.1f} s"
+        )
+        if self._status.content != words:
+            self._status.content = words
+
+    def _truth_of(self, state: State) -> Truth | None:
+        """The truth of the state's tick; where it has not come yet, the newest."""
+        if not self._truths:
+            return None
+        return self._truths.get(state.tick) or self._truths[max(self._truths)]
+
+    def _on_state(self, state: State) -> None:
+        self._state = state
+        self._history.add(state)
+
+    def _on_truth(self, truth: Truth) -> None:
+        if not self._truths:
+            self._appearance.truth_has_come(self._factor)
+        self._truths[truth.tick] = truth
+        self._history.add_truth(truth)
+        if len(self._truths) > 8:  # a state's truth comes with it, or a message before or after
+            del self._truths[min(self._truths)]
+
+    def _on_event(self, event: Event) -> None:
+        if event.kind in {"protective_stop", "safety_stop", "warning", "control_lost"} and event.why:
+            self._say(event.why)
+
+    def _say(self, sentence: str) -> None:
+        for client in self._server.get_clients().values():
+            client.add_notification("tvist", sentence, auto_close_seconds=8.0)
+
+    def _came(self, client: ClientHandle) -> None:
+        """A tab was opened; called in any thread."""
+        tab = client.client_id
+        self._loop.call_soon_threadsafe(self._open, tab, client)
+
+    def _open(self, tab: int, client: ClientHandle) -> None:
+        if tab not in self._cockpits:
+            self._cockpits[tab] = Cockpit(client.gui, tab, self._pilot, self._info, self._post)
+            self._cockpits[tab].refresh(self._info.control)
+
+    def _went(self, client: ClientHandle) -> None:
+        """A tab was closed; called in any thread."""
+        self._loop.call_soon_threadsafe(self._cockpits.pop, client.client_id, None)
+        self._post(self._pilot.gone(client.client_id))
+
+    def _post(self, doing: Coroutine[Any, Any, Any]) -> None:
+        """Run something in the pilot's loop; from any thread."""
+        self._loop.call_soon_threadsafe(self._start, doing)
+
+    def _start(self, doing: Coroutine[Any, Any, Any]) -> None:
+        task = self._loop.create_task(doing)
+        self._posted.add(task)
+        task.add_done_callback(self._finished)
+
+    def _finished(self, task: asyncio.Task[Any]) -> None:
+        self._posted.discard(task)
+        if not task.cancelled() and (error := task.exception()) is not None:
+            log.error("the page: %s", error, exc_info=error)
+        for cockpit in self._cockpits.values():
+            cockpit.refresh(self._info.control)
+
+
+def _word(kind: type[RobotMode] | type[SafetyMode], number: int) -> str:
+    try:
+        return kind(number).name
+    except ValueError:
+        return str(number)

@@ -1,0 +1,238 @@
+"""Moves a robot for the tabs of the page: one of them has control, and a jog lasts as long as it is heard of."""
+
+import asyncio
+import contextlib
+from collections.abc import Awaitable, Callable, Sequence
+from contextlib import AsyncExitStack
+from typing import Any
+
+from tvist_client.arm import Arm
+from tvist_client.errors import ClientError, StreamStoppedError
+from tvist_client.payload import make_payload
+from tvist_client.readiness import look
+from tvist_client.robot import Robot
+from tvist_client.unlock import make_ready
+from tvist_protocol.errors import ProtocolError, RefusedError
+from tvist_protocol.values import Payload
+
+DEADMAN_S = 0.25
+"""Silence of the tab that jogs after which the arm is stopped [s]."""
+JOG_PERIOD = 0.02
+"""Time between two set-points of a jog [s]."""
+JOG_SPEED = 0.25
+"""Share of a joint's velocity limit with which it is jogged [-]."""
+JOG_ACCELERATION = 1.5
+"""Acceleration at the beginning of a jog [rad/s²]."""
+
+Say = Callable[[str], None]
+Doing = Callable[[Arm], Awaitable[Any]]
+
+
+class Pilot:
+    """Control of one robot, lent to one tab at a time. Everything is called in one event loop.
+
+    Args:
+        robot: The robot.
+        client: Name under which control is taken.
+        say: Called with a sentence for people when something was refused or lost.
+
+    Attributes:
+        holder: Number of the tab that has control; None: no tab.
+    """
+
+    holder: int | None
+
+    def __init__(self, robot: Robot, client: str, say: Say) -> None:
+        self._robot, self._client, self._say = robot, client, say
+        self.holder = None
+        self._arm: Arm | None = None
+        self._held: AsyncExitStack | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._jog = (0, 0.0)
+        self._jog_until = 0.0
+        self._jogging: asyncio.Task[None] | None = None
+
+    async def take(self, tab: int) -> bool:
+        """Take control for a tab; tell if it has it now."""
+        if self.holder == tab:
+            return True
+        if self.holder is not None:
+            self._say("another tab has control: give it back there first")
+            return False
+        self.holder = tab  # no other tab may ask meanwhile
+        stack = AsyncExitStack()
+        try:
+            self._arm = await stack.enter_async_context(self._robot.control(self._client))
+        except (RefusedError, ClientError, ProtocolError) as error:
+            self.holder = None
+            self._say(str(error))
+            return False
+        self._held = stack
+        return True
+
+    async def give_back(self, tab: int) -> None:
+        """Stop what this tab moves, and give control back. Another tab's control stays."""
+        if self.holder != tab:
+            return
+        if self.busy:
+            await self.stop()
+        await self._end(self._jogging)
+        await self._end(self._task)
+        held, self._held, self._arm, self.holder = self._held, None, None, None
+        if held is not None:
+            with contextlib.suppress(RefusedError, ClientError):
+                await held.aclose()
+
+    @property
+    def busy(self) -> bool:
+        """Whether a motion or a jog of a tab is under way."""
+        return any(task is not None and not task.done() for task in (self._task, self._jogging))
+
+    async def stop(self) -> None:
+        """Stop the arm, whoever moves it: that needs no control."""
+        self._jog_until = 0.0
+        try:
+            await self._robot.stop()
+        except (RefusedError, ClientError) as error:
+            self._say(str(error))
+
+    def do(self, tab: int, doing: Doing) -> bool:
+        """Do something with the arm for the tab that has control, one thing at a time; tell if it was begun."""
+        if self.holder != tab or self._arm is None:
+            self._say("this tab does not have control: take it first")
+            return False
+        if self.busy:
+            self._say("the arm is still moving: wait, or stop it")
+            return False
+        self._task = self._begin(doing(self._arm))
+        return True
+
+    async def set(self, tab: int, doing: Doing) -> bool:
+        """Change a setting for the tab that has control, also while the arm moves; tell if it was changed."""
+        if self.holder != tab or self._arm is None:
+            self._say("this tab does not have control: take it first")
+            return False
+        try:
+            await doing(self._arm)
+        except (RefusedError, ClientError, ProtocolError) as error:
+            self._say(str(error))
+            return False
+        return True
+
+    def jog(self, tab: int, joint: int, direction: float) -> None:
+        """Jog a joint for the next quarter of a second; call it again and again while the button is down.
+
+        Args:
+            tab: The tab whose button is down.
+            joint: Number of the joint.
+            direction: 1 or -1.
+        """
+        loop = asyncio.get_running_loop()
+        if (
+            self.holder != tab or self._arm is None
+        ):  # the page shows that; many sentences a second help nobody
+            return
+        if self._task is not None and not self._task.done():
+            return
+        self._jog, self._jog_until = (joint, direction), loop.time() + DEADMAN_S
+        if self._jogging is None or self._jogging.done():
+            self._jogging = self._begin(self._play_jog(self._arm))
+
+    async def where(self) -> list[float]:
+        """Joint angles of the shaped reference now [rad]."""
+        return list((await self._robot.state()).target_q)
+
+    async def make_ready(self, arm: Arm) -> None:
+        """Release what a client can release, and switch the power on; say what remains."""
+        await arm.inject("normal")
+        await make_ready(self._robot, arm, power_on=True)
+        found = await look(self._robot)
+        if not found.ready:
+            self._say(found.sentence)
+
+    async def gone(self, tab: int) -> None:
+        """A tab was closed or has lost its connection."""
+        await self.give_back(tab)
+
+    def _begin(self, doing: Awaitable[Any]) -> asyncio.Task[None]:
+        return asyncio.get_running_loop().create_task(self._told(doing))
+
+    async def _told(self, doing: Awaitable[Any]) -> None:
+        try:
+            await doing
+        except StreamStoppedError as error:
+            if self._jog_until > 0.0:  # not by our own stop
+                self._say(str(error))
+        except (RefusedError, ClientError, ProtocolError) as error:
+            self._say(str(error))
+
+    async def _end(self, task: asyncio.Task[None] | None) -> None:
+        if task is None or task.done():
+            return
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+
+    async def _play_jog(self, arm: Arm) -> None:
+        loop, info = asyncio.get_running_loop(), await self._robot.info()
+        joint, direction = self._jog
+        q = list((await self._robot.state()).target_q)
+        low, high = info.limits.position[joint]
+        most, speed = JOG_SPEED * info.limits.velocity[joint], 0.0
+        async with arm.servo(period=JOG_PERIOD) as servo:
+            due = loop.time()
+            while loop.time() < self._jog_until and self._jog == (joint, direction):
+                speed = min(speed + JOG_ACCELERATION * JOG_PERIOD, most)
+                q[joint] = min(max(q[joint] + direction * speed * JOG_PERIOD, low), high)
+                servo.set(q)
+                due += JOG_PERIOD
+                await asyncio.sleep(max(due - loop.time(), 0.0))
+            self._jog_until = 0.0
+            await self._robot.stop()
+            # The stop has ended the stream, which the block hears of now.
+            await asyncio.sleep(10 * JOG_PERIOD)
+            servo.check()
+
+
+def motion(poses: Sequence[Sequence[float]]) -> Doing:
+    """A motion through poses: to the first one, if the arm is not there, and on to the last.
+
+    Args:
+        poses: Joint angles of each pose [rad].
+    """
+
+    async def run(arm: Arm) -> None:
+        for place, q in enumerate(poses):
+            at = (await arm.robot.state()).target_q
+            if place or max(abs(a - b) for a, b in zip(at, q, strict=True)) > 1e-6:
+                await arm.move_j(q)
+
+    return run
+
+
+def carry(mass: float) -> Doing:
+    """Let a simulated arm carry another mass [kg], which is not declared; it stands at rest then."""
+
+    async def run(arm: Arm) -> None:
+        await arm.reset(payload=_scaled((await arm.robot.info()).payload, mass))
+
+    return run
+
+
+def declare(mass: float) -> Doing:
+    """Declare another mass as the payload [kg]."""
+
+    async def run(arm: Arm) -> None:
+        payload = _scaled((await arm.robot.info()).payload, mass)
+        await arm.set_payload(payload.mass, payload.com, payload.inertia)
+
+    return run
+
+
+def _scaled(payload: Payload, mass: float) -> Payload:
+    """A payload of the same shape; where nothing is carried yet, a steel disc of 10 cm."""
+    if payload.mass <= 0.0:
+        across, along = 0.05**2 / 4 * mass, 0.05**2 / 2 * mass
+        return make_payload(mass, (0.0, 0.0, 0.03), (across, 0.0, 0.0, across, 0.0, along))
+    share = mass / payload.mass
+    return make_payload(mass, payload.com, [share * entry for entry in payload.inertia])

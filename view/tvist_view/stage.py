@@ -1,0 +1,75 @@
+"""The page's server with its floor, lights and camera. It is reached from this machine alone, unless told otherwise."""
+
+import ipaddress
+import socket
+
+from viser import ViserServer
+
+PORT = 8080
+
+
+class StageError(RuntimeError):
+    """The page cannot be served."""
+
+
+def open_stage(address: str, port: int, title: str, *, insecure: bool = False) -> ViserServer:
+    """Serve a page.
+
+    Args:
+        address: Address to listen on.
+        port: Port to listen on; 0 takes a free one.
+        title: Title of the page.
+        insecure: Serve other machines, too: whoever opens the page can move the robot.
+
+    Raises:
+        StageError: The port is in use, the address is not this machine's, or other machines could reach it.
+    """
+    if not _is_local(address) and not insecure:
+        raise StageError(
+            f"address is {address}: other machines could open the page and move the robot, since it knows no "
+            "passwords. Add --insecure to accept that, or forward the port: ssh -L 8080:127.0.0.1:8080 HOST"
+        )
+    with socket.socket(socket.AF_INET6 if ":" in address else socket.AF_INET) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((address, port))
+        except (OSError, OverflowError) as error:
+            raise StageError(
+                f"cannot listen on {address} port {port}: {getattr(error, 'strerror', None) or error}. "
+                "Another port: --port 8081"
+            ) from error
+        port = probe.getsockname()[1]
+    server = ViserServer(host=address, port=port, label=title, verbose=False)
+    server.gui.configure_theme(
+        control_layout="collapsible",
+        control_width="medium",
+        show_logo=False,
+        show_share_button=False,
+    )
+    server.gui.set_panel_label(title)
+    scene = server.scene
+    scene.set_up_direction("+z")
+    scene.configure_environment_map(None)
+    scene.add_light_ambient("/lights/ambient", intensity=1.2)
+    scene.add_light_directional("/lights/sun", intensity=2.2, position=(1.5, -2.0, 3.0), cast_shadow=True)
+    scene.add_light_directional("/lights/sky", intensity=1.0, position=(-2.0, 1.5, 2.0))
+    scene.add_grid("/floor", 4.0, 4.0, cell_size=0.25, section_size=1.0, shadow_opacity=0.25)
+    return server
+
+
+def look_at(server: ViserServer, target: tuple[float, float, float], distance: float) -> None:
+    """Have every camera begin with a look at a point [m] from the front and above."""
+    camera = server.initial_camera
+    camera.look_at = target
+    camera.position = (
+        target[0] + 0.75 * distance,
+        target[1] - 0.95 * distance,
+        target[2] + 0.45 * distance,
+    )
+
+
+def _is_local(address: str) -> bool:
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return address == "localhost"
