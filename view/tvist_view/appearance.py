@@ -22,7 +22,7 @@ class Appearance:
         self, gui: GuiApi, *, truth: bool, why_not: str = "", factor: float = 1.0, ghost: bool = True
     ) -> None:
         self._factor = gui.add_slider(
-            "Magnify bending ×",
+            "bending ×",
             min=1.0,
             max=MAX_FACTOR,
             step=1.0,
@@ -38,12 +38,14 @@ class Appearance:
             hint="Magnify what the arm hangs through by its own weight, too; otherwise the vibration alone.",
         )
         self._ghost = gui.add_checkbox(
-            "ghost of the unshaped reference",
+            "ghost",
             initial_value=ghost,
             visible=ghost,
-            hint="Where the arm would be asked to be without the shaper.",
+            hint="The grey arm is where the motion would be without the shaper, and without bending.",
         )
-        self._trace = gui.add_checkbox("trace of the tool", initial_value=True)
+        self._trace = gui.add_checkbox(
+            "trace", initial_value=True, hint="The way of the tool in the last seconds."
+        )
         self._words = gui.add_markdown("" if truth else why_not)
 
     @property

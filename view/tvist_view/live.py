@@ -54,6 +54,19 @@ async def show_robot(
     """
     status = server.gui.add_markdown(f"Looking for robot **{name}** at {endpoint} …", order=0.0)
     said = ""
+    shown: list[LivePage] = []
+    look_at(server, (0.0, 0.0, 0.45), 1.9)
+
+    @server.on_client_connect
+    def _(client: ClientHandle) -> None:
+        for page in shown:
+            page.came(client)
+
+    @server.on_client_disconnect
+    def _(client: ClientHandle) -> None:
+        for page in shown:
+            page.went(client)
+
     while True:
         try:
             robot = await Robot.connect(endpoint, name, security=security)
@@ -68,7 +81,9 @@ async def show_robot(
         try:
             async with robot:
                 status.visible = False
-                await LivePage(server, robot, await robot.info(), factor=factor).run()
+                page = LivePage(server, robot, await robot.info(), factor=factor)
+                shown.append(page)
+                await page.run()
         except GeometryError as error:
             status.content, status.visible = f"**The robot cannot be drawn.** {error}", True
             log.warning("%s", error)
@@ -77,6 +92,8 @@ async def show_robot(
             log.warning("%s; waiting for the robot", error)
             status.content, status.visible = f"**The robot has gone.** {error}. The page waits for it.", True
             await asyncio.sleep(RETRY_S)
+        finally:
+            shown.clear()
 
 
 class LivePage:
@@ -123,7 +140,6 @@ class LivePage:
         Raises:
             ClientError: It has.
         """
-        look_at(self._server, (0.0, 0.0, 0.45), 1.9)
         robot, server = self._robot, self._server
         ends = [
             robot.on_state(self._on_state),
@@ -131,16 +147,12 @@ class LivePage:
             robot.on_event(self._on_event),
         ]
         for client in server.get_clients().values():
-            self._came(client)
-        server.on_client_connect(self._came)
-        server.on_client_disconnect(self._went)
+            self.came(client)
         try:
             await self._frames()
         finally:
             for end in ends:
                 end()
-            for callbacks in (server._client_connect_cb, server._client_disconnect_cb):  # noqa: SLF001
-                callbacks.clear()
             if self._pilot.holder is not None:
                 await self._pilot.give_back(self._pilot.holder)
             self._folder.remove()
@@ -203,7 +215,7 @@ class LivePage:
         for client in self._server.get_clients().values():
             client.add_notification("tvist", sentence, auto_close_seconds=8.0)
 
-    def _came(self, client: ClientHandle) -> None:
+    def came(self, client: ClientHandle) -> None:
         """A tab was opened; called in any thread."""
         tab = client.client_id
         self._loop.call_soon_threadsafe(self._open, tab, client)
@@ -213,7 +225,7 @@ class LivePage:
             self._cockpits[tab] = Cockpit(client.gui, tab, self._pilot, self._info, self._post)
             self._cockpits[tab].refresh(self._info.control)
 
-    def _went(self, client: ClientHandle) -> None:
+    def went(self, client: ClientHandle) -> None:
         """A tab was closed; called in any thread."""
         self._loop.call_soon_threadsafe(self._cockpits.pop, client.client_id, None)
         self._post(self._pilot.gone(client.client_id))

@@ -56,13 +56,15 @@ class Plots:
         shown = [signals.between(now - SPAN, now) for signals in robots]
         seconds = grid - now
         alphas = [_peaks(signals.time, signals.alpha, grid) for signals in shown]
-        self._alpha.data = (seconds, *alphas)
+        least = np.zeros(POINTS)
+        least[0] = SMALL
+        self._alpha.data = (seconds, *alphas, least)
         qdd = [_peaks(signals.time, signals.acceleration, grid) for signals in shown]
         if len(shown) == 1:
             qdd.insert(0, _peaks(shown[0].time, shown[0].unshaped, grid))
-        self._acceleration.data = (seconds, *qdd)
-        self._f_d.data = (seconds, *(_held(signals.time, signals.f_d, grid) for signals in shown))
-        self._zeta.data = (seconds, *(_held(signals.time, signals.zeta, grid) for signals in shown))
+        self._acceleration.data = (seconds, *qdd, least)
+        self._f_d.data = (seconds, *(_held(signals.time, signals.f_d, grid) for signals in shown), least)
+        self._zeta.data = (seconds, *(_held(signals.time, signals.zeta, grid) for signals in shown), least)
         self._say(shown)
 
     def _say(self, shown: list[Signals]) -> None:
@@ -90,13 +92,14 @@ def _write(html: GuiHtmlHandle, lines: list[str]) -> None:
 def _plot(gui: GuiApi, title: str, lines: list[tuple[str, str, bool]]) -> GuiUplotHandle:
     empty = np.linspace(-SPAN, 0.0, 2)
     return gui.add_uplot(
-        (empty, *(np.zeros(2) for _ in lines)),
+        (empty, *(np.zeros(2) for _ in lines), np.array([SMALL, 0.0])),
         (
             uplot.Series(label="s"),
             *(
                 uplot.Series(label=label, stroke=colour, width=1.5, fill=f"{colour}22" if filled else "")
                 for label, colour, filled in lines
             ),
+            uplot.Series(label="", stroke="transparent", points=uplot.Series_Points(show=False)),
         ),
         title=title,
         scales={"x": uplot.Scale(time=False, auto=False, range=(-SPAN, 0.0)), "y": uplot.Scale(auto=True)},

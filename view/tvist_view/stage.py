@@ -1,11 +1,16 @@
 """The page's server with its floor, lights and camera. It is reached from this machine alone, unless told otherwise."""
 
+import contextlib
+import io
 import ipaddress
 import socket
 
-from viser import ViserServer
+from viser import ClientHandle, ViserServer
 
-PORT = 8080
+UPRIGHT = 0.8
+"""Width over height below which a window is a phone's [-]."""
+PHONE_DISTANCE, PHONE_DROP = 1.4, 0.72
+"""How much further a phone's camera is, and how far below the point it looks, in distances [-]."""
 
 
 class StageError(RuntimeError):
@@ -39,9 +44,12 @@ def open_stage(address: str, port: int, title: str, *, insecure: bool = False) -
                 "Another port: --port 8081"
             ) from error
         port = probe.getsockname()[1]
-    server = ViserServer(host=address, port=port, label=title, verbose=False)
+    with contextlib.redirect_stdout(
+        io.StringIO()
+    ):  # it would print a banner; the caller says where the page is
+        server = ViserServer(host=address, port=port, label=title, verbose=False)
     server.gui.configure_theme(
-        control_layout="collapsible",
+        control_layout="floating",
         control_width="medium",
         show_logo=False,
         show_share_button=False,
@@ -58,14 +66,24 @@ def open_stage(address: str, port: int, title: str, *, insecure: bool = False) -
 
 
 def look_at(server: ViserServer, target: tuple[float, float, float], distance: float) -> None:
-    """Have every camera begin with a look at a point [m] from the front and above."""
-    camera = server.initial_camera
-    camera.look_at = target
-    camera.position = (
-        target[0] + 0.75 * distance,
-        target[1] - 0.95 * distance,
-        target[2] + 0.45 * distance,
-    )
+    """Have every camera begin with a look at a point [m] from the front and above.
+
+    On a phone held upright the controls cover the lower half: the point is above the middle then, and further away.
+    """
+
+    def aim(client: ClientHandle) -> None:
+        if client.camera.aspect < UPRIGHT:
+            x, y, z = target
+            client.camera.position = _from(target, PHONE_DISTANCE * distance)
+            client.camera.look_at = (x, y, z - PHONE_DROP * distance)
+
+    server.initial_camera.look_at = target
+    server.initial_camera.position = _from(target, distance)
+    server.on_client_connect(aim)
+
+
+def _from(target: tuple[float, float, float], distance: float) -> tuple[float, float, float]:
+    return (target[0] + 0.75 * distance, target[1] - 0.95 * distance, target[2] + 0.45 * distance)
 
 
 def _is_local(address: str) -> bool:
