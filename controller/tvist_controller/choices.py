@@ -22,7 +22,7 @@ def wanted_modes(name: str, modes: int, where: str, known: Registry = BUILT_IN) 
 
     Args:
         name: Name of the filter.
-        modes: Number of modes that it shall suppress.
+        modes: Number of modes to suppress.
         where: Field that the name comes from.
         known: Available filters.
 
