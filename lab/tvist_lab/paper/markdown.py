@@ -33,7 +33,7 @@ stop. The arm is still when the true tool acceleration stays below 0.1 m/s². In
 
 
 def page(result: dict[str, Any], command: str) -> str:
-    """Tables 1 and 2 beside the paper's, the baselines, and where each figure comes from."""
+    """Return Tables 1 and 2 beside the paper's, the baselines, and the origin of each figure."""
     made = (
         f"Made by `{command}`; do not edit. Simulated: {result['runs']} runs a motion, each with noise and gear errors "
         f"of its own, seed {result['seed']}, calibration `{result['calibration']}`. The paper is Thomsen et al., "
