@@ -30,7 +30,7 @@ class Portal:
         """Run a function on the loop and wait for its result in this thread; Ctrl-C cancels it.
 
         An error of the client or protocol is raised as if it occurred here: its path through the loop and its cause
-            would only distract from the message.
+        would only distract from the message.
 
         Raises:
             NotConnectedError: The connection is closed.

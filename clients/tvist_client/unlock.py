@@ -73,7 +73,7 @@ async def make_ready(robot: Robot, arm: Arm, *, power_on: bool = False) -> list[
 
     Args:
         robot: The robot.
-        arm: Control of it.
+        arm: Control of the robot.
         power_on: Whether to power on the arm and release its brakes.
 
     Returns:

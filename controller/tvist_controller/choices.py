@@ -43,7 +43,7 @@ def make_estimator(source: ModeSource, modes: int, payload: Payload, where: str)
     """Make the chosen estimator for a number of modes.
 
     Raises:
-        RefusalError: It cannot estimate so many modes.
+        RefusalError: The source provides fewer modes.
     """
     try:
         return source.estimator(modes, payload)

@@ -1,4 +1,4 @@
-"""A command is a row: its message, what handles it, and what it takes."""
+"""Rows of the table of commands: message, handler and requirements."""
 
 from collections.abc import Callable
 from typing import Any, Generic, Literal, NamedTuple, TypeVar

@@ -119,7 +119,7 @@ class ControlCycle:
         if self.guard is not None:
             x, x_star = self._guarded(self.guard, x, x_star)
         self.reference = reference = self._shaped.posture(x)  # q [rad]
-        target = self._shaped.update(x_star)  # q*, q̇*, q̈* of the tick before
+        target = self._shaped.update(x_star)  # q*, q̇*, q̈* a tick earlier
         self.inverse_dynamics.advance()
         torque = self.inverse_dynamics.torque(target.q, target.qd, target.qdd)  # τ* [N m]
         gravity = self.inverse_dynamics.gravity(target.q)

@@ -13,7 +13,7 @@ TICKS = round(ALLOWED / PERIOD)
 
 
 class Overload:
-    """Finds a joint whose drive has been beyond its torque limit for longer than `ALLOWED`.
+    """Finds a joint whose drive has exceeded its torque limit for longer than `ALLOWED`.
 
     Args:
         limits: Largest torque of each joint, shape (n,) [N m].

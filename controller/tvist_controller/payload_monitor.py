@@ -35,7 +35,7 @@ class PayloadMonitor:
     upright posture, where gravity has no lever arm, there is therefore no warning.
 
     A deviating frequency would show the error too, but only while the arm vibrates, and less clearly: 3 kg instead of
-        5 kg change the frequency by a fifth and the shoulder's torque by half.
+    5 kg change the frequency by a fifth and the shoulder's torque by half.
 
     Args:
         description: The robot.

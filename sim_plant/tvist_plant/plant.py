@@ -61,8 +61,8 @@ class Plant(Protocol):
     """An arm with its drives, simulated or real.
 
     A controller owns its plant: no other code steps or resets it, and controllers do not share plants. The controller
-        resets the plant when it starts, takes a few steps at rest, and resets it again; from then on it calls `step`
-        once in every control period of `PERIOD` seconds.
+    resets the plant when it starts, takes a few steps at rest, and resets it again; from then on it calls `step` once
+    in every control period of `PERIOD` seconds.
 
     An implementation guarantees:
 

@@ -17,7 +17,7 @@ class Mailbox:
     """Passes messages to callbacks on the loop, in the order of their arrival.
 
     There is one mailbox for all topics, since their order matters: events of a tick come before its state. The loop
-        is woken once for all waiting messages, not once per message.
+    is woken once for all waiting messages, not once per message.
 
     Args:
         loop: The event loop.

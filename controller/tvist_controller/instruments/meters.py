@@ -10,7 +10,7 @@ class Meters:
     """Temperature of each joint, and energy of all joints.
 
     A joint is one body: τ dT/dt = T_ambient + R_th (P_standby + R i²) - T, solved exactly over each step with
-        constant current. Ticks that were skipped count as one step with the current at its end.
+    constant current. Ticks that were skipped count as one step with the current at its end.
 
     Args:
         ratings: Ratings of each joint.

@@ -18,7 +18,7 @@ class Reading:
     """One tick of one robot.
 
     The docstring of each value in the derived classes begins with its source. State and Io: the message contains it.
-        Computed: what it is computed from. Constant: what stands for something that is not simulated.
+    Computed: what it is computed from. Constant: what stands for something that is not simulated.
 
     Args:
         state: State of the tick.

@@ -22,8 +22,8 @@ class ProgramPlayer:
     """Carries out one program at a time, line by line, with the rights of the client that played it.
 
     Its motions are ordinary motions: they have numbers and events, and a client may pause them; stopping one ends the
-        program. A protective stop pauses the program: after the stop is unlocked, playing resumes with the line that
-        was stopped.
+    program. A protective stop pauses the program: after the stop is unlocked, playing resumes with the line that was
+    stopped.
 
     Args:
         description: The robot.

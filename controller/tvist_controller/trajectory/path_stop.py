@@ -20,8 +20,8 @@ class PathStop(Trajectory):
     therefore never ahead of the motion.
 
     It brakes from its first step with full jerk: the second difference b of the positions played last becomes b -
-        jerk·h, and the stop continues from the state of motion that central differences give with this step. If the
-        motion is so slow that the limits let it stand at once, it does.
+    jerk·h, and the stop continues from the state of motion that central differences give with this step. If the
+    motion is so slow that the limits let it stand at once, it does.
 
     Args:
         path: Path of the stop.

@@ -32,7 +32,7 @@ def choose(
     Args:
         arm: Guessed arm with its payloads.
         candidates: Configurations, each of shape (n,) [rad].
-        jog: The move that makes it ring.
+        jog: The move that excites the arm.
         counts: Number of ring-downs with each payload; together at most the number of candidates.
 
     Returns:

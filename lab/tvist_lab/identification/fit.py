@@ -40,7 +40,7 @@ def check_count(configurations: int, joints: tuple[int, ...], degree: int) -> No
     """Check that there are enough configurations, before or after they are measured.
 
     Raises:
-        FitError: There are fewer than one and a half times the coefficients.
+        FitError: There are fewer than one and a half times as many as coefficients.
     """
     size = terms(np.zeros((1, max(joints) + 1)), joints=joints, basis=BASIS, degree=degree).shape[1]
     needed = math.ceil(1.5 * size)
@@ -65,7 +65,7 @@ def fit_polynomials(
         degree: Highest total degree.
 
     Raises:
-        FitError: There are fewer measurements than one and a half times the coefficients.
+        FitError: There are fewer than one and a half times as many measurements as coefficients.
     """
     check_count(len(q), joints, degree)
     design = terms(q, joints=joints, basis=BASIS, degree=degree)

@@ -109,7 +109,7 @@ async def identify(
 
     Args:
         robot: The robot, on a network or in process.
-        arm: Control of it.
+        arm: Control of the robot.
         plan: What to measure.
         name: Name of the calibration.
         command: Command line that the user typed, for the calibration's provenance.

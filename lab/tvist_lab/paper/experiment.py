@@ -138,7 +138,7 @@ async def experiment(
 
     Args:
         robot: The robot.
-        arm: Control of it.
+        arm: Control of the robot.
         runs: Number of repetitions, each with its own noise and gear errors.
         seed: Seed of the first repetition.
         baselines: Whether to run the baselines, too.

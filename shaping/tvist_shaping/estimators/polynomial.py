@@ -24,9 +24,9 @@ def saturate(x: float, low: float, high: float) -> float:
         y = low + w r((x - low)/w)        near low, w = MARGIN (high - low), and mirrored near high
         r(t) = 2 (p⁶ - 3p⁵ + 5/2 p⁴),     p = (t + 1)/2,    -1 < t < 1
 
-    r is the integral of the quintic smooth step: r(t) = 0 below -1, t above 1. So y is x itself from low + w to high
-        - w, and the bound itself at a distance of more than w beyond it. In between, its slope changes smoothly from
-        1 to 0: a kink in f_d(q) would be a jump in the velocity of the delay, and of the arm.
+    r is the integral of the quintic smooth step: r(t) = 0 below -1, t above 1. So y is x itself between low + w and
+    high - w, and it is the bound itself at more than w outside the range. In between, its slope changes smoothly from
+    1 to 0: a kink in f_d(q) would be a jump in the velocity of the delay, and of the arm.
     """
     w = MARGIN * (high - low)
     if x < low + w:

@@ -27,8 +27,8 @@ def access_control(robots: Sequence[str], roles: Mapping[str, Role]) -> dict[str
         roles: Role by common name of a client's certificate; at least one.
 
     Returns:
-        Rules and the clients they apply to. Everything else is denied: to names without a role, and to clients
-            without a certificate.
+        Rules and the clients they apply to. Everything else is denied: to names without a role, and to clients without
+        a certificate.
     """
     viewing, operating = _viewing(robots), _operating(robots)
     rules_of: dict[Role, list[dict[str, Any]]] = {"viewer": viewing, "operator": [*viewing, *operating]}

@@ -1,4 +1,4 @@
-"""Gateways: the ways clients reach a robot, and what a gateway asks of the robot."""
+"""Gateways, through which clients reach a robot, and the interface between a gateway and its robot."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -16,7 +16,7 @@ Answer = Callable[[Reply], None]
 
 
 class GatewayError(Exception):
-    """A gateway cannot open; the sentence says why and what to do."""
+    """A gateway cannot open; the message says why and what to do."""
 
 
 class Desk(Protocol):

@@ -23,7 +23,7 @@ def is_local(endpoint: str) -> bool:
     """Return whether only this machine can reach an endpoint.
 
     When in doubt, an endpoint counts as reachable from other machines: if the protocol is unknown, if its host name
-        cannot be looked up, or if any one of the name's addresses is not local.
+    cannot be looked up, or if any one of the name's addresses is not local.
     """
     if protocol(endpoint) in LOCAL_PROTOCOLS:
         return True

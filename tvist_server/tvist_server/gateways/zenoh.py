@@ -135,18 +135,18 @@ def _publishers(
     """Declare one publisher for each topic.
 
     In real time nothing may block the publisher, so all publishers use DROP and none is express. Messages that find
-        the link busy then share a batch of 64 KiB, and two batches may wait. With express, each message has a batch
-        of its own, so only two states could wait: on two cores loaded with eight busy processes, a client that read
-        as fast as it could got 2330 of 3000 states; without express it got all of them, none of them late.
+    the link busy then share a batch of 64 KiB, and two batches may wait. With express, each message has a batch of
+    its own, so only two states could wait: on two cores loaded with eight busy processes, a client that read as fast
+    as it could got 2330 of 3000 states; without express it got all of them, none of them late.
 
     Messages of every tick have a low priority, so on a link that is too slow for them, answers, events and telemetry
     are sent first. With real-time priority, and a link fast enough for a fifth of the states, no answer arrived.
 
     Events must not be lost. They have a priority, and hence queues, of their own, so that about a thousand can wait
-        for a client that has stopped reading, in addition to what its socket buffers. Measured with a reader that
-        stopped for 7.5 s under more states than its socket buffers: 3300 of 6000 states were dropped, but none of 240
-        events; with the states' priority, half of the events were lost. BLOCK would have held up the publisher, and
-        with it all other clients, for 5 s.
+    for a client that has stopped reading, in addition to what its socket buffers. Measured with a reader that stopped
+    for 7.5 s under more states than its socket buffers: 3300 of 6000 states were dropped, but none of 240 events;
+    with the states' priority, half of the events were lost. BLOCK would have held up the publisher, and with it all
+    other clients, for 5 s.
 
     In lockstep all publishers use BLOCK, as the protocol requires, and events share the states' queue: a client that
     reads state `n` has read all events up to tick `n`.

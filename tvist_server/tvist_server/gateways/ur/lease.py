@@ -60,7 +60,7 @@ class HostLease:
         self.ask(command(self._token), again)
 
     def ask(self, command: Command, then: Then) -> None:
-        """Send a command as it is."""
+        """Send a command unchanged."""
         self._desk.command(command, lambda reply: self._soon(lambda: then(reply)))
 
     def leave(self, connection: object) -> None:
