@@ -82,7 +82,7 @@ class Feed(Generic[M]):
         """Return the next message that satisfies a condition.
 
         Raises:
-            AnswerTimeoutError: None arrived in time.
+            AnswerTimeoutError: No such message arrived in time.
             NotConnectedError: The robot disconnected.
         """
         self.subscribe()

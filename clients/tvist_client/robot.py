@@ -133,7 +133,7 @@ class Robot:
         Before the first tick, the state describes the arm at rest. In lockstep the first call may take a second.
 
         Raises:
-            AnswerTimeoutError: None arrived within `STATE_S`.
+            AnswerTimeoutError: No state arrived within `STATE_S`.
             MisuseError: An in-process host other than this project's publishes no state before its first tick.
             NotConnectedError: The connection is closed, or the robot has disconnected.
         """
@@ -183,7 +183,7 @@ class Robot:
         """Return inputs, outputs, registers and tool: the latest known values, else the next ones within about 1 s.
 
         Raises:
-            AnswerTimeoutError: None arrived within `STATE_S`.
+            AnswerTimeoutError: No message arrived within `STATE_S`.
         """
         self._ios.subscribe()
         return self._ios.latest or await self._ios.next(lambda _: True, STATE_S)

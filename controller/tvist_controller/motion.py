@@ -214,7 +214,7 @@ class MotionControl:
         """Start to follow set-points.
 
         Raises:
-            RefusalError: The arm is busy, or the stream's limits are too high.
+            RefusalError: The arm is busy, or the velocity limit is above that of reduced speed.
         """
         target = self._check("servo_start")
         most = self.motions.slowest

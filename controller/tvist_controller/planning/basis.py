@@ -58,4 +58,4 @@ class PlanBasis(NamedTuple):
 
     filter: FilterBasis
     motion: MotionBasis | None
-    """None while a point-to-point motion may not begin."""
+    """Basis of a point-to-point motion; None while none may begin."""
