@@ -1,10 +1,10 @@
-"""Stream a sine to a robot and measure what comes back, with nothing but eclipse-zenoh and msgpack.
+"""Stream a sine to a robot and measure its response, with only eclipse-zenoh and msgpack.
 
     pip install eclipse-zenoh msgpack
     python 01_bare_client.py [ENDPOINT] [ROBOT]        default: tcp/127.0.0.1:7447 ur5e
 
-Takes control, swings the base joint around where it stands with set-points at 125 Hz for 10 s, comes to rest,
-gives control back and prints what it saw. Keys and messages: protocol/README.md.
+Takes control, swings the base joint around its present position with set-points at 125 Hz for 10 s, comes to rest,
+gives control back and prints the results. Keys and messages: protocol/README.md.
 """
 
 import json
@@ -26,7 +26,7 @@ TICK = 0.002  # the robot's control period [s]
 
 
 def ask(session: zenoh.Session, leaf: str, **message: object) -> dict[str, Any]:
-    """Query a key, with a message where there is one, for the answer. A refusal ends the program."""
+    """Query a key, with a message if there is one, and return the answer. A refusal ends the program."""
     payload = msgpack.packb(message) if message else None
     for reply in session.get(f"tvist/{ROBOT}/{leaf}", payload=payload, timeout=10.0):
         if reply.ok:
@@ -34,18 +34,18 @@ def ask(session: zenoh.Session, leaf: str, **message: object) -> dict[str, Any]:
             if answer["type"] == "refused":
                 sys.exit(f"refused, {answer['code']}: {answer['why']}")
             return answer
-    # A query that nobody hears ends at once, without any reply.
+    # A query that reaches no one ends at once, without any reply.
     return sys.exit(f"no robot {ROBOT} answers at {ENDPOINT}: does the server run?")
 
 
 def swing(t: float) -> float:
-    """Offset of the base joint at a time [rad]: a sine that fades in for a second and out for the last."""
+    """Offset of the base joint at a time [rad]: a sine that fades in over the first second and out over the last."""
     fade = math.sin(math.pi / 2 * min(1.0, t, SECONDS - t)) ** 2
     return AMPLITUDE * fade * math.sin(2 * math.pi * FREQUENCY * t)
 
 
 def delay(reference: Sequence[float], target: Sequence[float], longest: int = 100) -> float:
-    """Return by how many samples `target` lags behind `reference`: least squares, between samples by a parabola."""
+    """Return by how many samples `target` lags behind `reference`: least squares, interpolated by a parabola."""
     n = range(longest, len(target))
     error = [sum((target[i] - reference[i - lag]) ** 2 for i in n) for lag in range(longest + 1)]
     best = min(range(1, longest), key=error.__getitem__)
@@ -64,7 +64,7 @@ def median_ms(function: Callable[[], object]) -> float:
 
 
 def main() -> None:
-    """Take control, swing, give back, tell."""
+    """Take control, swing, give control back, print the results."""
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([ENDPOINT]))
@@ -73,16 +73,16 @@ def main() -> None:
         session = zenoh.open(config)
     except zenoh.ZError:
         sys.exit(f"nobody listens at {ENDPOINT}: does the server run?")
-    with session:  # closes it: a session that stays open can keep the process from ending
+    with session:  # closes it, since an open session can keep the process from ending
         info = ask(session, "info")
         if info["clock"] != "realtime":
             sys.exit(f"this example needs a robot in real time; {ROBOT} is in {info['clock']}")
 
-        # Zenoh itself answers the first, at once; the robot the second, at the start of its next tick.
+        # Zenoh itself answers the first query, at once; the robot answers the second at the start of its next tick.
         trip = median_ms(lambda: list(session.liveliness().get(f"tvist/{ROBOT}/alive")))
         answer = median_ms(lambda: ask(session, "info"))
 
-        # Zenoh calls back in a thread of its own, which only fills a queue.
+        # Zenoh calls back in its own thread, where we only fill a queue.
         inbox = queue.SimpleQueue()
         session.declare_subscriber(
             f"tvist/{ROBOT}/state", lambda sample: inbox.put(sample.payload.to_bytes())
@@ -91,8 +91,8 @@ def main() -> None:
         def next_state() -> dict[str, Any]:
             return msgpack.unpackb(inbox.get(timeout=5.0))
 
-        # While this token is there the robot knows that we are: if we die, control ends at once. The session's id tells
-        # us from another program of that name.
+        # This token tells the robot that we are present: if we die, control ends at once. The session's id
+        # distinguishes us from another program with the same client name.
         alive = session.liveliness().declare_token(f"tvist/{ROBOT}/client/bare/{session.info.zid()}")
         token = ask(session, "command", type="take_control", client="bare", lease_s=30.0)["token"]
         q = next_state()["target_q"]
@@ -101,7 +101,7 @@ def main() -> None:
         print(f"swinging {info['joints'][0]} of {ROBOT} by ±{AMPLITUDE} rad for {SECONDS:g} s …")
         start = time.monotonic()
         for sequence in range(round(SECONDS / PERIOD) + 1):
-            # Deadlines count from the start, so that no lateness adds up.
+            # Deadlines count from the start, so that delays do not add up.
             time.sleep(max(0.0, start + sequence * PERIOD - time.monotonic()))
             wanted = [q[0] + swing(sequence * PERIOD), *q[1:]]
             setpoint = {"type": "setpoint", "token": token, "sequence": sequence, "q": wanted}
@@ -116,7 +116,7 @@ def main() -> None:
         alive.undeclare()
 
     lag = delay([s["reference_q"][0] for s in states], [s["target_q"][0] for s in states])
-    still = states[0]["actual_tool_accelerometer"]  # gravity, which turning the base leaves where it is
+    still = states[0]["actual_tool_accelerometer"]  # gravity, which a rotation of the base does not change
     joint = max(abs(qdd) for s in states for qdd in s["target_qdd"])
     tool = max(math.dist(s["actual_tool_accelerometer"], still) for s in states)
     print(f"round trip              {trip:6.2f} ms, median; {answer:.2f} ms where the robot answers")

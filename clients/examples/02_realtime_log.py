@@ -1,12 +1,12 @@
-"""Log UR's real-time interface, port 30003, into a CSV file, with nothing but Python.
+"""Log UR's real-time interface, port 30003, to a CSV file, with only Python's standard library.
 
     tvist serve --ur
     python 02_realtime_log.py [HOST] [FILE] [SECONDS]        default: 127.0.0.1 realtime.csv, until Control+C
 
 The robot sends a package at every tick, 500 times a second: an int32 with its own length, then doubles, big-endian.
-This is the layout that UR publishes; software before 5.10 ends it after the safety status. A column is named as there,
-with a number behind it where there are several: one a joint, or x y z and a rotation vector. Times are in s, angles in
-rad, lengths in m, forces in N, moments in N m, currents in A.
+This is the layout that UR publishes; software before 5.10 ends it after the safety status. Columns have UR's names,
+with a number appended to each of several values: one per joint, or x y z and a rotation vector. Times are in s,
+angles in rad, lengths in m, forces in N, moments in N m, currents in A.
 """
 
 import csv
@@ -28,14 +28,14 @@ LAYOUT = (
     ("elbow_position", 3), ("elbow_velocity", 3), ("safety_status", 1),
     ("", 3), ("payload_mass", 1), ("payload_cog", 3), ("payload_inertia", 6),
 )  # fmt: skip
-"""Doubles of a package, in order: name and how many; without a name they are reserved."""
+"""Doubles of a package, in order: name and count; those without a name are reserved."""
 NAMES = [
     name and (name if count == 1 else f"{name}_{number}") for name, count in LAYOUT for number in range(count)
 ]
 
 
 def receive(robot: socket.socket, size: int) -> bytes:
-    """So many bytes, which may come in pieces."""
+    """Receive this many bytes, which may arrive in pieces."""
     data = b""
     while len(data) < size:
         piece = robot.recv(size - len(data))
@@ -46,14 +46,14 @@ def receive(robot: socket.socket, size: int) -> bytes:
 
 
 def main() -> None:
-    """Log until it is enough."""
+    """Log until the time is over."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     ticks: list[int] = []
     try:
         robot = socket.create_connection((HOST, PORT), timeout=5.0)
     except OSError as error:
         sys.exit(f"nobody listens at {HOST}:{PORT} ({error}): does the server run, with --ur?")
-    # Samples that this program is too slow to read are lost: room for half a second of them.
+    # Samples that this program is too slow to read are lost; this makes room for half a second of them.
     robot.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 600_000)
     with robot, open(FILE, "w", newline="", encoding="utf-8") as file:  # noqa: PTH123  one page of plain Python
         log = csv.writer(file)

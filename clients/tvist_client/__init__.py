@@ -1,4 +1,4 @@
-"""The Python client: asyncio here, a blocking face of it in `tvist_client.blocking`."""
+"""The Python client: asyncio here, and a blocking version in `tvist_client.blocking`."""
 
 from tvist_client.arm import Arm
 from tvist_client.errors import (

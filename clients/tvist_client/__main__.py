@@ -10,7 +10,7 @@ from tvist_client.robot import ENDPOINT, NAME
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command line; 0 if all is well, 1 if not, 2 for misuse."""
+    """Run the command line; return 0 if all is well, 1 if not, 2 for incorrect arguments."""
     parser = argparse.ArgumentParser(prog="python -m tvist_client", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     checking = commands.add_parser(

@@ -1,4 +1,4 @@
-"""An arm under control: what only the holder of the lease may do."""
+"""An arm under control: everything that only the client in control may do."""
 
 import asyncio
 import contextlib
@@ -53,13 +53,15 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 UNLOCKED_TICKS = 150
-"""Ticks, 0.3 s, for which a robot is watched once it is unlocked: an overloaded drive gives out in hundredths."""
+"""Ticks (0.3 s) for which a robot is observed after unlocking; an overloaded drive stops within hundredths of a
+second.
+"""
 
 
 class Arm(Terminals, Simulation):
-    """What `Robot.control` gives. Joint values are any sequence of numbers [rad], one a joint.
+    """The arm that `Robot.control` yields. Joint values are any sequence of numbers [rad], one for each joint.
 
-    Every command may raise RefusedError: then it changed nothing.
+    Every command may raise RefusedError; it has then changed nothing.
 
     Attributes:
         robot: The robot it belongs to.
@@ -84,7 +86,7 @@ class Arm(Terminals, Simulation):
             velocity: Largest velocity of any joint [rad/s].
             acceleration: Largest acceleration of any joint [rad/s²].
             jerk: Largest jerk of any joint [rad/s³].
-            wait: Whether to wait for the end; in lockstep and free time is made to pass until it comes.
+            wait: Whether to wait for the end; in lockstep and free, time is stepped until then.
 
         Returns:
             The motion; `started` and `done` are ticks once they are known.
@@ -133,12 +135,12 @@ class Arm(Terminals, Simulation):
             jerk=number(jerk, "jerk"),
         )
         servo = Servo(self, every, joints)
-        with servo:  # it hears of the stream's end, which may come before the answer
+        with servo:  # receives the event of the stream's end, which may precede the answer
             await self.robot.request(start)
             try:
                 yield servo
             except BaseException:
-                # The error that ends the block says more than a refusal to end a stream that has ended.
+                # The error that ends the block is more informative than a refusal to end a stream that has ended.
                 with contextlib.suppress(RefusedError, ClientError):
                     await self.robot.request(ServoStop(token=self.token))
                 raise
@@ -150,13 +152,13 @@ class Arm(Terminals, Simulation):
         """Come to rest now, bypassing the shaper.
 
         Args:
-            deceleration: Largest deceleration of any joint [rad/s²]; None: as much as the torque limits allow.
+            deceleration: Largest deceleration of any joint [rad/s²]; None for as much as the torque limits allow.
         """
         limit = None if deceleration is None else number(deceleration, "deceleration")
         await self.robot.request(Stop(token=self.token, deceleration=limit))
 
     async def pause(self) -> None:
-        """Bring the running motion to a standstill on its way."""
+        """Bring the running motion to a standstill on its path."""
         await self.robot.request(Pause(token=self.token))
 
     async def resume(self) -> None:
@@ -174,21 +176,21 @@ class Arm(Terminals, Simulation):
     # ------------------------------------------------------------------ power and protective stops
 
     async def power_on(self, *, release_brakes: bool = True) -> None:
-        """Power the arm; without `release_brakes` the brakes of an arm that had no power go on holding it."""
+        """Power on the arm; without `release_brakes`, the brakes of an arm that was off stay closed."""
         await self.robot.request(PowerOn(token=self.token, release_brakes=release_brakes))
 
     async def power_off(self) -> None:
-        """Stop what moves, then take the arm's power."""
+        """Stop any motion, then power off the arm."""
         await self.robot.request(PowerOff(token=self.token))
 
     async def unlock_protective_stop(self) -> None:
-        """Leave a protective stop; the arm must be at rest.
+        """Unlock a protective stop; the arm must be at rest.
 
-        In real time it waits for `UNLOCKED_TICKS` to see that the robot does not stop again. In lockstep and free time
-        is the caller's: a stop that comes with it is an event, and stands in `Robot.info` as `stop`.
+        In real time, wait for `UNLOCKED_TICKS` to see that the robot does not stop again. In lockstep and free, the
+        caller advances time: a new stop is then reported as an event, and as `stop` in `Robot.info`.
 
         Raises:
-            ProtectiveStopError: The robot stopped again meanwhile: what made it stop is still there.
+            ProtectiveStopError: The robot has stopped again, because the cause of the stop persists.
         """
         unlock = UnlockProtectiveStop(token=self.token)
         if await self.robot.clock() != "realtime":
@@ -199,7 +201,7 @@ class Arm(Terminals, Simulation):
             lambda event: stops.append(event) if event.kind == "protective_stop" else None
         )
         try:
-            # The event of the stop that is unlocked may still be on its way; it is of the next tick at the latest.
+            # The event of the unlocked stop may still be on its way; its tick is the next one at the latest.
             before = (await self.robot.info()).tick + 1
             await self.robot.request(unlock)
             await self.robot.advance(UNLOCKED_TICKS)
@@ -220,11 +222,11 @@ class Arm(Terminals, Simulation):
         await self.robot.request(ProgramLoad(token=self.token, name=name))
 
     async def play_program(self) -> None:
-        """Start the loaded program, or go on with a paused one. `io` tells how far it is; it ends with control."""
+        """Start the loaded program, or resume a paused one. `io` reports its progress; it ends with control."""
         await self.robot.request(ProgramPlay(token=self.token))
 
     async def pause_program(self) -> None:
-        """Pause the program and its motion; `play_program` continues it."""
+        """Pause the program and its motion; `play_program` resumes it."""
         await self.robot.request(ProgramPause(token=self.token))
 
     async def stop_program(self) -> None:
@@ -234,7 +236,7 @@ class Arm(Terminals, Simulation):
     # ------------------------------------------------------------------ setting up
 
     async def set_shaper(self, name: str, modes: int = 1) -> None:
-        """Choose the input shaper, one of those in `info`; `none` does not shape."""
+        """Choose the input shaper, one of those in `info`; `none` turns shaping off."""
         await self.robot.request(SetShaper(token=self.token, name=name, modes=whole(modes, "modes", 1)))
 
     async def set_estimator(
@@ -245,12 +247,12 @@ class Arm(Terminals, Simulation):
         zeta: float | Iterable[float] | None = None,
         calibration: str | Mapping[str, Any] | None = None,
     ) -> None:
-        """Choose the estimator that gives the shaper frequency and damping ratio.
+        """Choose the estimator that provides the shaper with frequency and damping ratio.
 
         Args:
             name: `fixed` with `f_d` and `zeta`, `polynomial` or `modal` with `calibration`.
-            f_d: Damped frequency of each mode [Hz]; a number stands for one mode.
-            zeta: Damping ratio of each mode [-]; likewise.
+            f_d: Damped frequency of each mode [Hz]; a single number for one mode.
+            zeta: Damping ratio of each mode [-]; a single number for one mode.
             calibration: Name of a calibration in `info`, or its content as a map.
         """
         await self.robot.request(
@@ -288,15 +290,15 @@ class Arm(Terminals, Simulation):
     # ------------------------------------------------------------------ lease
 
     async def hand_over(self, client: str) -> None:
-        """Give control to another client, which has only to take it; this one has none any more."""
+        """Give control to another client, which only has to take it; this client loses control."""
         await self.robot.request(HandOver(token=self.token, client=client))
 
     async def keep_alive(self) -> None:
-        """Renew the lease, as every command does; `Robot.control` sees to it."""
+        """Renew the lease, as every command does; `Robot.control` does this automatically."""
         await self.robot.request(KeepAlive(token=self.token))
 
     async def keep_alive_every(self, period_s: float) -> None:
-        """Renew the lease again and again, until it is lost."""
+        """Renew the lease periodically, until it is lost."""
         while True:
             await asyncio.sleep(period_s)
             try:
@@ -316,9 +318,9 @@ async def hold_control(
 
     Args:
         robot: Robot to control.
-        transport: The robot's; the client is announced there first.
+        transport: The robot's transport; the client is announced there first.
         client: Name of the client.
-        lease_s: How long control lasts without a sign of life [s].
+        lease_s: How long control lasts without renewal [s].
     """
     check_client_name(client)
     seconds = number(lease_s, "lease_s")

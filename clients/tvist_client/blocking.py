@@ -1,9 +1,9 @@
-"""The client without `await`: the same names, and an event loop in a thread of its own.
+"""The client without `await`: the same names, and an event loop in a separate thread.
 
     with Robot.connect() as robot, robot.control("me") as arm:
         arm.move_j(q)
 
-A call waits for its answer; Ctrl-C ends the wait. Callbacks run in the loop's thread and may not wait.
+A call waits for its answer; Ctrl-C ends the wait. Callbacks run in the loop's thread and must not block.
 """
 
 import contextlib
@@ -38,7 +38,7 @@ class Stream(Iterator[M], Generic[M]):
 
     @property
     def dropped(self) -> int:
-        """Messages the reader was too slow for."""
+        """Number of messages that were dropped because the reader was too slow."""
         return self._stream.dropped
 
     def __next__(self) -> M:
@@ -49,7 +49,7 @@ class Stream(Iterator[M], Generic[M]):
 
 
 class Robot:
-    """One robot; see `tvist_client.robot.Robot` for what the arguments mean."""
+    """One robot; see `tvist_client.robot.Robot` for the arguments."""
 
     def __init__(self, portal: Portal, robot: asynchronous_robot.Robot) -> None:
         self._portal = portal
@@ -57,7 +57,7 @@ class Robot:
 
     @classmethod
     def connect(cls, endpoint: str = ENDPOINT, name: str = NAME, *, security: Folder | None = None) -> Self:
-        """Connect over Zenoh and shake hands."""
+        """Connect over Zenoh and check that the robot answers."""
         portal = Portal()
         try:
             robot = portal.call(lambda: asynchronous_robot.Robot.connect(endpoint, name, security=security))
@@ -68,12 +68,12 @@ class Robot:
 
     @classmethod
     def over(cls, transport: Transport) -> Self:
-        """Talk to a robot over a transport that belongs to no event loop yet, as the loopback's."""
+        """Use a robot over a transport that is not yet bound to an event loop, such as the loopback's."""
         portal = Portal()
         return cls(portal, portal.run(lambda: asynchronous_robot.Robot.over(transport)))
 
     def close(self) -> None:
-        """End the connection and the loop's thread; a second call does nothing."""
+        """Close the connection and end the loop's thread; a second call does nothing."""
         if not self._portal.closed:
             try:
                 self._portal.call(self._robot.close)
@@ -97,19 +97,19 @@ class Robot:
         return self._portal.call(self._robot.clock)
 
     def state(self) -> State:
-        """The present state: in real time the next to come, otherwise the last."""
+        """Return the present state: in real time the next one to arrive, otherwise the last one."""
         return self._portal.call(self._robot.state)
 
     def states(self, buffer: int = BUFFER) -> Stream[State]:
-        """Every state from now on."""
+        """Iterate over every state from now on."""
         return Stream(self._portal, self._portal.run(lambda: self._robot.states(buffer)))
 
     def events(self, buffer: int = BUFFER) -> Stream[Event]:
-        """Every event from now on."""
+        """Iterate over every event from now on."""
         return Stream(self._portal, self._portal.run(lambda: self._robot.events(buffer)))
 
     def on_state(self, callback: Callable[[State], object]) -> Callable[[], None]:
-        """Have a callback called with every state; the function returned ends that."""
+        """Call a function with every state; the function returned ends that."""
         return self._portal.subscription(lambda: self._robot.on_state(callback))
 
     def on_event(self, callback: Callable[[Event], object]) -> Callable[[], None]:
@@ -129,7 +129,7 @@ class Robot:
         return self._portal.subscription(lambda: self._robot.on_io(callback))
 
     def io(self) -> Io:
-        """Inputs, outputs, registers and tool."""
+        """Return inputs, outputs, registers and tool."""
         return self._portal.call(self._robot.io)
 
     def request(self, command: Command, timeout_s: float = ANSWER_S) -> Accepted | Done:
@@ -137,7 +137,7 @@ class Robot:
         return self._portal.call(lambda: self._robot.request(command, timeout_s))
 
     def stop(self) -> None:
-        """Bring the arm to rest now; anyone may."""
+        """Bring the arm to rest now; no control is needed."""
         self._portal.call(self._robot.stop)
 
     @contextlib.contextmanager
@@ -153,9 +153,9 @@ class Robot:
             yield Stepper(self._portal, stepper)
 
     def advance(self, ticks: int) -> int:
-        """Let ticks pass: by steps in lockstep and free, by waiting in real time."""
+        """Advance time: by steps in lockstep and free, by waiting in real time."""
         return self._portal.call(lambda: self._robot.advance(ticks))
 
     def rest(self) -> State:
-        """Let time pass until the shaped reference rests."""
+        """Advance time until the shaped reference is at rest."""
         return self._portal.call(self._robot.rest)

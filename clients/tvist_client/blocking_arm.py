@@ -1,4 +1,4 @@
-"""What the blocking client's robot gives: an arm, its motions and streams, and the clock."""
+"""Objects that the blocking client's robot returns: an arm, its motions and streams, and the clock."""
 
 import contextlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -24,22 +24,22 @@ class Motion:
 
     @property
     def id(self) -> int:
-        """The robot's number for it."""
+        """The robot's number for the motion."""
         return self._motion.id
 
     @property
     def started(self) -> int | None:
-        """Tick at which it began; None before."""
+        """Tick at which it began; None until then."""
         return self._motion.started
 
     @property
     def done(self) -> int | None:
-        """Tick at which it came to rest at the target; None before, and where it never did."""
+        """Tick at which it came to rest at the target; None until then, or if it never did."""
         return self._motion.done
 
     @property
     def stopped(self) -> Event | None:
-        """The event that says that it ended before its target; None where it did not."""
+        """The event that reports its end before the target; None if there is none."""
         return self._motion.stopped
 
     @property
@@ -48,7 +48,7 @@ class Motion:
         return self._motion.ended
 
     def wait(self) -> Self:
-        """Wait for the end; raises MotionStoppedError where it came before the target."""
+        """Wait for the end; raise MotionStoppedError if it came before the target."""
         self._portal.call(self._motion.wait)
         return self
 
@@ -71,7 +71,7 @@ class Servo:
         return self._servo.sequence
 
     def set(self, q: Iterable[float]) -> int:
-        """Send the next set-point: call it once a period."""
+        """Send the next set-point; to be called once per period."""
         return self._portal.run(lambda: self._servo.set(q))
 
     def step_through(self, qs: Iterable[Iterable[float]]) -> int:
@@ -80,7 +80,7 @@ class Servo:
 
 
 class Arm:
-    """An arm under control; see `tvist_client.arm.Arm` for what the arguments mean."""
+    """An arm under control; see `tvist_client.arm.Arm` for the arguments."""
 
     def __init__(self, portal: Portal, arm: asynchronous_arm.Arm) -> None:
         self._portal = portal
@@ -125,7 +125,7 @@ class Arm:
         self._portal.call(lambda: self._arm.stop(deceleration))
 
     def pause(self) -> None:
-        """Bring the running motion to a standstill on its way."""
+        """Bring the running motion to a standstill on its path."""
         self._portal.call(self._arm.pause)
 
     def resume(self) -> None:
@@ -137,15 +137,15 @@ class Arm:
         self._portal.call(lambda: self._arm.set_speed(fraction))
 
     def power_on(self, *, release_brakes: bool = True) -> None:
-        """Power the arm and release its brakes."""
+        """Power on the arm and release its brakes."""
         self._portal.call(lambda: self._arm.power_on(release_brakes=release_brakes))
 
     def power_off(self) -> None:
-        """Stop what moves, then take the arm's power."""
+        """Stop any motion, then power off the arm."""
         self._portal.call(self._arm.power_off)
 
     def unlock_protective_stop(self) -> None:
-        """Leave a protective stop; the arm must be at rest. In real time, check that it does not stop again."""
+        """Unlock a protective stop; the arm must be at rest. In real time, check that it does not stop again."""
         self._portal.call(self._arm.unlock_protective_stop)
 
     def restart_safety(self) -> None:
@@ -169,7 +169,7 @@ class Arm:
         self._portal.call(lambda: self._arm.set_registers(bank, values, first))
 
     def set_digital_input(self, number: int, on: bool) -> None:
-        """Switch a digital input, as what is wired to it would."""
+        """Switch a digital input, as a device connected to it would."""
         self._portal.call(lambda: self._arm.set_digital_input(number, on))
 
     def load_program(self, name: str) -> None:
@@ -177,7 +177,7 @@ class Arm:
         self._portal.call(lambda: self._arm.load_program(name))
 
     def play_program(self) -> None:
-        """Start the loaded program, or go on with a paused one."""
+        """Start the loaded program, or resume a paused one."""
         self._portal.call(self._arm.play_program)
 
     def pause_program(self) -> None:
@@ -200,7 +200,7 @@ class Arm:
         zeta: float | Iterable[float] | None = None,
         calibration: str | Mapping[str, Any] | None = None,
     ) -> None:
-        """Choose the estimator that gives the shaper frequency and damping ratio."""
+        """Choose the estimator that provides the shaper with frequency and damping ratio."""
         self._portal.call(lambda: self._arm.set_estimator(name, f_d=f_d, zeta=zeta, calibration=calibration))
 
     def set_payload(self, mass: float, com: Iterable[float], inertia: Iterable[float]) -> None:
@@ -222,7 +222,7 @@ class Arm:
         )
 
     def step(self, ticks: int, setpoints: Sequence[StepSetpoint] | None = None) -> int:
-        """Let 1 to 100000 ticks pass at once, in lockstep and free."""
+        """Advance time by 1 to 100000 ticks at once, in lockstep and free."""
         return self._portal.call(lambda: self._arm.step(ticks, setpoints))
 
     def inject(
@@ -233,7 +233,7 @@ class Arm:
         seconds: float | None = None,
         value: float | None = None,
     ) -> None:
-        """Cause a fault on purpose."""
+        """Cause a deliberate fault."""
         self._portal.call(lambda: self._arm.inject(fault, joint=joint, seconds=seconds, value=value))
 
     def hand_over(self, client: str) -> None:
@@ -241,7 +241,7 @@ class Arm:
         self._portal.call(lambda: self._arm.hand_over(client))
 
     def keep_alive(self) -> None:
-        """Renew the lease; `Robot.control` sees to it."""
+        """Renew the lease; `Robot.control` does this automatically."""
         self._portal.call(self._arm.keep_alive)
 
 
@@ -258,9 +258,9 @@ class Stepper:
         return self._stepper.token
 
     def step(self, ticks: int) -> int:
-        """Let 1 to 100000 ticks pass by one command."""
+        """Advance time by 1 to 100000 ticks with one command."""
         return self._portal.call(lambda: self._stepper.step(ticks))
 
     def advance(self, ticks: int) -> int:
-        """Let any number of ticks pass."""
+        """Advance time by any number of ticks."""
         return self._portal.call(lambda: self._stepper.advance(ticks))

@@ -1,4 +1,4 @@
-"""Check that a robot answers, works and is ready to be moved, with real commands rather than a port scan."""
+"""Check that a robot answers, works and is ready to move, with real commands rather than a port scan."""
 
 import asyncio
 from collections.abc import Callable
@@ -18,13 +18,13 @@ from tvist_protocol.stream import State
 from tvist_protocol.values import PROTOCOL_VERSION
 
 LISTEN_S = 0.5
-"""How long the states are listened to for their rate, at least [s]."""
+"""Shortest time over which the rate of states is measured [s]."""
 STALE = "check"
-"""A token that names no lease."""
+"""A token that belongs to no lease."""
 
 
 class Finding(msgspec.Struct, frozen=True):
-    """One thing that was tried."""
+    """Result of one step of the check."""
 
     what: str
     ok: bool
@@ -33,31 +33,31 @@ class Finding(msgspec.Struct, frozen=True):
 
 
 class CheckReport(msgspec.Struct, frozen=True):
-    """What a check found."""
+    """Result of a check."""
 
     ok: bool
-    """Whether all that was asked for is well."""
+    """Whether everything that was checked is in order."""
     endpoint: str
     robot: str
-    """Name of the robot; empty where none was found."""
+    """Name of the robot; empty if none was found."""
     robots: list[str]
-    """Names of all robots there."""
+    """Names of all robots found."""
     protocol: int | None
-    """Version of the protocol the robot speaks; null where it did not answer."""
+    """Version of the protocol that the robot uses; null if it did not answer."""
     state_rate_hz: float | None
-    """States per second, by their ticks [Hz]; null in lockstep, or if no state came."""
+    """States per second, computed from their ticks [Hz]; null in lockstep, or if no state came."""
     findings: list[Finding]
-    """Step by step; a step that fails is the last."""
+    """One result per step; a step that fails is the last one."""
     ready: bool | None
-    """Whether the robot may be moved; null where that was not looked at."""
+    """Whether the robot may be moved; null if that was not checked."""
     robot_mode: str | None
     """RTDE name of the robot mode; null if it was not checked or is unknown."""
     safety_mode: str | None
     """RTDE name of the safety mode; null if it was not checked or is unknown."""
     stop: StopReason | None
-    """The stop that keeps the robot from moving; null: there is none, or it is not known."""
+    """The stop that keeps the robot from moving; null if there is none, or it is not known."""
     next: str | None
-    """What to do to have it ready; null where nothing is known to be missing."""
+    """What to do to make the robot ready; null if nothing is known to be missing."""
 
 
 def check(
@@ -67,15 +67,15 @@ def check(
     alive: bool = False,
     security: Folder | None = None,
 ) -> CheckReport:
-    """Shake hands with a robot, see a state, have a command refused, and ask whether it may be moved.
+    """Connect to a robot, receive a state, have a command refused, and ask whether the robot may be moved.
 
-    It changes nothing.
+    The check changes nothing.
 
     Args:
         endpoint: Endpoint of the server, `tcp/<host>:<port>`.
         name: Name of the robot; None: `ur5e` if it is there, otherwise the first robot at the endpoint.
-        alive: Check only that the server answers and, in real time, ticks; an orchestrator then does not kill a robot
-            that has stopped, and that somebody is about to unlock.
+        alive: Check only that the server answers and, in real time, ticks. An orchestrator that uses this does not
+            kill a robot that has stopped and is about to be unlocked.
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
     """
     return asyncio.run(_Check(endpoint, name, security, alive=alive).run())
@@ -149,7 +149,8 @@ class _Check:
         return f"{self.rate:.1f} Hz"
 
     async def refusal(self, robot: Robot) -> str:
-        # Where it stands: even a server that obeyed would move nothing. Before the first tick nothing moves.
+        # Move to the present posture: even a server that obeyed would move nothing. Before the first tick nothing
+        # moves anyway.
         info = await robot.info()
         ticks = await robot.clock() == "realtime" or info.tick > 0
         here = tuple((await robot.state()).target_q) if ticks else (0.0,) * len(info.joints)
@@ -160,10 +161,10 @@ class _Check:
                 return f"a command without control is refused: {error.reply.code}"
             raise
         except NotConnectedError:
-            # Access control drops what is not allowed, and a query that nobody hears ends at once.
+            # Access control drops what is not allowed, and a query that reaches no one ends at once.
             if self.security is None:
                 raise
-            await robot.info()  # the robot is still there, so it is this client that is not heard
+            await robot.info()  # the robot is still there, so only this client is denied
             return "commands are not delivered: this certificate has the role viewer"
         raise ClientError("a command with an invalid token was accepted: the server does not check control")
 
@@ -178,7 +179,7 @@ class _Check:
 
 
 def _doubt(calibration: CalibrationInfo | None) -> str:
-    """What a person should know of the calibration in use; empty where it is in order."""
+    """Return a warning about the calibration in use; empty if it is in order."""
     if calibration is not None and calibration.fits_arm is False:
         return f"; calibration {calibration.name!r} was measured on a different arm: the frequencies will be wrong"
     if calibration is not None and not calibration.fits_payload:
@@ -188,7 +189,7 @@ def _doubt(calibration: CalibrationInfo | None) -> str:
 
 
 async def _rate(robot: Robot) -> float:
-    """Ticks a second between two states, `LISTEN_S` apart or more."""
+    """Return the ticks per second between two states that are at least `LISTEN_S` apart."""
     loop = asyncio.get_running_loop()
     seen: list[tuple[int, float]] = []
 

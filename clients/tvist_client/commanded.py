@@ -1,4 +1,4 @@
-"""What control of a robot and its clock need of it: commands, replies and time."""
+"""Parts of a robot that control and the clock need: commands, replies and time."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -11,13 +11,13 @@ from tvist_protocol.stream import Event, State
 
 
 class CommandedRobot(Protocol):
-    """A robot that takes commands; `tvist_client.robot.Robot` is one, and says what each of these does."""
+    """A robot that takes commands; `tvist_client.robot.Robot` implements it and documents each method."""
 
     motions: MotionsByNumber
 
     @property
     def clock_token(self) -> str | None:
-        """Token of the clock; None while this client does not hold it."""
+        """Token of the clock; None if this client does not hold it."""
 
     async def info(self) -> Info:
         """Request the robot's description and settings."""
@@ -44,7 +44,7 @@ class CommandedRobot(Protocol):
         ...
 
     def watch(self) -> None:
-        """Begin to listen to the states."""
+        """Start to receive the states."""
         ...
 
     async def until(self, tick: int) -> State:
@@ -52,9 +52,9 @@ class CommandedRobot(Protocol):
         ...
 
     async def advance(self, ticks: int) -> int:
-        """Let ticks pass."""
+        """Advance time by a number of ticks."""
         ...
 
     async def rest(self) -> State:
-        """Wait until the shaped reference is at rest, stepping time if it is this client's to step."""
+        """Wait until the shaped reference is at rest, stepping time if this client may."""
         ...

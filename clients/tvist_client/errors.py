@@ -1,18 +1,18 @@
-"""What can go wrong at a client, and what to do about it.
+"""Errors that a client can raise, and what to do about them.
 
 TvistError
 ├── RefusedError             the robot refused a command, which changed nothing (of `tvist_protocol`)
-├── ProtocolError            a value cannot be sent: no number, no name (of `tvist_protocol`)
+├── ProtocolError            a value cannot be sent, such as a NaN or an invalid name (of `tvist_protocol`)
 └── ClientError
     ├── NotConnectedError    no server or robot answers; also a ConnectionError
     ├── AnswerTimeoutError   the robot is connected but does not answer; also a TimeoutError
-    ├── StoppedError         the robot ended something, and told why in an event
+    ├── StoppedError         the robot ended something, and gave the reason in an event
     │   ├── MotionStoppedError   a motion ended before its target
     │   ├── StreamStoppedError   the robot ended the stream of set-points
     │   └── ProtectiveStopError  an unlocked robot stopped again at once
-    ├── ArgumentError        an argument is no value of its kind; also a ValueError
+    ├── ArgumentError        an argument is invalid; also a ValueError
     ├── UnexpectedReplyError the answer is not one of this protocol
-    └── MisuseError          called when it makes no sense
+    └── MisuseError          called at the wrong time
 """
 
 from tvist_protocol.errors import TvistError
@@ -20,19 +20,19 @@ from tvist_protocol.stream import Event
 
 
 class ClientError(TvistError):
-    """Root of what a client raises of its own."""
+    """Base class of the client's own errors."""
 
 
 class NotConnectedError(ClientError, ConnectionError):
-    """There is no robot to talk to, or it has gone."""
+    """There is no robot to talk to, or the connection was lost."""
 
 
 class AnswerTimeoutError(ClientError, TimeoutError):
-    """What was waited for did not come in time."""
+    """The expected message did not arrive in time."""
 
 
 class UnexpectedReplyError(ClientError):
-    """An answer came that this client does not understand."""
+    """An answer arrived that this client does not understand."""
 
 
 class MisuseError(ClientError):
@@ -40,7 +40,7 @@ class MisuseError(ClientError):
 
 
 class ArgumentError(ClientError, ValueError):
-    """An argument that cannot be meant: nothing was sent.
+    """An argument is invalid; nothing was sent.
 
     Attributes:
         where: Argument at fault, such as `q[3]`.
@@ -59,7 +59,7 @@ class ArgumentError(ClientError, ValueError):
 
 
 class StoppedError(ClientError):
-    """The robot ended something, and told of it in an event.
+    """The robot ended something, and reported it in an event.
 
     Attributes:
         event: The event.
@@ -87,7 +87,7 @@ class MotionStoppedError(StoppedError):
 
 
 class StreamStoppedError(StoppedError):
-    """The robot ended the stream of set-points; `servo` begins a new one. The event is its `stream_stopped`."""
+    """The robot ended the stream of set-points; `servo` begins a new one. The event is the robot's `stream_stopped`."""
 
     @property
     def _what(self) -> str:
@@ -95,9 +95,9 @@ class StreamStoppedError(StoppedError):
 
 
 class ProtectiveStopError(StoppedError):
-    """A robot that was unlocked stopped again at once: what made it stop is still there.
+    """A robot that was unlocked stopped again at once, because the cause of the stop persists.
 
-    The event is its `protective_stop`.
+    The event is the robot's `protective_stop`.
     """
 
     @property

@@ -1,4 +1,4 @@
-"""One topic of a robot: decoded once, handed to everybody here who listens."""
+"""One topic of a robot, decoded once and distributed to all listeners in this process."""
 
 import asyncio
 import logging
@@ -15,7 +15,7 @@ log = logging.getLogger(__name__)
 
 
 class Ticked(Protocol):
-    """A message that says of which tick it is."""
+    """A message that contains its tick."""
 
     @property
     def tick(self) -> int:
@@ -26,22 +26,23 @@ M = TypeVar("M", bound=Ticked)
 
 
 class Feed(Generic[M]):
-    """Messages of one topic. Subscribes when somebody first listens.
+    """Messages of one topic. Subscribes with its first listener.
 
     Args:
         transport: Transport that delivers the messages.
         topic: Topic to subscribe to.
-        decode: Bytes to message.
-        once_a_tick: Whether there is one a tick; then what is not newer than the last one is a repetition.
+        decode: Converts bytes to a message.
+        once_a_tick: Whether there is one message per tick; a message that is not newer than the last is then dropped
+            as a repetition.
     """
 
     def __init__(
         self, transport: Transport, topic: Topic, decode: Callable[[bytes], M], *, once_a_tick: bool
     ) -> None:
         self.latest: M | None = None
-        """Newest message since somebody listens."""
+        """Newest message since the subscription; None before the first."""
         self.malformed = 0
-        """Messages left out since they are none of this protocol."""
+        """Number of messages dropped because they do not follow this protocol."""
         self._transport = transport
         self._topic: Topic = topic
         self._decode = decode
@@ -53,7 +54,7 @@ class Feed(Generic[M]):
         self._waiting: dict[asyncio.Future[M], Callable[[M], bool]] = {}
 
     def subscribe(self) -> None:
-        """Begin to listen; from then on `latest` is kept.
+        """Subscribe to the topic; from then on `latest` is updated.
 
         Raises:
             NotConnectedError: The connection is closed.
@@ -65,24 +66,24 @@ class Feed(Generic[M]):
             self._subscribed = True
 
     def listen(self, callback: Callable[[M], object]) -> Callable[[], None]:
-        """Have every message handed to a callback; the function returned ends that."""
+        """Call a function with every message; the function returned ends that."""
         self.subscribe()
         self._listeners.append(callback)
         return lambda: self._listeners.remove(callback)
 
     def stream(self, size: int) -> Stream[M]:
-        """Every message from now on; forgotten when nobody holds it any more."""
+        """Return an iterator over every message from now on; it is dropped when it is no longer referenced."""
         self.subscribe()
         stream: Stream[M] = Stream(size)
         self._streams.add(stream)
         return stream
 
     async def next(self, wanted: Callable[[M], bool], timeout_s: float) -> M:
-        """The next message that is wanted.
+        """Return the next message that satisfies a condition.
 
         Raises:
-            AnswerTimeoutError: None came in time.
-            NotConnectedError: The robot went away.
+            AnswerTimeoutError: No such message arrived in time.
+            NotConnectedError: The robot disconnected.
         """
         self.subscribe()
         message: asyncio.Future[M] = asyncio.get_running_loop().create_future()
@@ -97,7 +98,7 @@ class Feed(Generic[M]):
             self._waiting.pop(message, None)
 
     def fail(self, error: ClientError) -> None:
-        """Tell everybody that the robot went away; one that comes back may count its ticks anew."""
+        """Report to all listeners that the robot disconnected; when it reconnects, its ticks may restart."""
         self.latest = None
         for stream in tuple(self._streams):
             stream.fail(error)
@@ -106,7 +107,7 @@ class Feed(Generic[M]):
                 message.set_exception(error)
 
     def finish(self) -> None:
-        """The connection was closed: end every stream, and tell whoever waits."""
+        """End all streams and fail all waits, since the connection was closed."""
         self._finished = True
         self.latest = None
         for stream in tuple(self._streams):
@@ -128,7 +129,7 @@ class Feed(Generic[M]):
         self.latest = message
         for listener in tuple(self._listeners):
             self._call(listener, message)
-        # Asked first, since going through an empty weak set takes longer than decoding a state.
+        # Checked first, since iterating over an empty weak set takes longer than decoding a state.
         if self._streams:
             for stream in tuple(self._streams):
                 stream.push(message)
@@ -137,7 +138,7 @@ class Feed(Generic[M]):
                 waiting.set_result(message)
 
     def _call(self, listener: Callable[[M], object], message: M) -> None:
-        """A listener's error is its own: it stops neither the robot nor the others."""
+        """Call a listener; log an error in it, so that it affects neither the robot nor the other listeners."""
         try:
             listener(message)
         except Exception as error:  # noqa: BLE001  anything may go wrong in what a user wrote

@@ -1,4 +1,4 @@
-"""Rights on a robot, control or the clock, held for as long as a block lasts."""
+"""Rights on a robot, control or the clock, held for the duration of a block."""
 
 import contextlib
 from collections.abc import AsyncIterator, Callable
@@ -20,7 +20,7 @@ class Grant(NamedTuple):
 
     token: str
     lease_s: float | None
-    """How long it lasts without a sign of life [s]; None: it does not run out."""
+    """How long it lasts without renewal [s]; None if it does not expire."""
 
 
 @contextlib.asynccontextmanager
@@ -30,13 +30,14 @@ async def granted(
     take: TakeControl | TakeClock,
     release: Callable[[str], Command],
 ) -> AsyncIterator[Grant]:
-    """Hold a right for as long as the block lasts.
+    """Hold a right for the duration of a block.
 
     Args:
-        robot: Robot that gives it.
-        transport: The robot's; the client is announced there first, so that its going gives the right back.
-        take: Command that asks for the right.
-        release: Makes the command that gives it back, with its token.
+        robot: Robot that grants it.
+        transport: The robot's transport; the client is announced there first, so that the right ends if it
+            disconnects.
+        take: Command that requests the right.
+        release: Creates the command that gives it back, from its token.
 
     Raises:
         RefusedError: Another client holds it.
@@ -50,7 +51,7 @@ async def granted(
         try:
             yield Grant(accepted.token, accepted.lease_s)
         finally:
-            # A right that is lost, or a robot that has gone, needs no release.
+            # If the right is lost or the robot has disconnected, there is nothing to release.
             with contextlib.suppress(RefusedError, ClientError):
                 await robot.request(release(accepted.token))
     finally:

@@ -1,4 +1,4 @@
-"""What every command of a client with control has in common."""
+"""Common part of all commands of a client with control."""
 
 from typing import TYPE_CHECKING
 

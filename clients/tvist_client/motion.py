@@ -1,4 +1,4 @@
-"""Motions, as the robot's events tell of them."""
+"""Motions, as the robot's events report them."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Generator
@@ -8,7 +8,7 @@ from tvist_client.errors import ClientError, MotionStoppedError
 from tvist_protocol.stream import Event
 
 REMEMBERED = 256
-"""Motions of which the end is kept; an event may come before the answer that names its motion."""
+"""Number of ended motions that are remembered, since an event may precede the answer that names its motion."""
 
 
 class Motion:
@@ -16,10 +16,9 @@ class Motion:
 
     Attributes:
         id: The robot's number for it.
-        started: Tick at which it began; None before.
-        done: Tick at which its shaped reference came to rest at the target; None before, and where it never
-            did.
-        stopped: The event that says that it ended before its target; None where it did not.
+        started: Tick at which it began; None until then.
+        done: Tick at which its shaped reference came to rest at the target; None until then, or if it never did.
+        stopped: The event that reports its end before the target; None if there is none.
     """
 
     def __init__(self, id: int, pass_time: Callable[["Motion"], Awaitable[None]]) -> None:  # noqa: A002  the wire's name
@@ -33,15 +32,15 @@ class Motion:
 
     @property
     def ended(self) -> bool:
-        """True once the motion has ended, or the connection that reports its end is lost."""
+        """Whether the motion has ended, or the connection that would report its end is lost."""
         return self._ended.is_set()
 
     async def wait(self) -> "Motion":
-        """Wait for the end; in lockstep and free let time pass until it comes.
+        """Wait for the end; in lockstep and free, step time until then.
 
         Raises:
             MotionStoppedError: The motion ended before its target.
-            NotConnectedError: The robot went away.
+            NotConnectedError: The robot disconnected.
         """
         await self._pass_time(self)
         if self._error is not None:
@@ -51,11 +50,11 @@ class Motion:
         return self
 
     def __await__(self) -> Generator[Any, None, "Motion"]:
-        """`await motion` is `await motion.wait()`."""
+        """Make `await motion` equivalent to `await motion.wait()`."""
         return self.wait().__await__()
 
     async def wait_event(self) -> None:
-        """Wait for the event of the end, without letting time pass."""
+        """Wait for the event of the end, without stepping time."""
         await self._ended.wait()
 
     def on_event(self, event: Event) -> None:
@@ -70,17 +69,17 @@ class Motion:
             self._ended.set()
 
     def fail(self, error: ClientError) -> None:
-        """Nothing more will be heard of it."""
+        """Note that no further events of the motion will arrive."""
         if not self.ended:
             self._error = error
             self._ended.set()
 
 
 class MotionsByNumber:
-    """The motions of one robot by number, known by their answer or by an event, whichever comes first.
+    """The motions of one robot by number; each is created by its answer or its first event, whichever comes first.
 
     Args:
-        pass_time: Lets time pass until a motion has ended.
+        pass_time: Steps time until a motion has ended.
     """
 
     def __init__(self, pass_time: Callable[[Motion], Awaitable[None]]) -> None:
@@ -88,7 +87,7 @@ class MotionsByNumber:
         self._motions: dict[int, Motion] = {}
 
     def motion(self, id: int) -> Motion:  # noqa: A002  the wire's name
-        """The motion of that number."""
+        """Return the motion with this number."""
         motion = self._motions.get(id)
         if motion is None:
             motion = self._motions[id] = Motion(id, self._pass_time)
@@ -102,7 +101,7 @@ class MotionsByNumber:
             self.motion(event.id).on_event(event)
 
     def fail(self, error: ClientError) -> None:
-        """Nothing more will be heard of any; a robot that comes back may count anew."""
+        """Note that no further events will arrive; when the robot reconnects, its numbers may restart."""
         for motion in self._motions.values():
             motion.fail(error)
         self._motions.clear()

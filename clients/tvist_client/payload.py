@@ -1,4 +1,4 @@
-"""Payloads from plain numbers."""
+"""Payloads from plain sequences of numbers."""
 
 from collections.abc import Iterable
 
@@ -7,7 +7,7 @@ from tvist_protocol.values import Payload
 
 
 def make_payload(mass: float, com: Iterable[float], inertia: Iterable[float]) -> Payload:
-    """What hangs on a flange.
+    """Create a payload.
 
     Args:
         mass: Mass [kg].
@@ -15,7 +15,7 @@ def make_payload(mass: float, com: Iterable[float], inertia: Iterable[float]) ->
         inertia: xx xy xz yy yz zz about the centre of mass, flange axes [kg m²].
 
     Raises:
-        ArgumentError: One of them is no number, or has another count of them.
+        ArgumentError: An argument is not a number, or has the wrong number of entries.
     """
     x, y, z = floats(com, "com", "x y z")
     xx, xy, xz, yy, yz, zz = floats(inertia, "inertia", "xx xy xz yy yz zz")

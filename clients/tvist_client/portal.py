@@ -1,4 +1,4 @@
-"""An event loop in a thread, and the way into it from threads that may wait."""
+"""An event loop in a thread, and access to it from threads that may block."""
 
 import asyncio
 import contextlib
@@ -15,9 +15,9 @@ T = TypeVar("T")
 
 
 class Portal:
-    """Runs an event loop in a thread of its own.
+    """Runs an event loop in a separate thread.
 
-    The thread is a daemon's: a program that forgets to close ends all the same.
+    The thread is a daemon, so a program that forgets to close it ends all the same.
     """
 
     def __init__(self) -> None:
@@ -27,14 +27,14 @@ class Portal:
         self.closed = False
 
     def call(self, function: Callable[[], Awaitable[T]]) -> T:
-        """Await what a function gives, on the loop, while this thread waits; Ctrl-C cancels it.
+        """Run a function on the loop and wait for its result in this thread; Ctrl-C cancels it.
 
-        An error of client or protocol comes out as if it were raised here: its way through the loop, and what was
-        the matter underneath, would only hide the sentence from who reads it.
+        An error of the client or protocol is raised as if it occurred here: its path through the loop and its cause
+        would only distract from the message.
 
         Raises:
             NotConnectedError: The connection is closed.
-            MisuseError: Called by a callback, which would wait for itself.
+            MisuseError: Called by a callback, which would wait for itself forever.
         """
         if self.closed:
             raise NotConnectedError("the connection is closed: open another one")
@@ -55,7 +55,7 @@ class Portal:
         raise told.with_traceback(None) from None
 
     def run(self, function: Callable[[], T]) -> T:
-        """Call a function that does not wait, on the loop."""
+        """Call a function that does not block, on the loop."""
 
         async def called() -> T:
             return function()
@@ -63,19 +63,19 @@ class Portal:
         return self.call(called)
 
     def subscription(self, subscribe: Callable[[], Callable[[], None]]) -> Callable[[], None]:
-        """Call a function that gives a function to undo it; both run on the loop."""
+        """Call a function that returns a function to undo it; both run on the loop."""
         undo = self.run(subscribe)
         return lambda: self.run(undo)
 
     @contextlib.contextmanager
     def enter(self, context: AbstractAsyncContextManager[T]) -> Iterator[T]:
-        """Enter an asynchronous context manager, and leave it with the block's error where there is one."""
+        """Enter an asynchronous context manager, and leave it with the block's error if there is one."""
         value = self.call(context.__aenter__)
         try:
             yield value
         except BaseException as error:
             if sys.is_finalizing():
-                # A block that nobody left, thrown away with the interpreter: the loop's thread runs no more.
+                # The interpreter discards a block that was never left; the loop's thread has ended by then.
                 raise
             kind, raised, trace = type(error), error, error.__traceback__
             if not self.call(lambda: context.__aexit__(kind, raised, trace)):
@@ -84,7 +84,7 @@ class Portal:
             self.call(lambda: context.__aexit__(None, None, None))
 
     def close(self) -> None:
-        """End loop and thread; a second call does nothing."""
+        """End the loop and its thread; a second call does nothing."""
         if self.closed:
             return
         self.call(self._cancel_others)

@@ -34,11 +34,11 @@ class Readiness(Struct, frozen=True):
     safety_mode: str | None
     """RTDE name of the safety mode; null before the robot's first tick, when it is unknown."""
     stop: StopReason | None
-    """The stop that keeps it from moving; null: there is none, or the robot does not say why."""
+    """The stop that keeps it from moving; null if there is none, or the robot does not report it."""
     why: str
-    """A sentence; empty where it is ready."""
+    """A sentence with the reason; empty if the robot is ready."""
     next: str
-    """What to do about it; empty where it is ready."""
+    """What to do about it; empty if the robot is ready."""
 
     @property
     def sentence(self) -> str:
@@ -47,7 +47,7 @@ class Readiness(Struct, frozen=True):
 
 
 async def look(robot: Robot, unlock: str = "tvist unlock") -> Readiness:
-    """Ask a robot whether it is ready to be moved.
+    """Ask a robot whether it is ready to move.
 
     Args:
         robot: The robot.
@@ -60,11 +60,11 @@ async def look(robot: Robot, unlock: str = "tvist unlock") -> Readiness:
 
 
 def readiness(info: Info, state: State | None, unlock: str = "tvist unlock") -> Readiness:
-    """Judge by what the robot says of itself.
+    """Judge readiness from the robot's own messages.
 
     Args:
-        info: The robot now.
-        state: Its newest state, for a server whose `info` does not tell the modes; None: not needed, or there is none.
+        info: Present description of the robot.
+        state: Its newest state, for a server whose `info` lacks the modes; None if not needed or not available.
         unlock: The command that unlocks this robot.
     """
     robot = info.robot_mode if info.robot_mode is not None or state is None else state.robot_mode
@@ -85,7 +85,7 @@ def readiness(info: Info, state: State | None, unlock: str = "tvist unlock") -> 
 
 
 def unlock_command(endpoint: str, name: str, security: Folder | None) -> str:
-    """What to type to unlock a robot, without what is so by default."""
+    """Return the command line that unlocks a robot, without options that have their default values."""
     words = ["tvist unlock"]
     words += [endpoint] if endpoint != ENDPOINT else []
     words += ["--name", name] if name != NAME else []

@@ -1,4 +1,4 @@
-"""A robot as a client sees it: what it is, what it tells, and control over it."""
+"""A robot as a client sees it: its description, its messages, and control over it."""
 
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -37,21 +37,21 @@ from tvist_protocol.stream import Event, State, Telemetry, Truth
 ENDPOINT = "tcp/127.0.0.1:7447"
 NAME = "ur5e"
 ANSWER_S = 10.0
-"""How long a command may take [s]."""
+"""Longest wait for the answer to a command [s]."""
 STATE_S = 5.0
-"""How long the stream of states may pause [s]; in lockstep the last one is told again every second."""
+"""Longest pause between two states [s]; in lockstep the last one is repeated every second."""
 BUFFER = 5000
-"""Messages an iterator holds: 10 s of states."""
+"""Number of messages that an iterator buffers: 10 s of states."""
 CHUNK = 50
-"""Ticks to let pass between two looks at whether a motion has ended: a tenth of a second."""
+"""Ticks to step between two checks whether a motion has ended: a tenth of a second."""
 
 
 class Robot:
-    """One robot, over a transport that is open, which `close` closes.
+    """One robot, over an open transport, which `close` closes.
 
     Attributes:
         motions: Motions by number, this client's and others'.
-        arm: What this client moves, while it has control.
+        arm: The arm, while this client has control.
         stepper: The clock, while this client holds it.
     """
 
@@ -67,7 +67,7 @@ class Robot:
         self._ios: Feed[Io] = Feed(transport, "io", decode_io, once_a_tick=False)
         self._feeds = (self._states, self._events, self._truths, self._telemetries, self._ios)
         self.motions = MotionsByNumber(self._until_ended)
-        # Before any command is sent, since an event may come before the answer.
+        # Listen before any command is sent, since an event may precede the answer.
         self._events.listen(self.motions.on_event)
         transport.on_lost(self._on_lost)
 
@@ -75,7 +75,7 @@ class Robot:
     async def connect(
         cls, endpoint: str = ENDPOINT, name: str = NAME, *, security: Folder | None = None
     ) -> Self:
-        """Connect over Zenoh and shake hands.
+        """Connect over Zenoh and check that the robot answers.
 
         Args:
             endpoint: Endpoint of the server, `tcp/<host>:<port>`.
@@ -84,8 +84,8 @@ class Robot:
                 `tls/<host>:<port>`.
 
         Raises:
-            NotConnectedError: Nobody listens there, the certificate is not taken, or no robot of that name
-                is there or shows itself.
+            NotConnectedError: No server listens there, the certificate is rejected, or no robot of that name is there
+                or visible.
         """
         robot = cls(await ZenohTransport.open(endpoint, name, security))
         try:
@@ -97,11 +97,11 @@ class Robot:
 
     @classmethod
     def over(cls, transport: Transport) -> Self:
-        """Talk to a robot over any transport that is open, which `close` closes."""
+        """Use a robot over any open transport, which `close` closes."""
         return cls(transport)
 
     async def close(self) -> None:
-        """End the connection; iterators end too."""
+        """Close the connection, which also ends iterators."""
         for feed in self._feeds:
             feed.finish()
         self.motions.fail(NotConnectedError("the connection was closed"))
@@ -115,7 +115,7 @@ class Robot:
     ) -> None:
         await self.close()
 
-    # ------------------------------------------------------------------ what it is and what it tells
+    # ------------------------------------------------------------------ description and messages
 
     async def info(self) -> Info:
         """Request the robot's description and settings."""
@@ -128,14 +128,14 @@ class Robot:
         return self._clock or (await self.info()).clock
 
     async def state(self) -> State:
-        """The present state: in real time the next to come, otherwise the last, since time stands still.
+        """Return the present state: in real time the next one to arrive, otherwise the last one.
 
-        Before the first tick it is how the arm stands. In lockstep the first call may take a second.
+        Before the first tick, the state describes the arm at rest. In lockstep the first call may take a second.
 
         Raises:
-            AnswerTimeoutError: None came within `STATE_S`.
-            MisuseError: A host in process, not one of ours, tells no state before its first tick.
-            NotConnectedError: The connection is closed, or the robot has gone.
+            AnswerTimeoutError: No state arrived within `STATE_S`.
+            MisuseError: An in-process host other than this project's publishes no state before its first tick.
+            NotConnectedError: The connection is closed, or the robot has disconnected.
         """
         self._states.subscribe()
         clock = await self.clock()
@@ -148,19 +148,19 @@ class Robot:
         return await self._next_state()
 
     def states(self, buffer: int = BUFFER) -> Stream[State]:
-        """Every state from now on, once a tick; a slow reader loses the oldest, counted in `dropped`.
+        """Iterate over every state from now on, one per tick. If the reader is slow, the oldest are dropped.
 
         Args:
-            buffer: Number of messages that may wait.
+            buffer: Number of messages that may wait; those dropped are counted in `Stream.dropped`.
         """
         return self._states.stream(buffer)
 
     def events(self, buffer: int = BUFFER) -> Stream[Event]:
-        """Every event from now on."""
+        """Iterate over every event from now on."""
         return self._events.stream(buffer)
 
     def on_state(self, callback: Callable[[State], object]) -> Callable[[], None]:
-        """Have a callback called with every state; the function returned ends that. It may not wait."""
+        """Call a function, which must not block, with every state; the function returned ends that."""
         return self._states.listen(callback)
 
     def on_event(self, callback: Callable[[Event], object]) -> Callable[[], None]:
@@ -180,10 +180,10 @@ class Robot:
         return self._ios.listen(callback)
 
     async def io(self) -> Io:
-        """Inputs, outputs, registers and tool: the newest known, else the next that is told, within a second or so.
+        """Return inputs, outputs, registers and tool: the latest known values, else the next ones within about 1 s.
 
         Raises:
-            AnswerTimeoutError: None came within `STATE_S`.
+            AnswerTimeoutError: No message arrived within `STATE_S`.
         """
         self._ios.subscribe()
         return self._ios.latest or await self._ios.next(lambda _: True, STATE_S)
@@ -194,14 +194,14 @@ class Robot:
         """Send any command.
 
         Args:
-            command: The command, with its token where it has one.
+            command: The command, with its token if it has one.
             timeout_s: How long the robot may take [s].
 
         Raises:
             RefusedError: The robot refused it, which changed nothing.
             NotConnectedError: The robot does not answer.
             AnswerTimeoutError: No answer came in time.
-            ProtocolError: The command holds what cannot be sent.
+            ProtocolError: The command contains a value that cannot be sent.
         """
         reply = understood(decode_reply, await self._transport.request(encode(command), timeout_s))
         if isinstance(reply, Refused):
@@ -209,31 +209,31 @@ class Robot:
         return reply
 
     def watch(self) -> None:
-        """Begin to listen to the states, before anything is sent that causes one."""
+        """Start to receive the states, before a command causes one."""
         self._states.subscribe()
 
     def put_setpoint(self, data: bytes) -> None:
-        """Send an encoded set-point; `Arm.servo` does it."""
+        """Send an encoded set-point, as `Arm.servo` does."""
         self._transport.put_setpoint(data)
 
     async def stop(self) -> None:
-        """Bring the arm to rest now; anyone may, without control."""
+        """Bring the arm to rest now; no control is needed."""
         await self.request(Stop())
 
     @asynccontextmanager
     async def control(self, client: str, *, lease_s: float = 30.0) -> AsyncIterator[Arm]:
-        """Hold control for as long as the block lasts.
+        """Hold control for the duration of a block.
 
-        The client's presence is announced first, so that its going ends control at once; in real time the
-        lease is kept alive in the background.
+        The client's presence is announced first, so that control ends at once if it disconnects; in real time the
+        lease is renewed in the background.
 
         Args:
             client: Name of this client, shown to others.
-            lease_s: How long control lasts without a sign of life [s].
+            lease_s: How long control lasts without renewal [s].
 
         Raises:
-            RefusedError: Another client holds control; its name is in the sentence.
-            ProtocolError: `client` cannot be a client's name.
+            RefusedError: Another client has control; the message contains its name.
+            ProtocolError: `client` is not a valid client name.
         """
         async with hold_control(self, self._transport, client, lease_s) as arm:
             self.arm = arm
@@ -246,16 +246,16 @@ class Robot:
 
     @asynccontextmanager
     async def clock_control(self, client: str) -> AsyncIterator[Stepper]:
-        """Hold the clock for as long as the block lasts: time passes by this client's steps alone.
+        """Hold the clock for the duration of a block, so that time passes only by this client's steps.
 
-        In lockstep and free. It is another right than control, which another client may have meanwhile.
+        This works in lockstep and free. It is independent of control, which another client may have at the same time.
 
         Args:
             client: Name of this client, shown to others; the clock is released when it disconnects.
 
         Raises:
-            RefusedError: Another client holds the clock, whose name is in the sentence; or time passes by itself.
-            ProtocolError: `client` cannot be a client's name.
+            RefusedError: Another client holds the clock, whose name is in the message; or time passes by itself.
+            ProtocolError: `client` is not a valid client name.
         """
         async with hold_clock(self, self._transport, client) as stepper:
             self.stepper = stepper
@@ -266,11 +266,11 @@ class Robot:
 
     @property
     def clock_token(self) -> str | None:
-        """Token of the clock; None while this client does not hold it."""
+        """Token of the clock; None if this client does not hold it."""
         return None if self.stepper is None else self.stepper.token
 
     async def advance(self, ticks: int) -> int:
-        """Let ticks pass: by steps in lockstep and free, by waiting in real time.
+        """Advance time: by steps in lockstep and free, by waiting in real time.
 
         Args:
             ticks: Number of control periods, at least 1.
@@ -279,9 +279,9 @@ class Robot:
             The last tick that passed; its state has arrived.
 
         Raises:
-            ArgumentError: `ticks` is less than 1, or no whole number.
+            ArgumentError: `ticks` is less than 1, or not an integer.
             MisuseError: Not in real time, and this client has neither the clock nor control.
-            RefusedError: Another client holds the clock; its name is in the sentence.
+            RefusedError: Another client holds the clock; the message contains its name.
         """
         ticks = whole(ticks, "ticks", 1)
         if await self.clock() == "realtime":
@@ -300,7 +300,7 @@ class Robot:
         return tick
 
     async def until(self, tick: int) -> State:
-        """Wait until the state of a tick has arrived, without letting time pass."""
+        """Wait until the state of a tick has arrived, without stepping time."""
         self._states.subscribe()
         latest = self._states.latest
         if latest is not None and latest.tick >= tick:
@@ -311,7 +311,7 @@ class Robot:
         """Step time until the shaped reference is at rest, or wait if another client steps; the arm may still vibrate.
 
         Returns:
-            The first state seen that says so.
+            The first state received in which it is at rest.
         """
         while True:
             tick = await self._let_pass(CHUNK)
@@ -325,7 +325,7 @@ class Robot:
                 await motion.wait_event()
 
     async def _let_pass(self, ticks: int) -> int | None:
-        """Let ticks pass; None where that is not up to this client: in real time, or another one holds the clock."""
+        """Step time; return None if this client cannot: in real time, or if another client holds the clock."""
         if await self.clock() == "realtime":
             return None
         try:

@@ -20,12 +20,12 @@ TICK = 0.002
 
 
 class Servo:
-    """What `Arm.servo` gives. Numbers the set-points from 0, and checks them: a robot answers none of them.
+    """The stream that `Arm.servo` yields: numbers set-points from 0 and checks them, since a robot does not answer.
 
     Args:
         arm: Arm to stream to.
         period: Time between two set-points [s].
-        joints: The angles that the robot takes.
+        joints: The joint angles that the robot accepts.
 
     Attributes:
         period: Time between two set-points [s].
@@ -51,9 +51,9 @@ class Servo:
         self._forget()
 
     def set(self, q: Iterable[float]) -> int:
-        """Send the next set-point, without waiting for anything: call it once a period.
+        """Send the next set-point, without blocking; to be called once per period.
 
-        In real time the first one counts: 250 ms without one end the stream.
+        In real time, 250 ms without a set-point end the stream; this includes the wait for the first one.
 
         Args:
             q: Set-point, one angle per joint [rad].
@@ -74,13 +74,13 @@ class Servo:
         return sequence
 
     async def step_through(self, qs: Iterable[Iterable[float]]) -> int:
-        """Play set-points in lockstep and free, each for one period, letting that time pass.
+        """Play set-points in lockstep and free, each for one period, and step time accordingly.
 
         Args:
             qs: Set-points, one per period, each with one angle per joint [rad].
 
         Returns:
-            The tick of the last one's end; its state has arrived.
+            The tick at the end of the last set-point; its state has arrived.
 
         Raises:
             ArgumentError: See `set`; none of the set-points was played.
@@ -97,7 +97,7 @@ class Servo:
         if not setpoints:
             raise MisuseError("there are no set-points to play")
         ticks = max(1, round(self.period / TICK))
-        # The set-points of one step go one a tick: slower ones need a step each.
+        # One step takes one set-point per tick; if the period is longer, each set-point needs a step of its own.
         together = MAX_STEP if ticks == 1 else 1
         tick = 0
         for first in range(0, len(setpoints), together):
@@ -108,7 +108,7 @@ class Servo:
         return tick
 
     def check(self) -> None:
-        """Find out whether the stream still runs.
+        """Check that the stream is still running.
 
         Raises:
             StreamStoppedError: The robot has ended it.

@@ -1,4 +1,4 @@
-"""What can be done with a simulated arm alone: putting it somewhere, letting time pass, causing faults."""
+"""Commands for simulated arms only: placing the arm, stepping time, causing faults."""
 
 from collections.abc import Iterable, Sequence
 
@@ -11,7 +11,7 @@ from tvist_protocol.values import Payload, ResetMode
 
 
 class Simulation(Leased):
-    """What `Arm` does with a simulated arm."""
+    """The part of `Arm` that requires a simulated arm."""
 
     async def reset(
         self,
@@ -27,12 +27,12 @@ class Simulation(Leased):
         Args:
             q: Configuration to put the arm into [rad].
             seed: New seed of the sensors' noise.
-            payload: Payload that the arm carries, independent of the declared one; `make_payload` makes one.
+            payload: Payload that the arm carries, independent of the declared one; see `make_payload`.
             mode: Robot mode to set.
             shaper: Shaper to select.
 
         Returns:
-            The tick at which it was done.
+            The tick at which this was done.
         """
         reply = await self.robot.request(
             SimulationReset(
@@ -47,7 +47,7 @@ class Simulation(Leased):
         return reply.tick if isinstance(reply, Done) else None
 
     async def step(self, ticks: int, setpoints: Sequence[StepSetpoint] | None = None) -> int:
-        """Let 1 to 100000 ticks pass at once, in lockstep and free; `Robot.advance` takes any number.
+        """Advance time by 1 to 100000 ticks at once, in lockstep and free; `Robot.advance` takes any number.
 
         If this client also holds the clock (`Robot.clock_control`), the clock's token is used.
 
@@ -73,10 +73,10 @@ class Simulation(Leased):
         seconds: float | None = None,
         value: float | None = None,
     ) -> None:
-        """Cause a fault on purpose; the protocol's README lists them.
+        """Cause a deliberate fault; the protocol's README lists them.
 
         Args:
-            fault: Its name.
+            fault: Name of the fault.
             joint: Index of the joint that it affects, 0 for the base.
             seconds: Duration of the fault [s].
             value: Magnitude of the fault, in the fault's own unit.

@@ -1,4 +1,4 @@
-"""Time of a simulated robot that does not tick by itself, and the right to let it pass."""
+"""Time of a simulated robot that does not tick by itself, and the right to advance it."""
 
 import contextlib
 from collections.abc import AsyncIterator, Sequence
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
     from tvist_client.commanded import CommandedRobot
 
 MAX_STEP = 1000
-"""Set-points that one `simulation.step` may have, and ticks that every server takes at once."""
+"""Largest number of set-points in one `simulation.step`, and number of ticks that every server accepts at once."""
 LONGEST_STEP = 100_000
-"""Ticks that one may have."""
+"""Largest number of ticks in one `simulation.step`."""
 TICK_S = 0.06
-"""How long a tick may take on the slowest of machines [s]: a server may compute more slowly than time passes."""
+"""Longest duration of a tick on a slow machine [s], since a server may be slower than real time."""
 
 
 class Stepper:
-    """The clock of a simulated robot: what `Robot.clock_control` gives. It moves nothing.
+    """The clock of a simulated robot, which `Robot.clock_control` yields. It cannot move the robot.
 
     Attributes:
         robot: The robot it belongs to.
@@ -37,31 +37,33 @@ class Stepper:
         self.token = token
 
     async def step(self, ticks: int) -> int:
-        """Let ticks pass by one command; what other clients send meanwhile is carried out between them.
+        """Advance time with one command; other clients' commands are carried out between the ticks.
 
         Args:
             ticks: Number of control periods, 1 to 100000.
 
         Returns:
-            The last tick that passed; its state has arrived. It is an earlier one where the clock was lost meanwhile.
+            The last tick that passed, which is earlier than requested if the clock was lost meanwhile; its state has
+            arrived.
 
         Raises:
-            RefusedError: The clock was lost; the present holder's name is in the sentence.
+            RefusedError: The clock was lost; the message contains the present holder's name.
         """
         return await step(self.robot, self.token, ticks)
 
     async def advance(self, ticks: int) -> int:
-        """Let any number of ticks pass, as `Robot.advance` does."""
+        """Advance time by any number of ticks, as `Robot.advance` does."""
         return await self.robot.advance(ticks)
 
 
 @contextlib.asynccontextmanager
 async def hold_clock(robot: "CommandedRobot", transport: Transport, client: str) -> AsyncIterator[Stepper]:
-    """Hold the clock for as long as the block lasts; see `Robot.clock_control`.
+    """Hold the clock for the duration of a block; see `Robot.clock_control`.
 
     Args:
         robot: Robot to step.
-        transport: The robot's; the client is announced there first, so that its going gives the clock back.
+        transport: The robot's transport; the client is announced there first, so that the clock is free if it
+            disconnects.
         client: Name of the client.
     """
     check_client_name(client)

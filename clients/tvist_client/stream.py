@@ -1,4 +1,4 @@
-"""Messages as an asynchronous iterator, with a buffer that has an end."""
+"""Messages as an asynchronous iterator with a limited buffer."""
 
 import asyncio
 from collections import deque
@@ -11,10 +11,10 @@ M = TypeVar("M")
 
 
 class Stream(AsyncIterator[M], Generic[M]):
-    """Messages from the moment this was made, in order.
+    """Messages in order, from the creation of this iterator on.
 
-    Where the reader is slower than the robot the oldest are dropped and counted, so that what is read is
-    never older than the buffer. It ends when the robot's connection is closed.
+    If the reader is slower than the robot, the oldest messages are dropped and counted, so that messages are never
+    older than the buffer. The iterator ends when the robot's connection is closed.
 
     Args:
         size: Number of messages that may wait.
@@ -22,7 +22,7 @@ class Stream(AsyncIterator[M], Generic[M]):
 
     def __init__(self, size: int) -> None:
         self.dropped = 0
-        """Messages the reader was too slow for."""
+        """Number of messages that were dropped because the reader was too slow."""
         self._waiting: deque[M] = deque(maxlen=size)
         self._news = asyncio.Event()
         self._error: ClientError | None = None
@@ -36,12 +36,12 @@ class Stream(AsyncIterator[M], Generic[M]):
         self._news.set()
 
     def fail(self, error: ClientError) -> None:
-        """Raise an error at the reader, once, behind the messages that wait."""
+        """Raise an error in the reader, once, after the waiting messages."""
         self._error = error
         self._news.set()
 
     def finish(self) -> None:
-        """End behind the messages that wait."""
+        """End after the waiting messages."""
         self._finished = True
         self._news.set()
 

@@ -12,7 +12,7 @@ LAST_ANALOG = 1
 
 
 class Terminals(Leased):
-    """What `Arm` does with inputs, outputs and registers."""
+    """The part of `Arm` that deals with inputs, outputs and registers."""
 
     async def set_digital_output(self, number: int, on: bool) -> None:
         """Switch a digital output: 0–7 standard, 8–15 configurable, 16–17 tool."""
@@ -27,7 +27,7 @@ class Terminals(Leased):
         Args:
             number: 0 or 1.
             share: Value as a share of the output's range [-].
-            voltage: Whether it gives 0 to 10 V; otherwise 4 to 20 mA.
+            voltage: Whether the range is 0 to 10 V; otherwise it is 4 to 20 mA.
         """
         bit = 1 << whole(number, "number", 0, LAST_ANALOG)
         ratio = number_of(share, "share")
@@ -47,13 +47,13 @@ class Terminals(Leased):
         Args:
             bank: Bank of registers: `input_int`, `output_double` …
             values: Booleans, integers or numbers, depending on the bank.
-            first: Number of the first.
+            first: Number of the first register.
         """
         written = entries(values, "values")
         await self.robot.request(SetRegisters(token=self.token, bank=bank, values=written, first=first))
 
     async def set_digital_input(self, number: int, on: bool) -> None:
-        """Switch a digital input, as what is wired to it would: 0–7 standard, 8–15 configurable, 16–17 tool."""
+        """Switch a digital input, as a device connected to it would: 0–7 standard, 8–15 configurable, 16–17 tool."""
         bit = 1 << whole(number, "number", 0, LAST_DIGITAL)
         await self.robot.request(
             SimulationSetInputs(token=self.token, digital_input_mask=bit, digital_inputs=bit if on else 0)

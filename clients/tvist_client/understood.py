@@ -1,4 +1,4 @@
-"""Answers decoded, or an error that says what may be wrong."""
+"""Decoding of answers, with an error that says what may be wrong."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -13,7 +13,7 @@ def understood(decode: Callable[[bytes], T], data: bytes) -> T:
     """Decode an answer.
 
     Raises:
-        UnexpectedReplyError: It is invalid.
+        UnexpectedReplyError: The answer is invalid.
     """
     try:
         return decode(data)

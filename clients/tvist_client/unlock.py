@@ -1,4 +1,4 @@
-"""Make a robot that has stopped ready to be moved again, as far as a client can."""
+"""Make a robot that has stopped ready to move again, as far as a client can."""
 
 import asyncio
 
@@ -23,25 +23,25 @@ _ALLOW_POWER = {mode.name for mode in (SafetyMode.NORMAL, SafetyMode.REDUCED, Sa
 
 
 class UnlockReport(msgspec.Struct, frozen=True):
-    """What was done, and what remains."""
+    """What was done, and what remains to be done."""
 
     ok: bool
-    """Whether the robot is ready to be moved now."""
+    """Whether the robot is ready to move now."""
     endpoint: str
     robot: str
     """Name of the robot."""
     done: list[str]
-    """What was done, in order, as sentences without a subject; nothing where there was nothing to do."""
+    """What was done, in order, as sentences without a subject; empty if there was nothing to do."""
     robot_mode: str | None
-    """After that, by its RTDE name."""
+    """RTDE name of the robot mode afterwards."""
     safety_mode: str | None
-    """RTDE name of the safety mode."""
+    """RTDE name of the safety mode afterwards."""
     stop: StopReason | None
-    """The stop that keeps it from moving still, or again."""
+    """The stop that still, or again, keeps the robot from moving."""
     why: str
-    """What remains, as a sentence; empty where the robot is ready."""
+    """What remains, as a sentence; empty if the robot is ready."""
     next: str
-    """What to do about it; empty where the robot is ready."""
+    """What to do about it; empty if the robot is ready."""
 
 
 def unlock(
@@ -51,14 +51,14 @@ def unlock(
     power_on: bool = False,
     security: Folder | None = None,
 ) -> UnlockReport:
-    """Take control, release what a client can release, and look whether it holds.
+    """Take control, release what a client can release, and check that the robot does not stop again.
 
-    A robot that is ready already is left alone. In lockstep time passes by some hundred ticks.
+    A robot that is ready is not changed. In lockstep, time advances by some hundred ticks.
 
     Args:
         endpoint: Endpoint of the server, `tcp/<host>:<port>`.
         name: Name of the robot; None: the only one at the endpoint, or `ur5e`.
-        power_on: Switch the power on and release the brakes if the arm has no power.
+        power_on: Whether to power on the arm and release its brakes if it is off.
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
 
     Raises:
@@ -69,15 +69,15 @@ def unlock(
 
 
 async def make_ready(robot: Robot, arm: Arm, *, power_on: bool = False) -> list[str]:
-    """Restart the safety system, unlock a protective stop, switch the power on: what of it is needed and possible.
+    """Restart the safety system, unlock a protective stop and power on the arm, as far as needed and possible.
 
     Args:
         robot: The robot.
-        arm: Control of it.
-        power_on: Whether to switch the power on and to release the brakes.
+        arm: Control of the robot.
+        power_on: Whether to power on the arm and release its brakes.
 
     Returns:
-        What was done, as sentences without a subject. Whether it holds `readiness.look` says.
+        What was done, as sentences without a subject. `readiness.look` says whether the robot is then ready.
     """
     done: list[str] = []
     found = await look(robot)
@@ -93,7 +93,7 @@ async def make_ready(robot: Robot, arm: Arm, *, power_on: bool = False) -> list[
             if await robot.clock() != "realtime":
                 await robot.advance(UNLOCKED_TICKS)
         except ProtectiveStopError:
-            pass  # who looks sees why
+            pass  # the caller checks the result
         found = await look(robot)
         if found.safety_mode == SafetyMode.PROTECTIVE_STOP.name:
             done.append("the robot stopped again at once")

@@ -1,4 +1,4 @@
-"""What users hand over, to numbers as messages have them: lists, tuples and arrays alike."""
+"""Conversion of users' values, such as lists, tuples and arrays, to the numbers in messages."""
 
 import contextlib
 import math
@@ -13,16 +13,16 @@ Joints = tuple[float, ...]
 
 
 def number(value: float, where: str) -> float:
-    """A plain float; the robot checks how large it may be.
+    """Convert a value to a float; its range is checked by the robot.
 
     Args:
-        value: Anything that stands for one number.
-        where: Name of the argument, for the message.
+        value: Anything that represents one number.
+        where: Name of the argument, for error messages.
 
     Raises:
         ArgumentError: The value has the wrong type or length.
     """
-    # `float` reads text, which nobody means who moves a robot.
+    # `float` would also parse text, which cannot be intended here.
     if not isinstance(value, str | bytes):
         with contextlib.suppress(TypeError, ValueError, OverflowError):
             return float(value)
@@ -30,13 +30,13 @@ def number(value: float, where: str) -> float:
 
 
 def whole(value: int, where: str, low: int, high: int | None = None) -> int:
-    """An integer within bounds.
+    """Convert a value to an integer within bounds.
 
     Args:
-        value: Anything that stands for an integer.
-        where: Name of the argument, for the message.
-        low: Smallest that is allowed.
-        high: Largest that is allowed; None: there is no bound.
+        value: Anything that represents an integer.
+        where: Name of the argument, for error messages.
+        low: Smallest permitted value.
+        high: Largest permitted value; None for no bound.
 
     Raises:
         ArgumentError: The value is not a number, or out of range.
@@ -52,15 +52,15 @@ def whole(value: int, where: str, low: int, high: int | None = None) -> int:
 
 
 def floats(values: Iterable[float], where: str, meaning: str | None = None) -> Joints:
-    """Plain floats of any sequence of numbers.
+    """Convert a sequence of numbers to floats.
 
     Args:
-        values: List, tuple, array.
-        where: Name of the argument, for the message.
-        meaning: One word for each number, where their count is known here; otherwise the robot checks it.
+        values: List, tuple or array.
+        where: Name of the argument, for error messages.
+        meaning: One word for each number, if their count is known here; otherwise the robot checks it.
 
     Raises:
-        ArgumentError: They are no numbers, or another count.
+        ArgumentError: A value is not a number, or their count is wrong.
     """
     listed = entries(values, where)
     if meaning is not None and len(listed) != (count := len(meaning.split())):
@@ -70,7 +70,7 @@ def floats(values: Iterable[float], where: str, meaning: str | None = None) -> J
 
 
 def entries(values: Iterable[float], where: str) -> tuple[float, ...]:
-    """What a sequence holds, as it stands there.
+    """Return the entries of a sequence unchanged.
 
     Raises:
         ArgumentError: The value has the wrong type or length.
@@ -82,10 +82,10 @@ def entries(values: Iterable[float], where: str) -> tuple[float, ...]:
 
 
 class JointRange:
-    """The joint angles that a robot takes: checked here where nobody answers, as with set-points.
+    """The joint angles that a robot accepts; set-points are checked here because the robot does not answer them.
 
     Args:
-        info: What the robot says of itself.
+        info: Description of the robot.
     """
 
     def __init__(self, info: Info) -> None:
@@ -93,14 +93,14 @@ class JointRange:
         self._ranges = info.limits.position
 
     def check(self, q: Iterable[float], where: str = "q") -> Joints:
-        """Plain floats of joint angles that the robot takes.
+        """Convert joint angles to floats, and check that the robot accepts them.
 
         Args:
             q: One angle per joint [rad].
-            where: Name of the argument, for the message.
+            where: Name of the argument, for error messages.
 
         Raises:
-            ArgumentError: They are no numbers, another count, not finite or beyond a joint's range.
+            ArgumentError: An angle is not a number, not finite or outside its joint's range, or their count is wrong.
         """
         angles = floats(q, where)
         joints, ranges = self._joints, self._ranges

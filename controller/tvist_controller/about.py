@@ -1,4 +1,4 @@
-"""What a controller says of itself."""
+"""Description of a controller, as `info` returns it."""
 
 from importlib.metadata import version
 
@@ -14,11 +14,11 @@ from tvist_protocol.values import PROTOCOL_VERSION
 
 VERSION = version("tvist")
 FIELDS = {tag(kind): list(kind.__struct_fields__) for kind in COMMANDS}
-"""Fields of each command."""
+"""Fields of each command, by its type."""
 
 
 def info_of(controller: Controller) -> Info:
-    """The robot, its limits and how it is set up now."""
+    """Describe the robot, its limits and its present setup."""
     setup, limits, lease = controller.setup, controller.setup.description.limits, controller.session.lease
     hold = controller.stepping.hold
     calibration = controller.filters.source.calibration

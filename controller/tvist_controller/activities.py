@@ -1,4 +1,4 @@
-"""What an activity looks like from outside, and which one an arm is in that was put somewhere at rest."""
+"""Runtime state of an activity, and the activity of an arm that was placed somewhere at rest."""
 
 from tvist_protocol.modes import RuntimeState
 from tvist_protocol.transitions import Activity
@@ -9,7 +9,7 @@ PUT: dict[ResetMode, Activity] = {
     "IDLE": Activity.IDLE,
     "POWER_OFF": Activity.POWER_OFF,
 }
-"""At rest in a robot mode."""
+"""Activity at rest in each robot mode."""
 _RUNTIME = {
     Activity.MOVING: RuntimeState.PLAYING,
     Activity.STREAMING: RuntimeState.PLAYING,
@@ -20,22 +20,22 @@ _RUNTIME = {
     Activity.BRAKING: RuntimeState.STOPPING,
     Activity.PROTECTIVE_STOPPING: RuntimeState.STOPPING,
 }
-"""All else is STOPPED."""
+"""Runtime state of each activity; it is STOPPED for all others."""
 
 
 def runtime_of(activity: Activity, *, slowing: bool) -> RuntimeState:
-    """Whether something moves.
+    """Return the runtime state, which says whether something moves.
 
     Args:
         activity: What the robot is doing.
-        slowing: Whether a motion that is paused has not come to its standstill.
+        slowing: Whether a paused motion has not yet come to a standstill.
     """
     state = _RUNTIME.get(activity, RuntimeState.STOPPED)
     return RuntimeState.PAUSING if state is RuntimeState.PAUSED and slowing else state
 
 
 def at_rest(activity: Activity, *, emergency: bool) -> Activity:
-    """Activity of a robot whose arm was put at rest somewhere else.
+    """Return the activity of a robot whose arm was placed somewhere else at rest.
 
     Args:
         activity: Previous activity.

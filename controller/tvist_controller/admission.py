@@ -1,7 +1,7 @@
-"""What a message must pass before the controller sees it: it is sound, and its sender may send it.
+"""Checks that a message must pass before the controller gets it: it is valid, and its sender may send it.
 
-Nothing here changes anything, so that messages can be admitted in any thread. Whoever admits one long before it is
-carried out has it checked twice: the lease may have changed.
+Nothing here changes any state, so messages can be admitted in any thread. A message that is admitted long before it
+is carried out has to be checked again, since the lease may have changed.
 """
 
 import contextlib
@@ -27,28 +27,28 @@ from tvist_protocol.simulation import SimulationStep
 
 STEP = tag(SimulationStep)
 LONG = frozenset((tag(SetEstimator), STEP))
-"""Types of commands that may have more than `EXPLAINED_BYTES`."""
+"""Types of commands that may be longer than `EXPLAINED_BYTES`."""
 
 
 class Admitted(NamedTuple):
-    """A command that may be carried out."""
+    """A command that has passed the checks."""
 
     command: Command
     content: dict[str, Any]
-    """Content in Python's own types, for the journal."""
+    """Content as Python's built-in types, for the journal."""
     session: str | None = None
-    """Session of the client that it gives control or the clock to, where its going will be told."""
+    """Session of the client that the command gives control or the clock to, if `client_gone` will report its end."""
     client: str | None = None
-    """Client that sent it, by its token or the name in it; None if it has neither."""
+    """Client that sent it, from its token or the name in the command; None if it has neither."""
 
 
 def admit(data: bytes, lease: Lease | None, clock: ClockHold | None = None) -> Admitted | Refused:
-    """Read a command, and check that its sender may send it.
+    """Decode a command, and check that its sender may send it.
 
-    Of a long one nothing is read but type and token before its sender is known to have control or the clock.
+    Of a long command only the type and token are decoded until its sender is known to have control or the clock.
 
     Args:
-        data: The message.
+        data: Encoded message.
         lease: Lease that gives control.
         clock: Current hold of the clock.
     """
@@ -66,7 +66,7 @@ def admit(data: bytes, lease: Lease | None, clock: ClockHold | None = None) -> A
 def admit_command(
     command: Command, lease: Lease | None, clock: ClockHold | None = None
 ) -> Admitted | Refused:
-    """Check that whoever sends a command may send it.
+    """Check that the sender of a command may send it.
 
     Args:
         command: The command.
@@ -81,7 +81,7 @@ def admit_command(
 
 
 class Unreadable(NamedTuple):
-    """A set-point that cannot be read, of the client that has control."""
+    """A set-point from the client in control that cannot be decoded."""
 
     token: str
     why: str
@@ -89,10 +89,10 @@ class Unreadable(NamedTuple):
 
 
 def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | None:
-    """Read a set-point; None where its sender has no control, or nothing says that it has.
+    """Decode a set-point; return None if its sender is not known to have control.
 
     Args:
-        data: The message.
+        data: Encoded message.
         lease: Lease that gives control.
     """
     if lease is None or len(data) > EXPLAINED_BYTES:
@@ -105,14 +105,14 @@ def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | 
 
 
 def _token(data: bytes) -> str | None:
-    """Token of a message that cannot be read, as far as it has one."""
+    """Return the token of a message that cannot be decoded, if one is found."""
     with contextlib.suppress(ProtocolError):
         return decode_envelope(data).token
     return None
 
 
 def _authorize(command: Command, lease: Lease | None, clock: ClockHold | None) -> str | None:
-    """Check that a command's sender may send it; the sender's name, as far as the command says it."""
+    """Check that a command's sender may send it; return the sender's name, if the command contains it."""
     match command:
         case TakeControl():
             check_free(lease, command.client)

@@ -1,4 +1,4 @@
-"""References that are still to come, run ahead as far as somebody wants to know them."""
+"""Future references, simulated as far ahead as the caller needs them."""
 
 from functools import cached_property
 
@@ -11,15 +11,15 @@ from tvist_controller.line_filter import LineFilter
 from tvist_controller.trajectory import Trajectory
 
 MAX_AHEAD = 4000
-"""Ticks that a motion is run ahead at most to see how it will end."""
+"""Largest number of ticks that a motion is simulated ahead to find its end."""
 
 
 class Ahead:
-    """A control line without its arm, run ahead of itself.
+    """A control line without its arm, simulated ahead of time.
 
     Args:
-        trajectory: What is followed; it is used up.
-        line_filter: What shapes it, used up likewise; None for a stop, which bypasses it.
+        trajectory: Trajectory that is followed; it is consumed.
+        line_filter: Filter that shapes it, consumed in the same way; None for a stop, which bypasses the filter.
         shaped: Shaped reference, consumed in the same way.
     """
 
@@ -28,14 +28,16 @@ class Ahead:
     ) -> None:
         self._trajectory, self._line_filter, self._shaped = trajectory, line_filter, shaped
         self.samples: list[Floats] = [shaped.along.published.q, shaped.along.position]
-        """Samples of the shaped reference: the parameter of its path, or as `references`; as many as these."""
+        """Samples of the shaped reference, one for each entry of `references`: path parameters, or else joint
+        positions.
+        """
         self.references: list[Floats] = [shaped.joints.published.q, shaped.joints.position]
-        """The two shaped references played last and those to come, one a tick, each of shape (n,) [rad]."""
+        """The last two shaped references played and the future ones, one for each tick, each of shape (n,) [rad]."""
         self.rests = False
-        """True once the last of them is at rest: no more will follow."""
+        """True once the last reference is at rest, so that no more will follow."""
 
     def until(self, ticks: int) -> None:
-        """Run on until so many references to come are known, or they rest."""
+        """Simulate until this many future references are known, or they come to rest."""
         trajectory, line_filter = self._trajectory, self._line_filter
         while not self.rests and len(self.references) < ticks + 2:
             x = trajectory.next()
@@ -48,11 +50,11 @@ class Ahead:
 
     @cached_property
     def last(self) -> int:
-        """Index of the last reference that has moved, for those that rest; 0: none has."""
+        """Index of the last reference that moved, if they come to rest; 0 if none moved."""
         return resting_after(np.array(self.references))
 
 
 def resting_after(references: Floats) -> int:
-    """Index of the last of some references, one a tick and of shape (k, n), that has moved; 0: none has."""
+    """Return the index of the last one of references of shape (k, n), one for each tick, that moved; 0 if none did."""
     moves = np.flatnonzero(np.abs(np.diff(references, axis=0)).max(axis=1) > STILL)
     return int(moves[-1]) + 1 if len(moves) else 0

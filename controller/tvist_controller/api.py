@@ -1,4 +1,4 @@
-"""The controller's public face: what studies, experiments and evaluations use of it.
+"""The controller's public interface for studies, experiments and evaluations.
 
 The modules behind it may change; `tvist_lab` imports nothing else of this package.
 """

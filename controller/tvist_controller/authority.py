@@ -1,4 +1,4 @@
-"""Control of the robot and of its clock: the commands of both rights, and what ends with them."""
+"""Control of the robot and of its clock: the commands for both rights, and the consequences of losing them."""
 
 from collections.abc import Callable
 
@@ -14,13 +14,13 @@ from tvist_protocol.values import PROTOCOL_VERSION
 
 
 class Authority:
-    """Gives, renews and ends the lease, with which motion ends, and the right to let time pass.
+    """Grants, renews and ends the lease, with which motion ends, and the right to advance time.
 
     Args:
         session: The lease.
-        steppable: Whether a client may let time pass.
-        interrupt: Ends motion; it takes the reason.
-        emit: Takes what happens.
+        steppable: Whether a client may advance time.
+        interrupt: Ends motion; takes the reason.
+        emit: Emits events.
     """
 
     def __init__(
@@ -39,22 +39,22 @@ class Authority:
         )
 
     def watch(self, now: float) -> None:
-        """End a lease that nobody has renewed."""
+        """End a lease that was not renewed in time."""
         if self.session.expired(now):
             self._lose("the lease expired: no command renewed it")
 
     def client_gone(self, client: str, session: str) -> None:
-        """A client's session has ended; where it held control, motion ends with it, and its hold of the clock ends."""
+        """End the rights of a client whose session has ended: motion ends with control, and the clock becomes free."""
         self.stepping.client_gone(client, session)
         if self.session.client_gone(client, session):
             self._lose(f"client {client!r} is gone")
 
     def check_step(self, step: SimulationStep, now: float) -> None:
-        """Check that a step's sender may let time pass, and send the set-points in it.
+        """Check that a step's sender may advance time, and may send the set-points in it.
 
         Raises:
-            NoControlError: It may not.
-            RefusalError: Time passes by itself.
+            NoControlError: The sender has no such right.
+            RefusalError: Time passes by itself with this clock.
         """
         check_step(self.stepping.hold, self.session.lease, step)
         if self.stepping.hold is None:
@@ -83,7 +83,7 @@ class Authority:
         return Accepted(token=lease.token, lease_s=lease.seconds)
 
     def _hand_over(self, call: Call[HandOver]) -> None:
-        """Give the lease to another client, who then takes control and gets a token of its own."""
+        """Give the lease to another client, which then takes control and gets a token of its own."""
         self.session.hand_over(call.command.client, call.now, call.session)
 
     def _release(self, _: Call[ReleaseControl]) -> None:

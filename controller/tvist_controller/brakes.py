@@ -1,4 +1,4 @@
-"""A stop of category 0: the power is gone, and the brakes bring the arm to rest on whatever torque they have."""
+"""Stop of category 0: the power is off, and the brakes bring the arm to rest whatever torque that takes."""
 
 import numpy as np
 import pinocchio as pin
@@ -9,25 +9,25 @@ from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, payload_inertia, rigid_model
 
 HOLD = 1.25
-"""Brakes are at least so much stronger than what gravity and the other joints ask for: they hold what they stop [-]."""
+"""Least ratio of a brake's torque to the load by gravity and the other joints, so that it holds what it stops [-]."""
 LONGEST = 5.0
-"""Time after which the brakes count as having stopped the arm in any case [s]."""
+"""Time after which the arm counts as stopped in any case [s]."""
 
 
 def brake(description: RobotDescription, carried: Payload, state: Target, period: float) -> Known:
-    """Way of the rigid arm under its brakes.
+    """Simulate the rigid arm under its brakes.
 
-    Each joint is held back by the torque of its brake, taken to be as strong as its drive; at rest it stays there.
-    Rotors turn along:
+    Each joint is slowed down by the torque of its brake, which is taken to be as large as its drive's; once at rest,
+    it stays there. The rotors turn along:
 
         (M(q) + B) q̈ + C(q, q̇) q̇ + g(q) = -τ_b sgn(q̇)    over the joints that still turn.
 
-    Brakes know no path: the arm leaves the way that it was on.
+    Brakes do not follow a path, so the arm leaves the path that it was on.
 
     Args:
         description: The robot.
-        carried: What the arm carries.
-        state: Its state of motion.
+        carried: Payload of the arm.
+        state: Initial state of motion.
         period: Tick [s].
     """
     model = rigid_model(description, Payload())

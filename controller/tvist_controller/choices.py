@@ -22,7 +22,7 @@ def wanted_modes(name: str, modes: int, where: str, known: Registry = BUILT_IN) 
 
     Args:
         name: Name of the filter.
-        modes: Number of modes that it shall suppress.
+        modes: Number of modes to suppress.
         where: Field that the name comes from.
         known: Available filters.
 
@@ -43,7 +43,7 @@ def make_estimator(source: ModeSource, modes: int, payload: Payload, where: str)
     """Make the chosen estimator for a number of modes.
 
     Raises:
-        RefusalError: It cannot estimate so many modes.
+        RefusalError: The source provides fewer modes.
     """
     try:
         return source.estimator(modes, payload)

@@ -14,23 +14,23 @@ from tvist_plant.description import Body, Payload, RobotDescription
 from tvist_plant.model import FLANGE, link_frame, rigid_model
 
 CLEARANCE = 0.005
-"""Least distance between two bodies [m]."""
+"""Smallest permitted distance between two bodies [m]."""
 FAR = 0.05
-"""Distance that allows a long step [m]."""
+"""Distance above which checks may be far apart [m]."""
 SHORT = 0.004
-"""Way of the arm's points between two looks where something is as near as it may be [m]."""
+"""Travel of the arm's points between two checks where bodies are as close as permitted [m]."""
 PAYLOAD = "payload"
 FLOOR = "floor"
 
 
 @dataclass(frozen=True)
 class Meeting:
-    """Two bodies too near to each other."""
+    """Two bodies that are too close to each other."""
 
     first: str
     second: str
     distance: float
-    """Between their surfaces; negative where they overlap [m]."""
+    """Distance between their surfaces; negative if they overlap [m]."""
 
     def __str__(self) -> str:
         return f"{self.first} and {self.second} would be {1e3 * self.distance:.0f} mm apart"
@@ -40,8 +40,8 @@ class CollisionModel:
     """The arm's bodies, its declared payload and the floor.
 
     Args:
-        description: The robot; without bodies nothing ever meets.
-        payload: What the controller believes that the arm carries.
+        description: The robot; if it has no bodies, there are no collisions.
+        payload: Declared payload.
     """
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
@@ -49,7 +49,7 @@ class CollisionModel:
         self._data = self._model.createData()
         self._reach = np.zeros(description.joints)
         self.carried = payload
-        """What the controller believes that the arm carries."""
+        """Declared payload."""
         self._geometry = pin.GeometryModel()
         self._names: list[str] = []
         collision = description.collision
@@ -68,7 +68,7 @@ class CollisionModel:
             self.carry(payload)
 
     def meeting(self, q: Floats) -> Meeting | None:
-        """The nearest pair at a posture, where it is nearer than the clearance.
+        """Return the nearest pair of bodies at a posture, if it is closer than the clearance.
 
         Args:
             q: Joint positions, shape (n,) [rad].
@@ -76,15 +76,15 @@ class CollisionModel:
         return self._nearest(q) if self._within(self._fine, q) else None
 
     def on_way(self, way: Way, *, before: Floats | None = None) -> tuple[float, Meeting] | None:
-        """The first meeting on a way, found by long steps where everything is far apart and short ones elsewhere.
+        """Find the first meeting on a way, in long steps where everything is far apart and short ones elsewhere.
 
         Args:
-            way: Joint positions along the path; `Path.whole` and `Path.way` give those of a path.
-            before: Posture that the way begins from, shape (n,) [rad]: what is in a meeting there may move out of it.
-                None: the beginning of the way itself.
+            way: Joint positions along the path, as `Path.whole` and `Path.way` return them.
+            before: Posture from which the way begins, shape (n,) [rad]: bodies that are too close there may move
+                apart. None: the beginning of the way itself.
 
         Returns:
-            Share of the way and the pair; None where it is free.
+            Share of the way, and the pair; None if the way is clear.
         """
         travel = self.travel(way.turned)
         share, escaping = 0.0, self.meeting(way.at(0.0) if before is None else before)
@@ -96,7 +96,7 @@ class CollisionModel:
                 step = max(nearest.distance - CLEARANCE, SHORT)
                 if nearest.distance >= CLEARANCE:
                     escaping = None
-                # What is in a meeting already may move out of it.
+                # Bodies that are too close already may move apart.
                 elif escaping is None or nearest.distance < escaping.distance:
                     return share, nearest
                 else:
@@ -108,16 +108,16 @@ class CollisionModel:
             share = 1.0 if travel <= 0.0 else min(share + step / travel, 1.0)
 
     def nearest(self, postures: Floats, far: float = FAR) -> float:
-        """Least distance between two bodies at some postures, shape (k, n) [rad]; `far` where none is nearer [m]."""
+        """Smallest distance between two bodies at k postures, shape (k, n) [rad]; `far` if none is smaller [m]."""
         near = [q for q in postures if self._names and self._within(self._coarse, q)]
         return min((far, *(self._nearest(q).distance for q in near)))
 
     def travel(self, turned: Floats) -> float:
-        """Upper bound of the way of any point of the arm while its joints turn by so much, shape (n,) [rad], in m."""
+        """Upper bound of any point's travel [m] while the joints turn by these angles, shape (n,) [rad]."""
         return float(np.abs(turned) @ self._reach)
 
     def room(self, q: Floats) -> float:
-        """How far any point of the arm may travel from a posture before something can meet [m]; 0 in a meeting."""
+        """How far any point of the arm may travel from a posture without a meeting [m]; 0 in a meeting."""
         if not self._names:
             return math.inf
         return max(self._nearest(q).distance - CLEARANCE, 0.0)
@@ -129,7 +129,7 @@ class CollisionModel:
         return data
 
     def _within(self, margin: pin.GeometryData, q: Floats) -> bool:
-        """Whether any pair is nearer than the margin."""
+        """Return whether any pair is closer than the margin."""
         return bool(pin.computeCollisions(self._model, self._data, self._geometry, margin, q, True))
 
     def _nearest(self, q: Floats) -> Meeting:
@@ -156,10 +156,10 @@ class CollisionModel:
         self._add_capsule(PAYLOAD, flange.parentJoint, flange.placement, nowhere, nowhere, radius)
 
     def carry(self, payload: Payload) -> None:
-        """Change the payload, in place: building a model takes a good part of a tick.
+        """Change the payload in place, since building a new model takes a good part of a tick.
 
         Args:
-            payload: What the controller believes that the arm carries.
+            payload: Declared payload.
         """
         self.carried = payload
         if not self._names:
@@ -175,7 +175,7 @@ class CollisionModel:
         self._reach = self._reaches()
 
     def _reaches(self) -> Floats:
-        """How far any point of the arm can be from each joint's axis, in any posture, shape (n,) [m]."""
+        """Largest distance of any point of the arm from each joint's axis, in any posture, shape (n,) [m]."""
         joints = self._model.nv
         own = np.zeros(joints)  # from the joint's origin to the farthest point of its own link
         for body in self._geometry.geometryObjects[: len(self._names) - 1]:

@@ -1,4 +1,4 @@
-"""A command is a row: its message, what handles it, and what it takes."""
+"""Rows of the table of commands: message, handler and requirements."""
 
 from collections.abc import Callable
 from typing import Any, Generic, Literal, NamedTuple, TypeVar
@@ -10,29 +10,31 @@ C = TypeVar("C", bound=Command)
 
 
 class Call(NamedTuple, Generic[C]):
-    """A command as it is carried out between two ticks."""
+    """A command that is being carried out between two ticks."""
 
     command: C
     tick: int
     """Number of the next control period."""
     now: float
-    """Time [s]; it passes by ticks alone."""
+    """Time [s], which only ticks advance."""
     session: str | None
-    """Session of the client that the command gives control to, where its going will be told."""
+    """Session of the client that the command gives control to, if `client_gone` will report its end."""
     planned: Callable[[], Any]
-    """Gives what was planned for the command, or plans it; raises `RefusalError` where it cannot be done."""
+    """Returns the plan for the command, making it if necessary; raises `RefusalError` if it cannot be carried out."""
 
 
 class Row(NamedTuple):
     """How a controller carries out one type of command.
 
-    A handler stands beside what it changes. It raises `RefusalError`, or `NoControlError`, before it has changed
-    anything; where it returns nothing, the reply is `Done`.
+    The handler is defined next to the state that it changes. It raises `RefusalError` or `NoControlError` before it
+    changes anything; if it returns nothing, the reply is `Done`.
     """
 
     message: type[Command]
     handle: Callable[[Call[Any]], Reply | None]
     lease: Literal["needed", "if named", "none"] = "needed"
-    """Whether its token must be that of the lease: always, where it has one, or never: it names something else."""
+    """When the command's token must be that of the lease: always, if it has one, or never, since it means something
+    else.
+    """
     changes_io: bool = False
     """True if the command may change what `io` reports."""

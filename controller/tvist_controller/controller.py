@@ -1,6 +1,6 @@
 """The controller: messages in, replies, states and events out. It has no clock, socket, thread or log.
 
-It owns a `Session` (who may) and a `ControlCycle` (what moves), which do not know each other.
+It owns a `Session`, which grants control, and a `ControlCycle`, which moves the arm; neither knows of the other.
 """
 
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ from tvist_protocol.values import Payload
 
 @dataclass
 class Counters:
-    """What was counted since the start."""
+    """Counts since the start."""
 
     commands: int = 0
     refused: int = 0
@@ -57,11 +57,11 @@ class Controller:
     """One robot.
 
     Args:
-        setup: How it starts.
-        plant: What it moves; None: the flexible arm that the setup describes.
+        setup: Initial setup.
+        plant: Plant to control; None for the flexible arm that the setup describes.
 
     Raises:
-        ValueError: The setup is wrong, or the plant does not fit it.
+        ValueError: The setup is invalid, or the plant does not fit it.
     """
 
     def __init__(self, setup: Setup, plant: Plant | None = None) -> None:
@@ -84,7 +84,7 @@ class Controller:
             plant=plant,
         )
         if setup.truth:
-            truth_of(self.cycle.plant)  # found missing now rather than at the first tick
+            truth_of(self.cycle.plant)  # raises now rather than at the first tick if the plant has no truth
         self._seed = setup.seed
         self._reporter = Reporter(setup.description)
         self._wrench = ToolWrench(setup.description)
@@ -110,11 +110,13 @@ class Controller:
         )  # fmt: skip
         self._rows = {row.message: row for part in parts for row in part.rows}
         self.latest = self._state(self.cycle.standing)
-        """State of the last tick; before the first, and where the arm was put somewhere since, how it stands there."""
+        """State of the last tick, or the state at rest if the arm has not ticked yet or has been placed somewhere
+        since.
+        """
 
     @property
     def rows(self) -> tuple[Row, ...]:
-        """Commands on the whole robot."""
+        """Commands that concern the whole robot."""
         return (
             Row(SimulationReset, self._reset),
             Row(SimulationStep, self._check_step, lease="none"),
@@ -122,12 +124,12 @@ class Controller:
 
     @property
     def declared(self) -> Payload:
-        """What the controller believes that the arm carries."""
+        """Declared payload."""
         return self._payload.payload
 
     @property
     def now(self) -> float:
-        """Time of the present tick [s]; it passes by ticks alone."""
+        """Time of the present tick [s], which only ticks advance."""
         return self.tick_number * PERIOD
 
     @cached_property
@@ -137,23 +139,23 @@ class Controller:
 
     @property
     def stop_reason(self) -> StopReason | None:
-        """The stop that keeps the robot from moving; None: there is none."""
+        """The stop that keeps the robot from moving; None if there is none."""
         return self._stop_reasons.present(self.motion.activity.robot_mode, self.motion.safety_mode)
 
-    # ------------------------------------------------------------------ what comes in
+    # ------------------------------------------------------------------ inputs
 
     @property
     def basis(self) -> PlanBasis:
-        """What plans for commands depend on, as it is now."""
+        """The present state that plans for commands depend on."""
         on = self.filters.basis
         return PlanBasis(on, self.motion.basis(on))
 
     def receive(self, command: c.Command, plan: Plan | None = None, session: str | None = None) -> Reply:
-        """Carry out a command between two ticks. A refused one changes nothing.
+        """Carry out a command between two ticks. A refused command changes nothing.
 
         Args:
             command: The command.
-            plan: For it, where it was planned beforehand; it must hold on `basis`.
+            plan: Plan for the command, if it was made beforehand; it must hold on the present `basis`.
             session: Session of the client that gets control, if `client_gone` will report its end.
         """
         self.counters.commands += 1
@@ -174,10 +176,10 @@ class Controller:
         return Done() if reply is None else reply
 
     def receive_setpoint(self, setpoint: c.Setpoint) -> None:
-        """Take a set-point; one that is not for us is counted and dropped: nobody waits for an answer."""
+        """Take a set-point. If it is not accepted, it is counted and dropped, since its sender expects no answer."""
         lease = self.session.lease
         if lease is None or setpoint.token != lease.token:
-            self._count_refused()  # a stranger's: it says nothing of the stream, and no journal has it
+            self._count_refused()  # another client's: neither the stream nor the journal is concerned
             return
         try:
             check_joints(setpoint.q, self.setup.description)
@@ -192,7 +194,7 @@ class Controller:
         self.motion.streams.offer(setpoint.sequence, np.array(setpoint.q, dtype=float), self.now)
 
     def refuse_setpoint(self, why: str) -> None:
-        """Count and drop a set-point of the lease's holder; should the stream fall silent, its end names the reason."""
+        """Count and drop a set-point of the client in control; if the stream falls silent, its end gives the reason."""
         self._count_refused()
         self.motion.streams.refuse(why)
 
@@ -201,17 +203,17 @@ class Controller:
         self.counters.setpoints_refused += 1
 
     def client_gone(self, client: str, session: str) -> None:
-        """A client's session has ended; what it held ends with it."""
+        """Handle the end of a client's session, which ends the rights it held."""
         self._authority.client_gone(client, session)
 
     def missed(self, ticks: int) -> None:
-        """Ticks have begun too late."""
+        """Count ticks that began too late."""
         self.counters.missed_ticks += ticks
 
-    # ------------------------------------------------------------------ what goes out
+    # ------------------------------------------------------------------ outputs
 
     def tick(self) -> tuple[State, list[Event]]:
-        """One control period."""
+        """Compute one control period."""
         self._watch_time()
         self.programs.advance()
         try:
@@ -242,10 +244,10 @@ class Controller:
         )
 
     def io(self, *, wrench: bool = True) -> Io:
-        """Inputs, outputs and registers as they are for the next tick.
+        """Return inputs, outputs and registers as they are for the next tick.
 
         Args:
-            wrench: Whether to find the wrench at the tool, which takes a third of a tick.
+            wrench: Whether to compute the wrench at the tool, which takes a third of a tick.
         """
         return self.peripherals.io(
             self.tick_number + 1,
@@ -256,30 +258,30 @@ class Controller:
         )
 
     def wrench(self) -> list[float]:
-        """What pushes the tool in the last tick: force and torque at its centre point, base frame [N, N m].
+        """Return the external force and torque at the tool centre point in the last tick, base frame [N, N m].
 
-        It is computed when it is asked for.
+        It is computed on request.
         """
         return self._wrench.of(self.latest, self.peripherals.tcp_offset)
 
     def changed_io(self) -> Io | None:
-        """Inputs, outputs and registers where they changed since this was asked last, before a tick; else None."""
-        program = self.programs.progress  # changes by itself, by events and with other commands
+        """Return inputs, outputs and registers before a tick, if they changed since the last call; else None."""
+        program = self.programs.progress  # changes in ticks, by events and with other commands
         if not self._io_changed and program == self._told_program:
             return None
         self._io_changed, self._told_program = False, program
         return self.io(wrench=False)
 
     def truth(self) -> Truth:
-        """What no robot can know, after a tick.
+        """Return what a real robot cannot measure, after a tick.
 
         Raises:
-            ValueError: The plant does not know it either.
+            ValueError: The plant does not provide it.
         """
         return self._reporter.truth(self.tick_number, self.cycle.plant)
 
     def _emit(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
-        """Put down an event of the tick that is being made; of the next one between two."""
+        """Store an event of the tick that is being computed, or of the next one between two ticks."""
         event = Event(tick=self.tick_number + 1, kind=kind, **fields)
         self._events.append(event)
         if kind in {"protective_stop", "safety_stop"}:
@@ -287,19 +289,19 @@ class Controller:
         self.programs.hear(event)
 
     def _watch_time(self) -> None:
-        """End what is over, and what nobody keeps up."""
+        """End what has timed out or run its course."""
         self._faults.end(self.tick_number + 1)
         self._authority.watch(self.now)
         if self.setup.clock == "realtime":
             self.motion.watch(self.now)
 
     def _interrupt(self, why: str) -> None:
-        """End what nobody has control of any longer."""
+        """End the activities that need control, when no client has control any more."""
         self.programs.end()
         self.motion.interrupt(why)
 
     def _move_by_program(self, command: c.MoveJ) -> int:
-        """Plan and start a motion of the program; its number."""
+        """Plan and start a motion of the program; return its number."""
         self.motion.check_move()
         return self.motion.move(self._found(self._planner.plan(command, self.basis)))
 
@@ -308,10 +310,10 @@ class Controller:
             raise plan.found
         return plan.found
 
-    # ------------------------------------------------------------------ commands on the whole robot
+    # ------------------------------------------------------------------ commands that concern the whole robot
 
     def _reset(self, call: Call[SimulationReset]) -> Reply:
-        """Put the simulated arm somewhere at rest."""
+        """Place the simulated arm somewhere at rest."""
         command = call.command
         check_content(command, self.setup.description)
         chosen: PlannedFilter | None = call.planned()
@@ -334,7 +336,7 @@ class Controller:
         return Done(tick=self.tick_number)
 
     def _check_step(self, call: Call[SimulationStep]) -> Reply:
-        """Check that a client may let time pass; the driver then does."""
+        """Check that a client may advance time; the host then does so."""
         command = call.command
         self._authority.check_step(command, call.now)
         if command.setpoints is not None and not self.motion.streaming:

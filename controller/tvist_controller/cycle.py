@@ -30,22 +30,22 @@ from tvist_shaping.base import Filter
 T = TypeVar("T", bound=Trajectory)
 
 STILL = 1e-7
-"""A reference that moves less than this between two ticks is at rest [rad]."""
+"""A reference that changes by less than this between two ticks is at rest [rad]."""
 
 
 class Sample(Struct, frozen=True, eq=False, gc=False):
-    """What went along the line in one tick."""
+    """Signals along the control line in one tick."""
 
     reference: Floats
     """q before shaping, shape (n,) [rad]."""
     target: Target
-    """q* and its derivatives, of the tick before: central differences cost one."""
+    """q* and its derivatives at the previous tick, since central differences cost one tick of delay."""
     torque: Floats
     """τ* of the rigid arm for that target, shape (n,) [N m]."""
     fed_forward: Floats
     """Torque with rotors and friction, as the drives receive it, shape (n,) [N m]."""
     measured: Measurement
-    """What the arm did."""
+    """Measurement of the arm."""
 
 
 class ControlCycle:
@@ -54,14 +54,14 @@ class ControlCycle:
     Args:
         description: The robot.
         tvist: The filter, with its shaper and estimator.
-        q: Joint angles at which the arm rests at the start, shape (n,) [rad].
-        declared: The payload that inverse dynamics counts on.
-        carried: The payload that the arm has.
+        q: Joint angles at which the arm is at rest initially, shape (n,) [rad].
+        declared: Payload that inverse dynamics uses.
+        carried: Payload that the arm carries.
         seed: Seed of the arm's noise and gear errors.
-        plant: What the line moves; None: the flexible arm that the description describes.
+        plant: Plant to control; None for the flexible arm of the description.
 
     Raises:
-        ValueError: The plant cannot start there, or what it measures has the wrong shape.
+        ValueError: The plant cannot start there, or its measurement has the wrong shape.
     """
 
     def __init__(
@@ -85,18 +85,18 @@ class ControlCycle:
         self._shaped = ShapedReference(q, PERIOD)
         self.trajectory: Trajectory = Rest(q)
         self.reference = q
-        """Newest one before shaping, shape (n,) [rad]."""
+        """Newest reference before shaping, shape (n,) [rad]."""
         self.at_rest = True
-        """Whether nothing moves the shaped reference any more."""
+        """Whether the shaped reference has come to rest."""
         self.stopping = False
         """Whether a stop bypasses the filter."""
         self.running_out = False
-        """Whether what was under way comes to rest by itself, since no stop is quicker."""
+        """Whether the present motion comes to rest by itself, since no stop is quicker."""
         self.guard: LookAhead | None = None
-        """Asked before each shaped reference is played; where it answers with a stop, that is made instead."""
+        """Checks each shaped reference before it is played; if it returns a stop, that is followed instead."""
         self.reset(q, carried=carried, seed=seed)
         check_measurement(self.standing.measured, description.joints, self._plant)
-        # The first steps load compiled code, which lasts many ticks: they are made here, and taken back.
+        # The first steps load compiled code, which takes many ticks; they are made here, and undone.
         self.line_filter.rehearse(q)
         for _ in range(3):
             self.step()
@@ -104,22 +104,22 @@ class ControlCycle:
 
     @property
     def plant(self) -> Plant:
-        """What the line moves; the line alone steps and resets it."""
+        """The plant; only the control line steps and resets it."""
         return self._plant
 
     @property
     def tvist(self) -> Filter:
-        """The filter chosen last: in force, or about to be."""
+        """The latest chosen filter: in use, or about to be."""
         return self.line_filter.tvist
 
     def step(self) -> Sample:
-        """One tick."""
+        """Compute one tick."""
         x = self.trajectory.next()  # a path's parameter, or q itself [rad]
         x_star = x if self.stopping else self.line_filter.filter(x)  # x* [rad]
         if self.guard is not None:
             x, x_star = self._guarded(self.guard, x, x_star)
         self.reference = reference = self._shaped.posture(x)  # q [rad]
-        target = self._shaped.update(x_star)  # q*, q̇*, q̈* of the tick before
+        target = self._shaped.update(x_star)  # q*, q̇*, q̈* a tick earlier
         self.inverse_dynamics.advance()
         torque = self.inverse_dynamics.torque(target.q, target.qd, target.qdd)  # τ* [N m]
         gravity = self.inverse_dynamics.gravity(target.q)
@@ -129,7 +129,7 @@ class ControlCycle:
         return Sample(reference, target, torque, command.torque, measured)
 
     def _guarded(self, guard: LookAhead, reference: Floats, shaped: Floats) -> tuple[Floats, Floats]:
-        """Return the stream's reference, or that of a stop if no collision-free stop would lead on from it."""
+        """Return the stream's reference and its shaped one, or those of a stop if no clear stop leads on from them."""
         stop = None if self.stopping else guard(self._shaped.joints.after(shaped))
         if stop is None:
             return reference, shaped
@@ -138,12 +138,12 @@ class ControlCycle:
         return reference, reference
 
     def use(self, tvist: Filter) -> None:
-        """Change the filter: at once where the arm is at rest, else within the limits of the motion.
+        """Change the filter: at once if the arm is at rest, else within the limits of the motion.
 
-        While one change is under way the next waits for its turn; of several that wait the newest does.
+        If a change is under way, the new filter waits until that is complete; only the latest waiting filter is kept.
 
         Args:
-            tvist: The filter to come; its joints and period are the present one's.
+            tvist: New filter, with the joints and the period of the present one.
         """
         if self.at_rest or self.stopping:
             self.line_filter.begin(tvist, self.reference)
@@ -151,17 +151,17 @@ class ControlCycle:
             self.line_filter.use(tvist)
 
     def _settle(self, reference: Floats, target: Target) -> None:
-        """Notice the end of a motion: its trajectory is over and the shaped reference rests on it."""
+        """Detect the end of a motion: its trajectory is finished and the shaped reference has come to rest on it."""
         trajectory = self.trajectory
         if self.at_rest or not (trajectory.finished or (self.running_out and trajectory.standing)):
             return
         if not ((self.stopping or self.line_filter.settled) and rests(reference, target)):
             return
         leaves = self._shaped.posture_of is not None
-        if self.stopping or leaves:  # the delay line starts anew from where it ended
+        if self.stopping or leaves:  # the delay line restarts from where the motion ended
             self._shaped.enter(None, reference)
             self.line_filter.begin(self.tvist, reference)
-        if leaves or not trajectory.finished:  # what ran out was paused: it goes no further
+        if leaves or not trajectory.finished:  # a motion that ran out while paused ends here
             self.trajectory = Rest(reference)
         self.at_rest, self.stopping, self.running_out, self.guard = True, False, False, None
 
@@ -171,12 +171,12 @@ class ControlCycle:
         return self._shaped.joints.position
 
     def plan(self, target: Floats, limits: MotionLimits, speed: float = 1.0) -> PlannedMotion:
-        """A point-to-point motion from where the reference is; the arm must be at rest.
+        """Plan a point-to-point motion from the present reference; the arm must be at rest.
 
         Args:
             target: Joint positions, shape (n,) [rad].
-            limits: For every joint.
-            speed: Rate of its time against the clock's to start with [-].
+            limits: Limits for every joint.
+            speed: Initial rate of the motion's time relative to the clock's [-].
 
         Raises:
             ValueError: There is no such motion.
@@ -193,7 +193,7 @@ class ControlCycle:
         )
 
     def start(self, trajectory: T) -> T:
-        """Follow a trajectory that begins where the reference is; one on another path than before begins at rest."""
+        """Follow a trajectory from the present reference; if its path is a different one, the arm must be at rest."""
         path = trajectory.path
         if path is not None and path.posture_of != self._shaped.posture_of:
             self._shaped.enter(path.posture_of, path.start)
@@ -204,7 +204,7 @@ class ControlCycle:
         return trajectory
 
     def end_of(self, stream: SetpointStream) -> JointStop:
-        """How a stream comes to rest inside its own limits, through the filter."""
+        """Return how a stream comes to rest inside its own limits, through the filter."""
         limits = stream.limits
         return JointStop(*stream.state, acceleration=limits.acceleration, jerk=limits.jerk, period=PERIOD)
 
@@ -219,18 +219,18 @@ class ControlCycle:
         return self._shaped.along
 
     def fork(self) -> tuple[Trajectory, LineFilter, ShapedReference]:
-        """Copies of the line's parts that make targets, to be run ahead."""
+        """Return copies of the line's parts that generate targets, for simulation ahead of time."""
         return self.trajectory.fork(), self.line_filter.fork(), self._shaped.fork()
 
     def run_out(self) -> None:
-        """Come to rest by letting what is under way go on: where it is paused it goes no further."""
+        """Come to rest by completing the present motion; a paused motion ends where it is."""
         self.running_out = True
 
     def bypass(self, stop: Trajectory) -> None:
-        """Come to rest past the filter; nothing in the delay line plays on.
+        """Come to rest without the filter; the contents of the delay line are not played.
 
         Args:
-            stop: Continues the shaped reference.
+            stop: Stop that continues the shaped reference.
         """
         self.trajectory, self.at_rest = stop, False
         if stop.path is None:
@@ -239,7 +239,7 @@ class ControlCycle:
         self.stopping, self.running_out = True, False
 
     def reset(self, q: Floats, *, carried: Payload | None = None, seed: int = 0) -> None:
-        """Put the arm at rest somewhere, in static equilibrium; everything on the line starts anew."""
+        """Place the arm somewhere at rest, in static equilibrium; the whole line restarts."""
         self.trajectory, self.reference = Rest(q), q
         self.at_rest, self.stopping, self.running_out, self.guard = True, False, False, None
         self.inverse_dynamics.settle()
@@ -251,20 +251,20 @@ class ControlCycle:
         command = self._joint_controllers.command(Target(q, still, still), torque, torque)
         measured = self._plant.reset(command, payload=carried, seed=seed)
         self.standing = Sample(q, Target(q, still, still), torque, command.torque, measured)
-        """What there is to tell before the first tick from there."""
+        """Signals to report before the first tick from there."""
 
     def declare(self, payload: Payload) -> None:
-        """Change the payload that inverse dynamics counts on; torque goes there without a step."""
+        """Change the payload that inverse dynamics uses; the torque has no step."""
         self.inverse_dynamics.declare(payload)
 
 
 def rests(reference: Floats, target: Target) -> bool:
-    """Whether a shaped reference rests on its reference, by the target that was made of it.
+    """Return whether a shaped reference has come to rest at the unshaped one, judged by the target computed from it.
 
     Args:
-        reference: Before shaping, shape (n,) [rad].
-        target: That was made of it.
+        reference: Reference before shaping, shape (n,) [rad].
+        target: Target computed from the shaped reference.
     """
-    # What central differences make of q*ᵢ - q*ᵢ₋₁.
+    # The central differences' equivalent of q*ᵢ - q*ᵢ₋₁.
     step = PERIOD * (target.qd - 0.5 * PERIOD * target.qdd)
     return bool(max(np.abs(step).max(), np.abs(reference - target.q).max()) <= STILL)

@@ -1,4 +1,4 @@
-"""What the controller believes that the arm carries: declared by a client, doubted by what the drives feel."""
+"""The declared payload, which a client sets and the drives' torques may contradict."""
 
 from tvist_controller.command_row import Call, Row
 from tvist_controller.cycle import Sample
@@ -14,27 +14,27 @@ from tvist_protocol.values import Payload
 
 
 class DeclaredPayload:
-    """The declared payload, and everything that counts on it.
+    """The declared payload, and everything that depends on it.
 
     Args:
-        payload: At the start.
+        payload: Initial payload.
         motion: The arm's motion, and with it the control line.
         filters: The control line's filter.
-        emit: Takes what happens.
+        emit: Emits events.
     """
 
     def __init__(self, payload: Payload, motion: MotionControl, filters: Filters, emit: Emit) -> None:
         self.payload = payload
-        """What the controller believes that the arm carries."""
+        """Declared payload."""
         self._motion, self._filters, self._emit = motion, filters, emit
         self._description = motion.cycle.description
         self._monitor = PayloadMonitor(self._description, body(payload))
         self._held = False
-        """True if the brakes have held the arm since the last measurement of the drives."""
+        """Whether the brakes have held the arm since the last measurement of the drives."""
         self.rows = (Row(SetPayload, self._declare, changes_io=True),)
 
     def watch(self, sample: Sample) -> None:
-        """Say when the arm does not carry what was declared; where the brakes hold it, nobody can tell."""
+        """Warn if the arm does not carry the declared payload; this cannot be checked while the brakes hold it."""
         if self._motion.activity.robot_mode is not RobotMode.RUNNING:
             self._held = True
             return
@@ -45,7 +45,7 @@ class DeclaredPayload:
             self._emit("warning", code="payload_mismatch", why=why)
 
     def begin_anew(self) -> None:
-        """Forget what the drives felt: the arm was put elsewhere, or its power was off."""
+        """Discard past measurements, since the arm was placed elsewhere or its power was off."""
         self._held = False
         self._monitor.reset()
 

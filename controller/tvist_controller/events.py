@@ -1,4 +1,4 @@
-"""What happens, on its way to who tells of it."""
+"""Types for events on their way to the clients."""
 
 from typing import Protocol, TypedDict, Unpack
 
@@ -7,7 +7,7 @@ from tvist_protocol.stream import EventKind
 
 
 class Told(TypedDict, total=False):
-    """What the event of a stop says of it; see `tvist_protocol.stream.Event`."""
+    """Fields of a stop's event; see `tvist_protocol.stream.Event`."""
 
     category: int | None
     duration: float | None
@@ -15,7 +15,7 @@ class Told(TypedDict, total=False):
 
 
 class Fields(Told, total=False):
-    """What an event may say besides its kind; see `tvist_protocol.stream.Event`."""
+    """Fields of an event besides its kind; see `tvist_protocol.stream.Event`."""
 
     id: int | None
     code: Code | None
@@ -24,7 +24,7 @@ class Fields(Told, total=False):
 
 
 class Emit(Protocol):
-    """Puts down an event."""
+    """Emits an event."""
 
     def __call__(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
         """Emit an event of the tick that is being computed, or of the next one between two ticks."""

@@ -1,4 +1,4 @@
-"""Faults caused on purpose: what `simulation.inject` asks for, done to the arm or the safety system."""
+"""Deliberate faults: those of `simulation.inject`, applied to the arm or the safety system."""
 
 import heapq
 from collections.abc import Callable
@@ -16,11 +16,11 @@ from tvist_protocol.simulation import SimulationInject
 
 
 class Faults:
-    """Begins faults, and ends those that last.
+    """Starts faults, and ends those with a duration.
 
     Args:
-        motion: What they happen to.
-        safety: Its safety system.
+        motion: The robot's motion.
+        safety: The robot's safety system.
     """
 
     def __init__(self, motion: MotionControl, safety: SafetyControl) -> None:
@@ -37,7 +37,7 @@ class Faults:
                 lambda: safety.end_emergency("system"),
             ),
         }
-        """What begins and ends an input of the safety system."""
+        """Functions that start and end each input of the safety system."""
         self._momentary: dict[str, Callable[[], None]] = {
             "protective_stop": lambda: motion.protect("a protective stop was injected"),
             "normal": safety.release,
@@ -45,7 +45,7 @@ class Faults:
             "violation": lambda: safety.cut_power("the safety system found a violation", "violation"),
             "fault": lambda: safety.cut_power("the safety system failed", "fault"),
         }
-        """What is over at once."""
+        """Functions for the faults that have no duration."""
         self.rows = (Row(SimulationInject, lambda call: self.inject(call.command, call.tick)),)
         plant = motion.cycle.plant
         self._pushable = plant if isinstance(plant, Pushable) else None
@@ -56,15 +56,15 @@ class Faults:
         self._number = count()
 
     def inject(self, command: SimulationInject, tick: int) -> None:
-        """Begin a fault.
+        """Start a fault.
 
         Args:
             command: Command that causes the fault.
-            tick: The next one.
+            tick: Number of the next tick.
 
         Raises:
-            RefusalError: There is none of that name, a field it needs is missing, one it has not is there, or the plant
-                cannot have this fault.
+            RefusalError: There is no such fault, a field it needs is missing, it has no such field, or the plant does
+                not support it.
         """
         _check(command, self._motion.cycle.description.joints)
         self._check_plant(command.fault)
@@ -75,7 +75,7 @@ class Faults:
             self._add(joint, value)
             self._at(ends, fault, lambda: self._add(joint, -value))
             return
-        # An input that is set anew, or released, does not end by what it was set to before.
+        # An input that is set again or released no longer ends at the earlier time.
         self._forget({*self._inputs} if fault == "normal" else {fault})
         if fault in self._inputs:
             begin, end = self._inputs[fault]
@@ -86,12 +86,12 @@ class Faults:
             self._momentary[fault]()
 
     def end(self, tick: int) -> None:
-        """End those that are over before a tick."""
+        """End the faults whose time is over, before a tick."""
         while self._ends and self._ends[0][0] <= tick:
             heapq.heappop(self._ends)[-1]()
 
     def clear(self) -> None:
-        """End all that last now, and let go of the arm."""
+        """End all present faults, and release the arm."""
         while self._ends:
             heapq.heappop(self._ends)[-1]()
         self._push[:] = 0.0
@@ -99,7 +99,7 @@ class Faults:
             self._pushable.push(self._push)
 
     def _check_plant(self, fault: str) -> None:
-        """Check that the plant can have a fault that is its own."""
+        """Check that the plant supports a fault of its own."""
         if (fault == "torque" and self._pushable is None) or (
             fault == "nan" and fault not in self._momentary
         ):
@@ -111,7 +111,7 @@ class Faults:
             raise RefusalError("unknown_fault", "fault", why)
 
     def _forget(self, faults: set[str]) -> None:
-        """Let these go on, if they last, until something else ends them."""
+        """Drop the end times of faults; those with a duration then last until something else ends them."""
         self._ends = [one for one in self._ends if one[2] not in faults]
         heapq.heapify(self._ends)
 

@@ -1,4 +1,4 @@
-"""The filter of the line and the source of its modes: changes and supervision."""
+"""The control line's filter and the source of its modes: changes and supervision."""
 
 from tvist_controller.calibrations import fits
 from tvist_controller.command_row import Call, Row
@@ -16,10 +16,10 @@ class Filters:
     """The control line's filter.
 
     Args:
-        motion: What may not be spoiled by another filter; it has the control line.
+        motion: The robot's motion, which a new filter must not spoil; it contains the control line.
         source: Source of the modes of the line's first filter.
-        declared: What the controller believes that the arm carries.
-        emit: Takes what happens.
+        declared: Declared payload.
+        emit: Emits events.
     """
 
     def __init__(self, motion: MotionControl, source: ModeSource, declared: Payload, emit: Emit) -> None:
@@ -33,12 +33,12 @@ class Filters:
 
     @property
     def basis(self) -> FilterBasis:
-        """What another filter depends on."""
+        """The present state that a new filter depends on."""
         tvist = self._cycle.tvist
         return FilterBasis(tvist.name, tvist.estimator.modes, self.source, self._declared)
 
     def use(self, chosen: PlannedFilter) -> None:
-        """Shape with it from now on."""
+        """Shape with a filter from now on."""
         before = self.source
         self.source, tvist = chosen
         self._cycle.use(tvist)
@@ -56,11 +56,11 @@ class Filters:
         self._warn_of_payload()
 
     def declare(self, payload: Payload, tvist: Filter | None) -> None:
-        """The arm carries something else: so it may have other modes.
+        """Take another payload into account, which may change the arm's modes.
 
         Args:
-            payload: What the controller believes that it carries.
-            tvist: The filter for it; None where its modes are not known to change.
+            payload: Declared payload.
+            tvist: Filter for it; None if its modes are not known to differ.
         """
         self._declared = payload
         if tvist is not None:
@@ -68,7 +68,7 @@ class Filters:
         self._warn_of_payload()
 
     def _warn_of_payload(self) -> None:
-        """Say that modes are of another payload, where they are."""
+        """Warn if the modes belong to another payload."""
         declared = self._declared
         calibration = self.source.calibration
         if calibration is not None and not fits(calibration, declared, self.source.name):
@@ -81,7 +81,7 @@ class Filters:
             )
 
     def _warn_of_arm(self) -> None:
-        """Say that modes are of another arm of the same model, where they are."""
+        """Warn if the modes belong to another arm of the same model."""
         calibration = self.source.calibration
         if calibration is not None and self.source.fits_arm is False:
             why = (
@@ -91,7 +91,7 @@ class Filters:
             self._emit("warning", why=why)
 
     def watch(self) -> None:
-        """Say when the filter cannot do what it should, once until it can again."""
+        """Warn when the filter cannot work as intended; once, until it works again."""
         clipped = self._cycle.tvist.clipped
         if clipped and not self._clipped:
             name = self._cycle.tvist.name

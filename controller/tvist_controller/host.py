@@ -1,7 +1,7 @@
-"""What is around one controller: what was admitted is carried out and journaled, what comes out goes to sinks.
+"""Host of one controller: carries out and journals admitted messages, and passes output to sinks.
 
-Still without clock, thread or socket: whoever calls `tick` lets time pass. In lockstep and free it is the client,
-through `simulation.step`.
+It has no clock, thread or socket: time advances when `tick` is called. With the clocks lockstep and free, a client
+does this through `simulation.step`.
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ from tvist_protocol.simulation import SimulationStep
 from tvist_protocol.stream import Event
 
 Attend = Callable[[], bool]
-"""Does what waits before a tick of a step; False where the step has to end."""
+"""Does waiting jobs before a tick of a step; returns False if the step has to end."""
 _BUSY = Refused(code="busy", where="", why="a step is in progress: send the next one after its answer")
 
 
@@ -30,16 +30,16 @@ class Host:
 
     Args:
         controller: The robot.
-        sinks: They take what it puts out, in this order.
+        sinks: Sinks that take its output, in this order.
     """
 
     def __init__(self, controller: Controller, *sinks: Sink) -> None:
         self.controller = controller
         self.failure: str | None = None
-        """Why the controller ticks no more, where it does not."""
+        """Why the controller has stopped ticking; None if it ticks."""
         self._sinks = sinks
         self.standing = self._standing()
-        """What any thread may know of the controller."""
+        """The part of the controller's state that any thread may read."""
         self._info: tuple[int, Standing | None, bytes] = -1, None, b""
         self._stepping = False
 
@@ -55,8 +55,8 @@ class Host:
 
         Args:
             admitted: The command.
-            plan: For it, where it was planned beforehand and the plan holds.
-            attend: Called before each tick of a step, where others may send something meanwhile. It may carry out
+            plan: Plan for the command, if it was made beforehand and still holds.
+            attend: Called before each tick of a step, so that others may send something meanwhile. It may carry out
                 other commands, but no step.
         """
         command = admitted.command
@@ -67,9 +67,9 @@ class Host:
         try:
             reply = self.controller.receive(command, plan, session)
         except Exception:
-            self._note(entry)  # whoever looks for the error needs it
+            self._note(entry)  # needed to reproduce the error
             raise
-        # A command of the lease's holder renews the lease even where it is refused; a stranger's does nothing.
+        # A command of the client in control renews the lease even if it is refused; another client's does not.
         if not isinstance(reply, Refused) or self._is_holders(command):
             self._note(entry)
         if isinstance(command, SimulationStep) and isinstance(reply, Done):
@@ -87,30 +87,30 @@ class Host:
             self.receive_setpoint(setpoint)
 
     def client_gone(self, client: str, session: str) -> None:
-        """A client's session has ended; nothing comes of it but where that one has control or the clock."""
+        """Handle the end of a client's session; this matters only if it held control or the clock."""
         if session in self._standing().sessions_of(client):
             self._note(Entry(tick=self._next, kind="client_gone", client=client, session=session))
             self.controller.client_gone(client, session)
             self.standing = self._standing()
 
     def missed(self, ticks: int) -> None:
-        """Ticks have begun too late."""
+        """Count ticks that began too late."""
         self._note(Entry(tick=self._next, kind="missed", count=ticks))
         self.controller.missed(ticks)
 
     def publish(self) -> None:
-        """Tell what any thread may know, as it is now; after a tick that is done only where it matters."""
+        """Update the state that any thread may read; after a tick this is done only if it may have changed."""
         self.standing = self._standing()
 
     def info(self) -> bytes:
-        """What the controller says of itself; made once, however many ask between two ticks."""
+        """Return the encoded description of the controller, which is made at most once between two ticks."""
         now = self.controller.tick_number, self.standing
         if self._info[0] != now[0] or self._info[1] is not now[1]:
             self._info = *now, encode(info_of(self.controller))
         return self._info[2]
 
     def tick(self) -> None:
-        """One control period."""
+        """Compute one control period."""
         io = self.controller.changed_io()
         if io is not None:
             for sink in self._sinks:
@@ -131,7 +131,7 @@ class Host:
             self.publish()
 
     def warn(self, why: str) -> None:
-        """Tell clients of something outside the controller, whose replay knows nothing of it."""
+        """Send clients a warning about something outside the controller, which is not part of its replay."""
         event = Event(tick=self._next, kind="warning", why=why)
         for sink in self._sinks:
             sink.event(event)
@@ -141,7 +141,7 @@ class Host:
         return self.controller.tick_number + 1
 
     def _turned_away(self, refusal: Refused) -> Refused:
-        """Count a command that the controller never gets."""
+        """Count a command that was rejected before it reached the controller."""
         self.controller.counters.commands += 1
         self.controller.counters.refused += 1
         return refusal
@@ -151,7 +151,7 @@ class Host:
             sink.journal(entry)
 
     def receive_setpoint(self, setpoint: Setpoint | Unreadable) -> None:
-        """Take a set-point that was admitted."""
+        """Take an admitted set-point."""
         if isinstance(setpoint, Unreadable):
             if self._is_holders(setpoint):
                 self._note(Entry(tick=self._next, kind="setpoint_refused", why=setpoint.why))
@@ -170,7 +170,7 @@ class Host:
         return Standing(controller.session.lease, controller.basis, controller.stepping.hold)
 
     def _step(self, step: SimulationStep, attend: Attend | None) -> Done:
-        """Tick as often as a step says, or until its token lets time pass no longer."""
+        """Tick as often as a step says, or until its token no longer gives the right to advance time."""
         controller, setpoints = self.controller, iter(step.setpoints or ())
         motion_token = step.token if step.motion_token is None else step.motion_token
         self._stepping = True

@@ -1,4 +1,4 @@
-"""Streams of set-points: nothing is played from which no stop would be clear."""
+"""Collision check for streams of set-points: a reference is played only if a clear stop exists from it."""
 
 from collections.abc import Callable
 from functools import partial
@@ -12,25 +12,26 @@ from tvist_controller.stops import StopPlanner
 from tvist_controller.trajectory import JointStop, Way
 
 MARGIN = 0.8
-"""Share of the acceleration that the torque leaves where a stop begins, with which it is made: what it leaves changes
-on the way [-]."""
+"""Share of the acceleration that the torque permits at the start of a stop, which the stop uses, since the permitted
+acceleration changes on the way [-].
+"""
 FRESH = 8
-"""Ticks for which the acceleration that the torque leaves is taken for what it was: the margin covers what changes."""
+"""Number of ticks for which a computed permitted acceleration is reused; the margin covers its changes."""
 
 
 class LookAhead:
-    """Looks at the stop from the state of motion that a reference would lead to.
+    """Checks the stop from the state of motion that a reference would lead to.
 
-    As long as that stop is clear along its whole way, the reference may be played. Otherwise the stop from the state
-    before is made, which was looked at a tick ago: so there always is one that is clear.
+    As long as that stop is clear along its whole way, the reference may be played. Otherwise the stop from the
+    previous state is made. It was checked a tick earlier, so there is always a clear stop.
 
-    Where everything is far away a bound of the stop's way is enough: no point of the arm travels farther than the
-    angles turned times its reach. What room there is around a posture is remembered until it is used up.
+    If everything is far away, a bound of the stop's travel is enough: no point of the arm travels farther than the
+    turned angles times its reach. The free space around a posture is cached until it is used up.
 
     Args:
         collisions: Collision model of the arm.
-        stops: Plans stops.
-        room: What torque leaves.
+        stops: Planner of stops.
+        room: Acceleration that the torque permits.
     """
 
     def __init__(self, collisions: CollisionModel, stops: StopPlanner, room: StreamTorqueRoom) -> None:
@@ -41,7 +42,7 @@ class LookAhead:
         self._before: tuple[Target, Callable[[], JointStop]] | None = None
         self._acceleration, self._age = GENTLEST_STOP, FRESH
         self.met: Meeting | None = None
-        """What the reference that was refused last would have led to."""
+        """Meeting that the latest refused reference would have led to."""
 
     def begin(self, state: Target) -> None:
         """Start from rest."""
@@ -49,13 +50,13 @@ class LookAhead:
         self._acceleration, self._age = GENTLEST_STOP, FRESH
 
     def __call__(self, state: Target) -> JointStop | None:
-        """Whether a reference may be played.
+        """Decide whether a reference may be played.
 
         Args:
             state: State of motion that it would lead to.
 
         Returns:
-            None: it may. Otherwise the stop to be made instead, from the state before.
+            None if it may be played; otherwise the stop from the previous state, to be made instead.
         """
         found = self._permitted(state)
         if found is None:
@@ -64,16 +65,16 @@ class LookAhead:
         return None
 
     def take(self, state: Target, stop: JointStop) -> None:
-        """From now on this is the stop that is known to be clear, from the state of the newest reference."""
+        """Set the stop from the state of the newest reference, which is known to be clear."""
         self._before = state, lambda: stop
 
     def fallback(self) -> JointStop:
-        """The stop from the state of motion of the reference that was played last, which is known to be clear."""
+        """Return the stop from the state of the last reference played, which is known to be clear."""
         assert self._before is not None, "begin comes first"
         return self._before[1]()
 
     def clear(self, stop: JointStop) -> bool:
-        """Whether nothing meets on the whole way of a stop."""
+        """Return whether the whole way of a stop is clear."""
         q, qd, qdd = stop.at(0.0)
         if self.is_spacious(q, self.turned(qd, qdd, stop.acceleration)):
             return True
@@ -81,7 +82,7 @@ class LookAhead:
         return self.met is None
 
     def meeting(self, stop: JointStop) -> Meeting | None:
-        """The first pair that meets on the way of a stop."""
+        """Return the first pair of bodies that meets on the way of a stop."""
         _, qd, qdd = stop.at(0.0)
         turned = _fastest(qd, qdd, stop.jerk) * stop.duration
         before = None if self._before is None else self._before[0].q
@@ -90,11 +91,11 @@ class LookAhead:
         return None if found is None else found[1]
 
     def _within(self, state: Target, acceleration: float) -> Callable[[], JointStop]:
-        """Makes a stop, once it is wanted."""
+        """Return a function that makes the stop when it is needed."""
         return partial(self._stops.stop, state, acceleration)
 
     def _permitted(self, state: Target) -> Callable[[], JointStop] | None:
-        """Gives a stop that is clear; None where there is none."""
+        """Return a function that makes a clear stop; None if there is none."""
         self._age += 1
         if self._age <= FRESH and self._is_spacious_for(state):
             return self._within(state, self._acceleration)
@@ -110,7 +111,7 @@ class LookAhead:
         return self.is_spacious(state.q, self.turned(state.qd, state.qdd, self._acceleration))
 
     def is_spacious(self, q: Floats, turned: Floats) -> bool:
-        """Whether there is certainly room around q to turn the joints by so much."""
+        """Return whether the joints can certainly turn by these angles around q without a meeting."""
         collisions = self._collisions
         if self._carried is not collisions.carried:
             self._carried, self._centre = collisions.carried, None
@@ -122,13 +123,13 @@ class LookAhead:
         return way < self._room
 
     def turned(self, qd: Floats, qdd: Floats, acceleration: float, jerk: float | None = None) -> Floats:
-        """Upper bound of what each joint turns in a stop, shape (n,) [rad].
+        """Upper bound of the angle that each joint turns in a stop, shape (n,) [rad].
 
         Args:
-            qd: Velocities where it begins, shape (n,) [rad/s].
-            qdd: Accelerations there, shape (n,) [rad/s^2].
-            acceleration: Its limit [rad/s^2].
-            jerk: Its limit [rad/s^3]; None for that of the joints.
+            qd: Velocities at its start, shape (n,) [rad/s].
+            qdd: Accelerations at its start, shape (n,) [rad/s^2].
+            acceleration: Acceleration limit [rad/s^2].
+            jerk: Jerk limit [rad/s^3]; None for that of the joints.
         """
         jerk = self._stops.jerk if jerk is None else jerk
         fastest = _fastest(qd, qdd, jerk)
@@ -138,6 +139,6 @@ class LookAhead:
 
 
 def _fastest(qd: Floats, qdd: Floats, jerk: float) -> Floats:
-    """Upper bound of what each joint's velocity comes to until its acceleration is taken back [rad/s]."""
+    """Upper bound of each joint's velocity by the time its acceleration has been reduced to zero [rad/s]."""
     fastest: Floats = np.abs(qd) + qdd * qdd / (2.0 * jerk)
     return fastest

@@ -1,4 +1,4 @@
-"""The server in process: no network, no thread, no clock. Time passes when a client steps it."""
+"""The server within a process, without network, thread or clock. Time advances when a client steps it."""
 
 from collections.abc import Callable
 
@@ -14,25 +14,25 @@ from tvist_protocol.stream import Event, State, Truth
 
 
 class LoopbackHost(Sink):
-    """A robot in the caller's own thread, as fast as it computes. Every message still goes through the codec.
+    """A robot in the caller's own thread, as fast as it computes. Every message still passes through the codec.
 
     Args:
-        setup: How the controller starts; its clock should be `free` or `lockstep`.
-        plant: What the controller moves; None: the flexible arm that the setup describes.
+        setup: Initial setup; its clock should be `free` or `lockstep`.
+        plant: Plant to control; None for the flexible arm of the setup.
 
     Raises:
-        ValueError: The setup is wrong, or the plant does not fit it.
+        ValueError: The setup is invalid, or the plant does not fit it.
     """
 
     def __init__(self, setup: Setup, plant: Plant | None = None) -> None:
         self.controller = Controller(setup, plant)
         self.entries: list[Entry] = []
-        """What reached the controller: with the setup, all that a replay needs."""
+        """Inputs of the controller; together with the setup, all that a replay needs."""
         self._host = Host(self.controller, self)
         self._callbacks: dict[Topic, list[Callable[[bytes], object]]] = {}
 
     def request(self, client: str, data: bytes) -> bytes:  # noqa: ARG002  the network does not name its clients either
-        """Carry out a command; its encoded reply."""
+        """Carry out a command and return the encoded reply."""
         return encode(self._host.request(data))
 
     def put_setpoint(self, client: str, data: bytes) -> None:  # noqa: ARG002
@@ -40,11 +40,11 @@ class LoopbackHost(Sink):
         self._host.setpoint(data)
 
     def info(self) -> bytes:
-        """What the controller says of itself."""
+        """Return the encoded description of the controller."""
         return self._host.info()
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], object]) -> Callable[[], None]:
-        """Have every message of a topic, first of all the present state or io; the function returned ends that."""
+        """Call a function for each message of a topic, first the present state or io; return how to end this."""
         callbacks = self._callbacks.setdefault(topic, [])
         callbacks.append(callback)
         if topic == "state":
@@ -54,23 +54,23 @@ class LoopbackHost(Sink):
         return lambda: callbacks.remove(callback)
 
     def state(self, state: State) -> None:
-        """Hand on a state."""
+        """Pass on a state."""
         self._put("state", state)
 
     def event(self, event: Event) -> None:
-        """Hand on an event."""
+        """Pass on an event."""
         self._put("event", event)
 
     def truth(self, truth: Truth) -> None:
-        """Hand on what no robot can know."""
+        """Pass on what a real robot cannot measure."""
         self._put("truth", truth)
 
     def io(self, io: Io) -> None:
-        """Hand on inputs, outputs and registers."""
+        """Pass on inputs, outputs and registers."""
         self._put("io", io)
 
     def journal(self, entry: Entry) -> None:
-        """Keep an entry."""
+        """Store an entry."""
         self.entries.append(entry)
 
     def _put(self, topic: Topic, message: State | Event | Truth | Io) -> None:

@@ -1,4 +1,4 @@
-"""Source of a filter's modes: makes an estimator for any number of modes and for a payload."""
+"""Source of a filter's modes: creates an estimator for any payload and number of modes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ SourceName = Literal["fixed", "polynomial", "modal"]
 
 @dataclass(frozen=True)
 class ModeSource:
-    """An estimator that was chosen."""
+    """A chosen estimator with its parameters."""
 
     name: SourceName
     """Name on the wire."""
@@ -35,27 +35,27 @@ class ModeSource:
 
     @property
     def knows_payload(self) -> bool:
-        """Whether another payload makes other modes."""
+        """Whether the modes depend on the payload."""
         return self.name == "modal"
 
     @cached_property
     def fits_arm(self) -> bool | None:
-        """Whether the calibration was measured on the arm that the robot file describes; None: it does not say."""
+        """Whether the calibration was measured on the arm of the robot file; None if the calibration does not say."""
         measured = None if self.calibration is None else self.calibration.provenance.arm
         return None if measured is None else measured == fingerprint(self.description)
 
     @property
     def most(self) -> int:
-        """Largest number of modes that it can give."""
+        """Largest number of modes."""
         if self.name == "modal":
             return self.description.joints + 2 * len(self.description.link_flexibility.links)
         return len(self.f_d) if self.name == "fixed" else 1
 
     def estimator(self, modes: int, payload: Payload) -> Estimator:
-        """The lowest modes with a payload.
+        """Return an estimator of the lowest modes with a payload.
 
         Raises:
-            EstimatorError: There are not so many, or the calibration is not of this arm.
+            EstimatorError: There are fewer modes, or the calibration belongs to another arm.
         """
         if modes > self.most:
             raise EstimatorError("modes", modes, f"at most {self.most}, which the estimator {self.name} has")
@@ -67,7 +67,7 @@ class ModeSource:
 
 
 def first_source(description: RobotDescription, calibration: Calibration | None) -> ModeSource:
-    """What a robot starts with; without a calibration it is still to be identified."""
+    """Return a robot's initial source of modes; without a calibration the robot is yet to be identified."""
     if calibration is None:
         return ModeSource("fixed", description, f_d=(10.0,), zeta=(0.2,))
     name: SourceName = "modal" if calibration.polynomial is None else "polynomial"
@@ -75,14 +75,15 @@ def first_source(description: RobotDescription, calibration: Calibration | None)
 
 
 def modal_source(description: RobotDescription, calibration: Calibration | None) -> ModeSource | None:
-    """The estimator `modal` of a robot: of its own calibration, or of one that comes with the package.
+    """Return the source `modal` of a robot, from its own calibration or from one that comes with the package.
 
     Args:
         description: The robot.
-        calibration: Its own; None: it is still to be identified, and nothing that comes with the package is its own.
+        calibration: Calibration of the robot; None if it is yet to be identified, when no calibration of the package
+            is used.
 
     Returns:
-        None where there is none.
+        None if there is no modal model.
     """
     if calibration is None:
         return None

@@ -1,6 +1,6 @@
-"""What the robot is doing: motions by their numbers, streams of set-points, stops, power and protective stops.
+"""The robot's activities: motions by number, streams of set-points, stops, power and protective stops.
 
-`tvist_protocol.transitions` says what leads where; here it is done.
+`tvist_protocol.transitions` defines which trigger leads to which activity; this module carries the transitions out.
 """
 
 from typing import Unpack
@@ -32,13 +32,13 @@ from tvist_protocol.values import ResetMode
 
 
 class MotionControl:
-    """Starts, watches and ends motion on the control line. Every motion's number ends in one of done and stopped.
+    """Starts, monitors and ends motion on the control line. Each motion's number ends in either done or stopped.
 
     Args:
         cycle: The control line.
         collisions: Collision model of the arm.
-        emit: Takes what happens.
-        mode: Robot mode to start in.
+        emit: Emits events.
+        mode: Initial robot mode.
     """
 
     def __init__(
@@ -47,23 +47,23 @@ class MotionControl:
         self.cycle = cycle
         self.collisions = collisions
         self.activity = PUT[mode]
-        """What the robot is doing."""
+        """Present activity of the robot."""
         self.safety = SafetySystem()
-        """What the safety system allows."""
+        """The safety system."""
         self._emit = emit
         self.outlook = Outlook(cycle)
-        """What the control line is going to do."""
+        """Forecast of the control line's motion."""
         self.ahead = WayAhead(cycle, self.outlook, collisions)
-        """What would meet on its way."""
+        """Collision check of that motion."""
         self._protection = Protection(cycle)
         self.motions = Motions(cycle, self.safety, emit)
-        """Point-to-point motions, and their speed."""
+        """Point-to-point motions and their speed."""
         self.streams = Streaming()
-        """The stream of set-points that is followed, where there is one."""
+        """The present stream of set-points, if there is one."""
 
     @property
     def streaming(self) -> bool:
-        """Whether a stream of set-points is followed."""
+        """Whether the robot follows a stream of set-points."""
         return self.streams.stream is not None
 
     def check_move(self) -> None:
@@ -76,14 +76,14 @@ class MotionControl:
 
     @property
     def may_move(self) -> bool:
-        """Whether what the robot is doing lets a point-to-point motion begin."""
+        """Whether a point-to-point motion may begin in the present activity."""
         return after(self.activity, "move_j") is not None
 
     def basis(self, on: FilterBasis) -> MotionBasis | None:
-        """What a point-to-point motion from here depends on; None where the arm is busy or without power.
+        """What a point-to-point motion from here depends on; None if the arm is busy or without power.
 
         Args:
-            on: The present filter.
+            on: Basis of the present filter.
         """
         if not self.may_move:
             return None
@@ -99,7 +99,7 @@ class MotionControl:
         )
 
     def move(self, planned: PlannedMove) -> int:
-        """Start a point-to-point motion that was planned on what is so now; its number.
+        """Start a point-to-point motion whose plan holds for the present state; return its number.
 
         Raises:
             RefusalError: See `check_move`.
@@ -108,19 +108,19 @@ class MotionControl:
         return self.motions.begin(planned)
 
     def pause(self) -> None:
-        """Bring the motion to a standstill on its way; one that is about to end anyway goes on to its end.
+        """Bring the motion to a standstill on its path; one that is about to end continues to its end.
 
         Raises:
-            RefusalError: None is running.
+            RefusalError: No motion is running.
         """
         self._go("pause")
         self.motions.hold()
 
     def resume(self) -> None:
-        """Go on with a motion that was paused.
+        """Resume a paused motion.
 
         Raises:
-            RefusalError: None is.
+            RefusalError: No motion is paused.
         """
         self._go("resume")
         self.motions.release()
@@ -132,25 +132,25 @@ class MotionControl:
 
     @property
     def safety_mode(self) -> SafetyMode:
-        """What the safety system allows."""
+        """Present safety mode."""
         return self.safety.mode(self.activity)
 
     def power_on(self, *, release_brakes: bool = True) -> None:
         """Power the arm and release its brakes.
 
         Args:
-            release_brakes: False: leave the brakes of an arm without power.
+            release_brakes: False to leave the brakes of an arm without power closed.
 
         Raises:
-            RefusalError: It moves, or is in a protective stop.
+            RefusalError: The arm is moving, or is in a protective stop.
         """
         self._go("power_on" if release_brakes else "power")
 
     def brake(self, why: str) -> None:
-        """Stop by category 0: the power is gone, and the brakes close at once.
+        """Stop with category 0: the power is off, and the brakes close at once.
 
         Args:
-            why: The reason, for a person.
+            why: The reason, for people.
         """
         target, plan, cycle = after(self.activity, "brakes"), None, self.cycle
         if target is not None:
@@ -163,28 +163,28 @@ class MotionControl:
         self._tell_end(plan, why, None, "safety_stop", 0)
 
     def protect(self, why: str, code: Code | None = None) -> None:
-        """Make a protective stop; nothing happens where the brakes hold the arm or power is on its way out."""
+        """Make a protective stop; do nothing if the brakes hold the arm or its power is being switched off."""
         if after(self.activity, "protective_stop") is not None:
             self.end("protective_stop", why, code, kind="protective_stop")
 
     def unlock(self) -> None:
-        """Leave a protective stop.
+        """Unlock a protective stop.
 
         Raises:
-            RefusalError: There is none, or the arm is still stopping.
+            RefusalError: There is no protective stop, or the arm is still stopping.
         """
         self._go("unlock_protective_stop")
         self._protection.forget()
 
     def recover(self, error: PlantError, seed: int) -> Sample:
-        """Put an arm whose state was no longer finite at rest where its reference was, in a protective stop.
+        """Place an arm whose state has become non-finite at rest at its reference, in a protective stop.
 
         Args:
-            error: What the arm said.
+            error: The plant's error.
             seed: Seed of the noise and gear errors.
 
         Returns:
-            A tick of the line with it.
+            A tick of the line with the new state.
         """
         why = f"{error}: the simulation put the arm at rest at its reference"
         self.abandon(why, "plant_failure")
@@ -196,10 +196,10 @@ class MotionControl:
         return self.cycle.step()
 
     def _check(self, trigger: str) -> Activity:
-        """What a trigger leads to.
+        """Return the activity that a trigger leads to.
 
         Raises:
-            RefusalError: Nowhere, from here.
+            RefusalError: The trigger is not allowed in the present activity.
         """
         target = after(self.activity, trigger)
         if target is None:
@@ -214,7 +214,7 @@ class MotionControl:
         """Start to follow set-points.
 
         Raises:
-            RefusalError: The arm is busy, or such a stream may be too fast.
+            RefusalError: The arm is busy, or the velocity limit is above that of reduced speed.
         """
         target = self._check("servo_start")
         most = self.motions.slowest
@@ -229,7 +229,7 @@ class MotionControl:
         """Bring the stream to rest through the filter.
 
         Raises:
-            RefusalError: None is running.
+            RefusalError: No stream is running.
         """
         stream = self.streams.stream
         if stream is None:
@@ -244,17 +244,17 @@ class MotionControl:
         self._end_stream("servo_stop")
 
     def stop(self, deceleration: float | None, why: str, code: Code | None = None) -> None:
-        """Stop past the filter, and say how what was moving ended.
+        """Stop without the filter, and report how the present motion ended.
 
         Args:
-            deceleration: Wanted limit [rad/s^2]; None for what the torque allows.
-            why: The reason, for a person.
-            code: The reason, for a program.
+            deceleration: Requested limit [rad/s^2]; None for what the torque permits.
+            why: The reason, for people.
+            code: The reason, for programs.
         """
         self.end("stop", why, code, deceleration)
 
     def interrupt(self, why: str, code: Code | None = None) -> None:
-        """End motion that may not go on, as `stop` does."""
+        """End motion that may not continue, in the same way as `stop`."""
         self.end("interruption", why, code)
 
     def end(
@@ -267,13 +267,13 @@ class MotionControl:
         kind: EventKind | None = None,
         category: int = 2,
     ) -> None:
-        """Go where a trigger leads, and stop on the way what moves. One that leads nowhere is none of ours.
+        """Carry out a trigger's transition, and stop any motion. Nothing happens if the trigger leads nowhere.
 
         Args:
             trigger: Trigger of the table of transitions.
-            why: The reason, for a person.
-            code: The reason, for a program.
-            deceleration: Wanted limit [rad/s^2]; None for what the torque allows.
+            why: The reason, for people.
+            code: The reason, for programs.
+            deceleration: Requested limit [rad/s^2]; None for what the torque permits.
             kind: Kind of the event that reports the stop; None for no event.
             category: Category of the stop.
         """
@@ -285,7 +285,7 @@ class MotionControl:
         if plan is not None and plan.limited:
             kept = "the motion's own" if plan.acceleration is None else f"{plan.acceleration:.3g} rad/s²"
             why = f"{why}; deceleration is {kept}, limited from {deceleration:.3g}"
-        bare = not self.motions.running  # what has no number ends without a word on limits
+        bare = not self.motions.running  # the end of a numbered motion reports the limit itself
         self._tell_end(plan, why, code, kind, category)
         if bare and plan is not None and plan.limited:
             self._emit("warning", code="limit_acceleration", why=why)
@@ -293,7 +293,7 @@ class MotionControl:
     def _tell_end(
         self, plan: StopPlan | None, why: str, code: Code | None, kind: EventKind | None, category: int
     ) -> None:
-        """Tell of a stop, and of what it has ended."""
+        """Report a stop and what it has ended."""
         if kind is None and not self.motions.running and not self.streaming:
             return
         duration, way = (0.0, 0.0) if self.cycle.at_rest else self.ahead.until_rest(plan)
@@ -304,12 +304,12 @@ class MotionControl:
         self.motions.stopped(why, code, **told)
 
     def abandon(self, why: str, code: Code | None = None) -> None:
-        """Say that what was moving ended: the arm is put elsewhere."""
+        """Report that the present motion ended because the arm is placed elsewhere."""
         self._end_stream(why, code)
         self.motions.stopped(why, code)
 
     def put(self, mode: ResetMode | None) -> None:
-        """Be in a robot mode; None: in the present one, at rest. The arm was put somewhere at rest before."""
+        """Set the robot mode of an arm that was placed somewhere at rest; None for the present mode, at rest."""
         if mode is not None:
             self.activity = PUT[mode]
             self.safety.clear()
@@ -318,16 +318,16 @@ class MotionControl:
         self._protection.forget()
 
     def watch(self, now: float) -> None:
-        """End a stream that nobody keeps up."""
+        """End a stream that is no longer fed."""
         silence = self.streams.silence(now)
         if silence is not None:
             self.interrupt(silence)
 
     def step(self) -> Sample:
-        """One tick of the line.
+        """Compute one tick of the line.
 
         Raises:
-            PlantError: The arm's state is no longer finite: `recover`.
+            PlantError: The arm's state is no longer finite; call `recover`.
         """
         sample = self.cycle.step()
         stream = self.streams.stream

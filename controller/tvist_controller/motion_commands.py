@@ -11,12 +11,12 @@ from tvist_protocol.replies import Accepted, Reply
 
 
 class MotionCommands:
-    """What clients may ask of motion.
+    """Handlers of the commands for motion.
 
     Args:
-        motion: What the robot is doing.
-        safety: What its safety system does.
-        programs: The program, which no stop and no loss of power lets go on.
+        motion: The robot's motion.
+        safety: Carries out the safety system's stops.
+        programs: The program, which ends with every stop and loss of power.
     """
 
     def __init__(self, motion: MotionControl, safety: SafetyControl, programs: ProgramPlayer) -> None:

@@ -1,4 +1,4 @@
-"""Point-to-point motions by their numbers, and the speed at which they go."""
+"""Point-to-point motions by number, and their speed."""
 
 from typing import Unpack
 
@@ -12,12 +12,12 @@ from tvist_protocol.replies import Code
 
 
 class Motions:
-    """Starts motions, one at a time; every number ends in one of done and stopped.
+    """Starts motions, one at a time; each number ends in either done or stopped.
 
     Args:
         cycle: The control line.
-        safety: What the safety system allows.
-        emit: Takes what happens.
+        safety: The safety system.
+        emit: Emits events.
     """
 
     def __init__(self, cycle: ControlCycle, safety: SafetySystem, emit: Emit) -> None:
@@ -26,16 +26,16 @@ class Motions:
         self._started = 0
         self._move: RunningMove | None = None
         self.wanted_speed = 1.0
-        """What the speed was set to [-]."""
+        """Speed that was set [-]."""
 
     @property
     def running(self) -> bool:
-        """Whether one has not ended."""
+        """Whether a motion is running."""
         return self._move is not None
 
     @property
     def speed(self) -> float:
-        """Rate of the running motion's time; without one, that of the next [-]."""
+        """Rate of the running motion's time; without one, that of the next motion [-]."""
         return self.wanted_speed if self._move is None else self._move.rate
 
     @property
@@ -44,7 +44,7 @@ class Motions:
         return self._reduced_velocity if self._safety.reduced else None
 
     def begin(self, planned: PlannedMove) -> int:
-        """Start a motion; its number."""
+        """Start a motion and return its number."""
         trajectory = planned.trajectory
         self._cycle.start(trajectory)
         self._cycle.tvist.aim(trajectory.path.end)
@@ -56,37 +56,37 @@ class Motions:
         return move.number
 
     def set_speed(self, fraction: float) -> None:
-        """Scale the time of the motion that runs and of those to come."""
+        """Scale the time of the running motion and of later ones."""
         self.wanted_speed = fraction
         self.keep_rate()
 
     def keep_rate(self) -> None:
-        """Let the motion that runs go at the rate that is set and allowed."""
+        """Let the running motion continue at the rate that is set and allowed."""
         if self._move is not None:
             self._move.go(self._rate(self._move))
 
     def hold(self) -> None:
-        """Bring the motion to a standstill on its way."""
+        """Bring the motion to a standstill on its path."""
         if self._move is not None:
             self._move.hold()
 
     def release(self) -> None:
-        """Go on with it."""
+        """Resume the motion."""
         if self._move is not None:
             self._move.release(self._rate(self._move))
 
     def done(self) -> None:
-        """The shaped reference rests at the motion's target."""
+        """Report that the shaped reference has come to rest at the motion's target."""
         if self._move is not None:
             self._emit("motion_done", id=self._move.number)
             self._move = None
 
     def stopped(self, why: str, code: Code | None, **told: Unpack[Told]) -> None:
-        """The motion ends before its target."""
+        """Report that the motion ended before its target."""
         if self._move is not None:
             self._emit("motion_stopped", id=self._move.number, code=code, why=why, **told)
             self._move = None
 
     def _rate(self, move: RunningMove) -> float:
-        """Rate for the time of a motion [-]."""
+        """Rate of a motion's time [-]."""
         return rate_of(self.wanted_speed, move.velocity, self.slowest)

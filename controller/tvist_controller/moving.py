@@ -1,4 +1,4 @@
-"""A point-to-point motion that is under way: its rate and its pause."""
+"""A point-to-point motion in progress: its rate and its pause."""
 
 import numpy as np
 
@@ -7,18 +7,18 @@ from tvist_controller.safety import acceleration_on_way
 from tvist_controller.trajectory import PlannedMotion
 
 PAUSE_SHARE = 0.95
-"""Share of the acceleration that torque leaves on the way that a pause uses: the filter may add a little [-]."""
+"""Share of the acceleration permitted by the torque that a pause uses, since the filter may add a little [-]."""
 LEAST_PAUSE = 0.2
-"""Share of a motion's acceleration that torque must leave to a pause; otherwise the motion runs to its end [-]."""
+"""Smallest share of a motion's acceleration that the torque must permit for a pause; else the motion runs on [-]."""
 
 
 class RunningMove:
     """One motion.
 
     Args:
-        number: Its id.
-        trajectory: Its reference, just started on the line.
-        velocity: Limit that was asked for [rad/s].
+        number: Number of the motion.
+        trajectory: Its trajectory, which has just been started on the line.
+        velocity: Requested velocity limit [rad/s].
         cycle: The control line.
     """
 
@@ -29,16 +29,16 @@ class RunningMove:
 
     @property
     def rate(self) -> float:
-        """At which its time goes [-]."""
+        """Rate of its time [-]."""
         return self._trajectory.rate
 
     def go(self, rate: float) -> None:
-        """Change the rate [-]; a motion that is held by a pause stays so."""
+        """Change the rate [-], unless the motion is paused."""
         if not self._held:
             self._trajectory.speed = rate
 
     def hold(self) -> None:
-        """Slow down to a standstill within the torque, where that ends it sooner; see `PlannedMotion.hold`."""
+        """Slow down to a standstill within the torque limits, if that takes less time; see `PlannedMotion.hold`."""
         if self._held:
             return
         trajectory, cycle = self._trajectory, self._cycle
@@ -52,12 +52,12 @@ class RunningMove:
         room = PAUSE_SHARE * acceleration_on_way(
             cycle.inverse_dynamics, trajectory.path, newest.q, way, speed, limits
         )
-        if not trajectory.steady:  # the slider has it brake or hurry already, with all that it may
+        if not trajectory.steady:  # the slider is changing its speed already, and may use all
             room = most
         self._held = room > LEAST_PAUSE * most and trajectory.hold(min(room, most))
 
     def release(self, rate: float) -> None:
-        """Go on after a pause, at a rate [-]."""
+        """Resume after a pause, at a rate [-]."""
         if self._held:
             self._trajectory.release(rate)
         self._held = False

@@ -1,4 +1,4 @@
-"""What the control line is going to do, and the quickest way to end it."""
+"""Forecast of the control line's motion, and the quickest way to end it."""
 
 import math
 from dataclasses import replace
@@ -14,7 +14,7 @@ from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
 EVEN = 1e-12
-"""Differences of steps below this are rounding [rad]."""
+"""Differences between steps below this are rounding errors [rad]."""
 
 
 def _anywhere(_: JointStop) -> bool:
@@ -31,26 +31,26 @@ class Outlook:
     def __init__(self, cycle: ControlCycle) -> None:
         self._cycle = cycle
         self.stops = StopPlanner(cycle.description, cycle.inverse_dynamics, PERIOD)
-        """Plans stops."""
+        """Planner of stops."""
         self._wanted = math.inf
 
     def foresee(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Floats | None:
-        """Run the references ahead: what they will be if nothing is commanded.
+        """Simulate the future references that follow if no command comes.
 
         Args:
-            tvist: A filter to change to now; None for no change. A stop bypasses any.
-            trajectory: One to follow from now on; None for the present one.
+            tvist: A filter to change to now; None for no change. Stops bypass every filter.
+            trajectory: A trajectory to follow from now on; None for the present one.
 
         Returns:
-            The two shaped references played last and those to come until they rest, one a tick, shape (k, n) [rad];
-            None where that takes more than `MAX_AHEAD` ticks.
+            The last two shaped references played and the future ones until they come to rest, one for each tick,
+            shape (k, n) [rad]; None if that takes more than `MAX_AHEAD` ticks.
         """
         ahead = self._ahead(tvist, trajectory)
         ahead.until(MAX_AHEAD)
         return np.array(ahead.references) if ahead.rests else None
 
     def _ahead(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Ahead:
-        """Start a simulation like that of `foresee`, to be run as far as needed."""
+        """Start a simulation as in `foresee`, which the caller runs as far as needed."""
         stopping = self._cycle.stopping
         present, line_filter, shaped = self._cycle.fork()
         trajectory = present if trajectory is None else trajectory.fork()
@@ -59,17 +59,17 @@ class Outlook:
         return Ahead(trajectory, None if stopping else line_filter, shaped)
 
     def stop(self, deceleration: float | None) -> StopPlan | None:
-        """Come to rest as soon as is permitted.
+        """Come to rest as quickly as permitted.
 
-        A motion stays on its way, never further along it than if it had not been stopped, and rests no later.
-        Where no stop does that within the torque, the motion runs out through the filter. A stream, whose way is
-        its client's, stops clear of everything.
+        A motion stays on its path, is at no time ahead of the uninterrupted motion, and comes to rest no later than
+        it. If no stop within the torque limits does that, the motion runs out through the filter. A stream, whose
+        path is its client's, stops clear of all bodies.
 
         Args:
-            deceleration: Wanted limit [rad/s^2]; None for what the torque allows.
+            deceleration: Requested limit [rad/s^2]; None for what the torque permits.
 
         Returns:
-            What is done; None where a stop under way is as quick already, and goes on.
+            The stop; None if a stop that is already in progress is as quick, and continues.
         """
         cycle, wanted = self._cycle, math.inf if deceleration is None else deceleration
         if (cycle.stopping or cycle.running_out) and wanted <= self._wanted:
@@ -85,12 +85,12 @@ class Outlook:
         return plan
 
     def brake(self, trajectory: Trajectory) -> None:
-        """Follow the arm while its brakes bring it to rest; no stop takes their place."""
+        """Follow the arm while its brakes bring it to rest; no stop replaces this."""
         self._cycle.bypass(trajectory)
         self._wanted = math.inf
 
     def plan_stop(self, deceleration: float | None) -> StopPlan | None:
-        """The quickest permitted stop from here; as `stop`, but nothing is done."""
+        """Return the quickest permitted stop from the present state, without starting it; see `stop`."""
         forecast = self._cycle.trajectory.forecast
         return self._by_joints(deceleration) if forecast is None else self._on_path(forecast, deceleration)
 
@@ -99,7 +99,7 @@ class Outlook:
         stop = self.stops.by_joints(cycle.newest, deceleration, _anywhere if guard is None else guard.clear)
         if cycle.stopping and (stop is None or stop.acceleration <= present.acceleration):
             return None
-        if stop is None:  # none is clear and keeps the torque
+        if stop is None:  # no stop is clear and within the torque limits
             hardest = self.stops.highest
             stop = self.stops.stop(cycle.newest, hardest) if guard is None else guard.fallback()
         return self._plan(stop, deceleration, stop.duration, stop.end)
@@ -112,12 +112,12 @@ class Outlook:
         ahead = None
         if stop is None:
             ahead = self._ahead()
-            # What goes no way back need be run ahead no further than a stop lasts.
+            # A motion that cannot turn back has to be simulated only for as long as a stop lasts.
             ahead.until(MAX_AHEAD if forecast.turns else 0)
             stop = self.stops.under(ahead, state, forecast, deceleration)
         if stop is None and ahead is not None:
             ahead.until(MAX_AHEAD)
-            if not ahead.rests:  # it lasts for so long that any stop is sooner
+            if not ahead.rests:  # it lasts so long that any stop is sooner
                 stop = self.stops.on_path(state, newest, forecast, deceleration, certain=False)
             else:
                 last, asked = ahead.last, self.stops.asked(np.array(ahead.references))
@@ -135,13 +135,13 @@ class Outlook:
         return StopPlan(stop, kept, wanted is not None and kept != wanted, max(duration, 0.0), way)
 
     def _shaped(self, forecast: Forecast) -> Forecast:
-        """What is known of a motion after the filter."""
+        """Return the forecast of a motion after the filter."""
         cycle = self._cycle
         if cycle.stopping:
             return forecast
         peak, direction = cycle.line_filter.peak, forecast.path.direction
         known = peak == 1.0 and not cycle.line_filter.fading and forecast.steady > 0.0
-        if known:  # the filter gives back late what it was given, also how it was slowed down before
+        if known:  # the filter's output is delayed, so it still contains earlier decelerations
             steps = np.diff(cycle.line_filter.window() @ direction)
             known = bool((np.diff(steps) >= -EVEN * float(direction @ direction)).all())
         return replace(

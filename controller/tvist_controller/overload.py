@@ -1,4 +1,4 @@
-"""Drives that give more torque than they should."""
+"""Detection of drives whose torque exceeds their limits."""
 
 from collections.abc import Sequence
 
@@ -8,12 +8,12 @@ from tvist_controller.control.differentiator import Floats
 from tvist_plant.plant import PERIOD
 
 ALLOWED = 0.01
-"""How long a drive may be beyond its limit [s]."""
+"""How long a drive may exceed its limit [s]."""
 TICKS = round(ALLOWED / PERIOD)
 
 
 class Overload:
-    """Finds a joint whose drive has been beyond its torque limit for longer than `ALLOWED`.
+    """Finds a joint whose drive has exceeded its torque limit for longer than `ALLOWED`.
 
     Args:
         limits: Largest torque of each joint, shape (n,) [N m].
@@ -25,13 +25,13 @@ class Overload:
         self._any = False
 
     def joint(self, moment: Floats) -> int | None:
-        """The joint with the longest excess that is too long, after one more tick; None: there is none.
+        """Take one more tick and return the joint with the longest excess, if it is too long; else None.
 
         Args:
             moment: Total torque of each drive, shape (n,) [N m].
         """
         beyond = np.abs(moment) > self.limits
-        if not np.count_nonzero(beyond):  # a good deal faster than any()
+        if not np.count_nonzero(beyond):  # much faster than any()
             if self._any:
                 self.forget()
             return None
@@ -41,6 +41,6 @@ class Overload:
         return joint if self._beyond[joint] > TICKS else None
 
     def forget(self) -> None:
-        """Begin to count anew."""
+        """Restart the count."""
         self._beyond[:] = 0
         self._any = False

@@ -1,4 +1,4 @@
-"""Whether the arm carries what was declared, by what its drives have to add to the torque fed forward."""
+"""Detection of a wrong declared payload, from the torque that the drives' feedback adds to the feed-forward."""
 
 import numpy as np
 import pinocchio as pin
@@ -10,53 +10,54 @@ from tvist_plant.model import FLANGE, rigid_model
 from tvist_plant.plant import PERIOD
 
 EVERY = 10
-"""Ticks that are averaged before they are looked at."""
+"""Number of ticks that are averaged into one measurement."""
 MEMORY = 2.0
-"""Time in which what was seen fades to 1/e [s]: many periods of a vibration."""
+"""Time in which the weight of a measurement decays to 1/e [s]; many periods of a vibration."""
 ENOUGH = 1.0
-"""Time that has to be seen before a judgement [s]."""
+"""Observation time required for a judgement [s]."""
 TOLERATED = 0.5
-"""Mass that a declaration may be wrong by [kg]."""
+"""Error of the declared mass that is tolerated [kg]."""
 FRICTION = 0.4
-"""Share of the Coulomb friction that may be unknown in each joint, with whatever sign is worst [-]."""
+"""Share of the Coulomb friction that may be unknown in each joint, with the worst sign [-]."""
 
 
 class PayloadMonitor:
-    """Compares the payload that is felt with the one declared, in motion and at rest.
+    """Compares the payload that the drives feel with the declared one, in motion and at rest.
 
-    What a drive's feedback adds to the torque fed forward is what the model does not know. A mass μ too much adds
-    y(q, q̇, q̈) μ, with y the torque for 1 kg where the declared payload's centre is. So over some time
+    The torque that a drive's feedback adds to the feed-forward is what the model does not explain. A mass error μ
+    adds y(q, q̇, q̈) μ, with y the torque for 1 kg at the declared payload's centre of mass. Over some time, the
+    estimate is
 
         μ = Σ yᵀ W r / Σ yᵀ W y,   W = diag(1/F²),      |error of μ| <= Σ_j Σ |y_j| W_j φ F_j / Σ yᵀ W y
 
-    the latter whatever the friction that is not known, up to φF in each joint, does to it. Vibrations have no mean,
-    so they do not count for long. A warning needs a μ that friction and an honest inaccuracy together do not explain:
-    upright, where gravity has no lever, there is none.
+    where the bound covers any unknown friction of up to φF in each joint. Vibrations have zero mean and cancel out. A
+    warning requires that μ exceed what friction and the tolerated error of the declaration explain together. In an
+    upright posture, where gravity has no lever arm, there is therefore no warning.
 
-    A frequency that is off would show it, too, but only where the arm rings, and less: 3 kg of 5 change the
-    frequency by a fifth and the shoulder's torque by half.
+    A deviating frequency would show the error too, but only while the arm vibrates, and less clearly: 3 kg instead of
+    5 kg change the frequency by a fifth and the shoulder's torque by half.
 
     Args:
         description: The robot.
-        declared: What the controller believes that the arm carries.
+        declared: Declared payload.
     """
 
     def __init__(self, description: RobotDescription, declared: Payload) -> None:
         self._model = rigid_model(description, Payload())
-        for number in range(self._model.njoints):  # what is left weighs nothing but the kilogram
+        for number in range(self._model.njoints):  # only the kilogram has mass in this model
             self._model.inertias[number] = pin.Inertia.Zero()
         flange = self._model.frames[self._model.getFrameId(FLANGE)]
         self._last, self._placement = flange.parentJoint, flange.placement
         self._data = self._model.createData()
         self._friction = np.array(description.drives.coulomb_friction)
-        # A joint without friction would count for everything.
+        # Without this floor, a joint without friction would dominate the estimate.
         self._friction = np.maximum(self._friction, 0.01 * np.array(description.limits.torque))
         self._weight = self._friction**-2
         self._fade = float(np.exp(-EVERY * PERIOD / MEMORY))
         self.declare(declared)
 
     def declare(self, payload: Payload) -> None:
-        """Something else is declared: forget what was seen, and wait until it is in force."""
+        """Set another declared payload: discard past measurements, and wait until it is fully phased in."""
         self.payload = payload
         kilogram = pin.Inertia(1.0, np.array(payload.com), np.zeros((3, 3)))
         self._model.inertias[self._last] = self._placement.act(kilogram)
@@ -64,7 +65,7 @@ class PayloadMonitor:
         self._wait = SLEW
 
     def reset(self) -> None:
-        """Forget what was seen: the arm was put elsewhere, its power was off, or something pushed it."""
+        """Discard past measurements, since the arm was placed elsewhere, its power was off, or something pushed it."""
         self._wait = 0
         self._ticks, self._sum = 0, np.zeros(len(self._friction))
         self._time = self._yy = self._yr = self._bound = 0.0
@@ -72,21 +73,22 @@ class PayloadMonitor:
 
     @property
     def excess(self) -> tuple[float, float]:
-        """Mass felt beyond the declared one, and how much of that friction may be [kg]; the latter may be infinite."""
+        """Estimated mass error of the declaration, and its bound from friction, which may be infinite [kg]."""
         if self._yy <= 0.0:
             return 0.0, np.inf
         return self._yr / self._yy, self._bound / self._yy
 
     def update(self, target: Target, expected: Floats, moment: Floats) -> str | None:
-        """Look at one tick, while the drives hold the arm.
+        """Take one tick in which the drives hold the arm.
 
         Args:
-            target: Shaped reference of the tick.
-            expected: Torque fed forward for it, rotors and friction included, shape (n,) [N m].
+            target: Shaped reference at the tick.
+            expected: Feed-forward torque for it, with rotors and friction, shape (n,) [N m].
             moment: Motor torques measured at the end of the tick, shape (n,) [N m].
 
         Returns:
-            A sentence, once: the payload declared cannot be right. Then None until another one is declared.
+            Once, a sentence saying that the declared payload cannot be right; otherwise None, until another is
+            declared.
         """
         if self._wait > 0:
             self._wait -= 1

@@ -1,4 +1,4 @@
-"""Terminals, registers and tool centre point of a robot: what commands set there, and what is told of it."""
+"""Terminals, registers and tool centre point of a robot: set by commands, and published as `Io`."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol
@@ -20,27 +20,27 @@ from tvist_protocol.programs import ProgramState
 from tvist_protocol.values import Payload
 
 CURRENT = (0.004, 0.020)
-"""Range of an analogue terminal as current [A]."""
+"""Range of an analogue terminal as a current [A]."""
 VOLTAGE = (0.0, 10.0)
-"""Range as voltage [V]."""
+"""Range of an analogue terminal as a voltage [V]."""
 LEAST, MOST = -(2**31), 2**31 - 1
 """Range of an integer register."""
 
 
 def analog_value(share: float, *, voltage: bool) -> float:
-    """What an analogue terminal gives at a share of its range [A or V]."""
+    """Value of an analogue terminal at a share of its range [A or V]."""
     low, high = VOLTAGE if voltage else CURRENT
     return low + share * (high - low)
 
 
 def analog_share(value: float, *, voltage: bool) -> float:
-    """Share of its range at which an analogue terminal gives a value [-]."""
+    """Share of its range that corresponds to a value of an analogue terminal [-]."""
     low, high = VOLTAGE if voltage else CURRENT
     return (value - low) / (high - low)
 
 
 class LoadedProgram(Protocol):
-    """What is told of the program; see `Io`."""
+    """The properties of the program that are published; see `Io`."""
 
     name: str | None
     state: ProgramState
@@ -51,10 +51,10 @@ class LoadedProgram(Protocol):
 
 
 class Peripherals:
-    """What hangs on the control box, apart from the arm. It starts with everything off and at zero.
+    """Everything connected to the control box except the arm. Initially everything is off or zero.
 
     Args:
-        on_tcp: Called with where the tool centre point is, when that is set.
+        on_tcp: Called with the tool centre point when it is set.
     """
 
     def __init__(self, on_tcp: Callable[[tuple[float, ...]], None]) -> None:
@@ -80,7 +80,7 @@ class Peripherals:
         """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
 
     def set_outputs(self, command: SetIo) -> None:
-        """Set those outputs that a mask names."""
+        """Set the outputs that the masks select."""
         mask = command.digital_output_mask
         self._digital_outputs = self._digital_outputs & ~mask | command.digital_outputs & mask
         for number, ratio in enumerate((command.standard_analog_output_0, command.standard_analog_output_1)):
@@ -91,7 +91,7 @@ class Peripherals:
                 self._analog_types = self._analog_types & ~bit | bit * voltage
 
     def set_inputs(self, command: SimulationSetInputs) -> None:
-        """Put signals on inputs."""
+        """Apply signals to inputs."""
         mask = command.digital_input_mask
         self._digital_inputs = self._digital_inputs & ~mask | command.digital_inputs & mask
         if command.standard_analog_input is not None:
@@ -102,12 +102,12 @@ class Peripherals:
             self._tool_analog_inputs = list(command.tool_analog_input)
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:
-        """Say where the tool centre point is in the flange frame: x y z [m] and rotation vector [rad]."""
+        """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
         self.tcp_offset = offset
         self._on_tcp(offset)
 
     def _set_registers(self, call: Call[SetRegisters]) -> None:
-        """Write registers; input registers anyone may."""
+        """Write registers; input registers may be written without control."""
         command = call.command
         if command.token is None and command.bank.startswith("output"):
             why = f"token is missing: {command.bank} registers belong to the robot, and writing them needs control"
@@ -118,7 +118,7 @@ class Peripherals:
         """Write registers.
 
         Raises:
-            RefusalError: There are not as many, or a value is none of the bank's.
+            RefusalError: A register does not exist, or a value is invalid for its bank.
         """
         bank, first, values = command.bank, command.first, command.values
         there = BITS if bank in self._bits else NUMBERS
@@ -136,14 +136,14 @@ class Peripherals:
     def io(
         self, tick: int, payload: Payload, speed: float, program: LoadedProgram, wrench: list[float] | None
     ) -> Io:
-        """What is told of all that.
+        """Return the message that publishes all this.
 
         Args:
-            tick: First control period for which it holds.
-            payload: Declared.
+            tick: First control period for which the values hold.
+            payload: Declared payload.
             speed: The speed slider [-].
-            program: The one that is loaded.
-            wrench: At the tool centre point in the last tick, base frame [N, N m]; None: it is not told.
+            program: Loaded program.
+            wrench: Wrench at the tool centre point in the last tick, base frame [N, N m]; None to leave it out.
         """
         return Io(
             tick=tick,

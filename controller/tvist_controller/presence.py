@@ -4,40 +4,40 @@ from tvist_controller.session import NoControlError
 
 
 class Presence:
-    """Sessions by the name of the client that they are of."""
+    """Sessions of clients, by client name."""
 
     def __init__(self) -> None:
         self._sessions: dict[str, set[str]] = {}
 
     def seen(self, client: str, session: str) -> None:
-        """A client's liveliness token is there.
+        """Note that a client's liveliness token has appeared.
 
         Args:
-            client: Its name.
-            session: Session that it is of; empty where the token does not say.
+            client: Name of the client.
+            session: Session that declared the token; empty if the token does not name it.
         """
         self._sessions.setdefault(client, set()).add(session)
 
     def gone(self, client: str, session: str) -> None:
-        """A client's liveliness token is gone."""
+        """Note that a client's liveliness token has disappeared."""
         there = self._sessions.get(client, set())
         there.discard(session)
         if not there:
             self._sessions.pop(client, None)
 
     def clients_of(self, session: str) -> list[str]:
-        """Names under which a session is there."""
+        """Names of the clients that a session declares."""
         return [client for client, there in self._sessions.items() if session in there]
 
     def has(self, client: str, session: str) -> bool:
-        """Whether a client's token is there."""
+        """Return whether a client's token is present."""
         return session in self._sessions.get(client, ())
 
     def session_of(self, client: str) -> str | None:
-        """The session of a client that asks for control; None where no token tells of it.
+        """Return the session of a client that requests control; None if it has no token.
 
         Raises:
-            NoControlError: Several go by its name: a command does not say from which of them it comes.
+            NoControlError: Several sessions use this name, and a command does not say which one sent it.
         """
         there = self._sessions.get(client, set())
         if len(there) > 1:

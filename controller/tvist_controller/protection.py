@@ -1,4 +1,4 @@
-"""What makes a protective stop by itself: drives that give too much for too long, and a shaper that fails."""
+"""Conditions that cause a protective stop: excessive torque of a drive for too long, and a failing shaper."""
 
 from typing import NamedTuple
 
@@ -8,12 +8,12 @@ from tvist_protocol.replies import Code
 
 
 class Danger(NamedTuple):
-    """Why the arm has to stop."""
+    """Reason for the arm to stop."""
 
     why: str
-    """For a person."""
+    """The reason, for people."""
     code: Code | None
-    """For a program."""
+    """The reason, for programs."""
 
 
 class Protection:
@@ -28,10 +28,10 @@ class Protection:
         self._overload = Overload(cycle.description.limits.torque)
 
     def dangers(self, sample: Sample) -> list[Danger]:
-        """What is wrong after a tick; mostly nothing.
+        """Return the dangers after a tick, usually none.
 
         Args:
-            sample: What went along the line.
+            sample: Signals along the control line.
         """
         found: list[Danger] = []
         joint = self._overload.joint(sample.measured.moment)
@@ -41,10 +41,10 @@ class Protection:
             why = f"torque of joint {name} is {moment:.0f} N m, beyond its limit of {limit:g} for more than 10 ms"
             found.append(Danger(why, "limit_torque"))
         fault = self._cycle.line_filter.fault
-        if fault is not None:  # the filter only goes on with old weights, because its shaper's function fails
+        if fault is not None:  # the filter continues with old weights, because its shaper's function fails
             found.append(Danger(fault, None))
         return found
 
     def forget(self) -> None:
-        """Begin to watch anew."""
+        """Restart the supervision."""
         self._overload.forget()

@@ -1,4 +1,4 @@
-"""Refusals of commands: raised where a problem is found, sent as an answer where the command came in."""
+"""Refusals of commands: raised where a problem is found, and sent as the command's reply."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload
 
 SLOWEST = {"velocity": 1e-3, "acceleration": 1e-2, "jerk": 0.1}
-"""Lowest accepted limits of a motion, which would otherwise take too long [rad/s, rad/s^2, rad/s^3]."""
+"""Lowest accepted limits of a motion; lower ones would make it too slow [rad/s, rad/s^2, rad/s^3]."""
 
 _NOTHING_TO = {
     "pause": "no motion is running: there is nothing to pause",
@@ -24,7 +24,7 @@ _NOTHING_TO = {
 
 
 class RefusalError(Exception):
-    """A command is refused; it has changed nothing."""
+    """A command is refused and has changed nothing."""
 
     def __init__(self, code: Code, where: str, why: str, limit: float | None = None) -> None:
         super().__init__(why)
@@ -53,7 +53,7 @@ def out_of_turn(command: str, activity: Activity) -> RefusalError:
 
 
 def check_joints(q: Sequence[float], description: RobotDescription, where: str = "q") -> None:
-    """Refuse a posture with another number of joints or outside their range."""
+    """Refuse a posture with a wrong number of joints or outside their range."""
     if len(q) != description.joints:
         why = f"{where} has {len(q)} angles; the arm has {description.joints}"
         raise RefusalError("out_of_range", where, why, description.joints)
@@ -82,7 +82,7 @@ def check_motion(velocity: float, acceleration: float, jerk: float, description:
 
 
 def check_body(payload: Payload, where: str = "", rated: float = math.inf) -> None:
-    """Refuse a payload that is heavier than rated or that no body can be."""
+    """Refuse a payload that is too heavy or physically impossible."""
     prefix = f"{where}." if where else ""
     if payload.mass > rated:
         field = f"{prefix}mass"
@@ -95,7 +95,7 @@ def check_body(payload: Payload, where: str = "", rated: float = math.inf) -> No
 
 
 def check_content(command: Command, description: RobotDescription) -> None:
-    """Refuse what no such robot can do, whatever it is doing."""
+    """Refuse a command that such a robot cannot carry out in any state."""
     match command:
         case MoveJ():
             check_joints(command.q, description)
@@ -110,5 +110,5 @@ def check_content(command: Command, description: RobotDescription) -> None:
 
 
 def payload_of(command: SetPayload) -> Payload:
-    """The payload that a command declares."""
+    """Return the payload that a command declares."""
     return Payload(mass=command.mass, com=command.com, inertia=command.inertia)

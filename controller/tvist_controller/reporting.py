@@ -1,4 +1,4 @@
-"""What went along the line in a tick, as the messages that clients get."""
+"""Conversion of a tick's signals into messages for clients."""
 
 from tvist_controller.control.kinematics import ForwardKinematics, rotation_vector
 from tvist_controller.cycle import Sample
@@ -10,11 +10,11 @@ from tvist_protocol.stream import State, Truth
 from tvist_shaping.base import Filter
 
 TRUE_MODES_EVERY = 50
-"""Ticks between two computations of the arm's true modes: an eigenvalue problem takes a good part of one."""
+"""Ticks between two computations of the arm's true modes, whose eigenvalue problem takes a good part of a tick."""
 
 
 class Reporter:
-    """Makes states and truths.
+    """Creates states and truths.
 
     Args:
         description: The robot.
@@ -38,7 +38,7 @@ class Reporter:
         setpoint_sequence: int | None,
         missed_ticks: int,
     ) -> State:
-        """The state of a tick."""
+        """Return the state of a tick."""
         target, measured = sample.target, sample.measured
         pose, tool_speed = self._kinematics.tool(measured.q, measured.qd)
         return State(
@@ -68,16 +68,16 @@ class Reporter:
         )
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:
-        """Say where the tool centre point is in the flange frame: x y z [m] and rotation vector [rad]."""
+        """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
         self._kinematics.set_tool(offset)
 
     def truth(self, tick: int, plant: Plant) -> Truth:
-        """What no robot can know of itself after a tick.
+        """Return what a real robot cannot measure, after a tick.
 
-        Its modes are computed now and then, and are empty lists where the plant does not know them.
+        Its modes are updated every `TRUE_MODES_EVERY` ticks; they are empty lists if the plant does not provide them.
 
         Raises:
-            ValueError: The plant does not know the truth.
+            ValueError: The plant does not provide the truth.
         """
         if not self._true_modes or tick % TRUE_MODES_EVERY == 0:
             modes = plant.modes() if isinstance(plant, ModalPlant) else None
@@ -101,15 +101,15 @@ class Reporter:
         )
 
     def forget_modes(self) -> None:
-        """The arm was put elsewhere: compute its modes anew."""
+        """Have the modes computed anew, since the arm was placed elsewhere."""
         self._true_modes = {}
 
 
 def truth_of(plant: Plant) -> PlantTruth:
-    """What no robot can know, from a plant that does.
+    """Return what a real robot cannot measure, from a plant that provides it.
 
     Raises:
-        ValueError: The plant does not know it.
+        ValueError: The plant does not provide it.
     """
     truth = plant.truth()
     if truth is None:

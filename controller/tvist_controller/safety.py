@@ -1,4 +1,4 @@
-"""What the arm may do: positions, velocities, accelerations, torques."""
+"""Limits of the arm's motion: velocities and torques."""
 
 import math
 from collections.abc import Iterator
@@ -11,35 +11,36 @@ from tvist_controller.trajectory import JointStop, Path, PathStop
 from tvist_plant.description import RobotDescription
 
 TORQUE_SHARE = 0.9
-"""Share of the joints' torque that a stop or a stream may ask for [-]."""
+"""Share of the joints' torque that a stop or a stream may use [-]."""
 REBOUND = 1.0
-"""How far a flexible arm's torque swings beyond a sudden change of the rigid arm's, against that change [-]: as far
-again without damping. A stop bypasses the filter, so its change is sudden."""
+"""Overshoot of a flexible arm's torque after a sudden change of the rigid arm's torque, relative to that change [-]:
+1 without damping. A stop bypasses the filter, so its change is sudden.
+"""
 GENTLEST_STOP = 1.0
-"""Deceleration below which no stop goes: neither for torque, nor because a client wants it [rad/s^2]."""
+"""Lowest deceleration of a stop, whatever the torque permits or a client requests [rad/s^2]."""
 
 MOMENTS = 32
 """Number of moments of a stop at which its torque is checked."""
 _SHARES = np.arange(1, MOMENTS + 1) / MOMENTS
 LOOK_EVERY = 4
-"""Ticks between two looks at the torque of references that are known."""
+"""Ticks between two checks of the torque along known references."""
 REDUCED_SHARE = 0.25
-"""Share of the joints' velocity that is left while the safety system reduces it [-]."""
+"""Share of the joints' velocity that remains while the safety system reduces the speed [-]."""
 
 
 def rate_of(speed: float, velocity: float, slowest: float | None) -> float:
-    """Rate for the time of a motion [-].
+    """Rate of a motion's time [-].
 
     Args:
-        speed: Share of the programmed speed that was set [-].
+        speed: Programmed speed fraction [-].
         velocity: The motion's velocity limit [rad/s].
-        slowest: Velocity that reduced speed leaves [rad/s]; None where it is not reduced.
+        slowest: Velocity limit of reduced speed [rad/s]; None if the speed is not reduced.
     """
     return speed if slowest is None else min(speed, slowest / velocity)
 
 
 class StreamTorqueRoom:
-    """What the joints' torques, less what gravity and velocities take, leave to a stream's accelerations.
+    """The acceleration of a stream that the joints' torques permit, after gravity and velocities.
 
     Args:
         description: The robot.
@@ -51,31 +52,33 @@ class StreamTorqueRoom:
         self._dynamics = dynamics
 
     def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
-        """Whether a state of motion keeps every torque within its share, or is as gentle as any stop."""
+        """Return whether a state of motion keeps all torques within their share, or is as gentle as any stop."""
         if (self._dynamics.effort(q, qd, qdd) <= self._most).all():
             return True
         return bool(np.abs(qdd).max() <= GENTLEST_STOP)
 
     def acceleration(self, q: Floats, qd: Floats) -> float:
-        """Largest a for which every q̈ with |q̈ᵢ| ≤ a keeps the torques within their share [rad/s^2].
+        """Largest a such that every q̈ with |q̈ᵢ| ≤ a keeps the torques within their share [rad/s^2].
 
-        With τ = M q̈ + h, the most that such a q̈ asks of joint i is |hᵢ| + a Σⱼ|Mᵢⱼ|. No less than the gentlest stop.
+        With τ = M q̈ + h, such a q̈ needs at most |hᵢ| + a Σⱼ|Mᵢⱼ| at joint i. The result is at least that of the
+        gentlest stop.
         """
         left = self._most - self._dynamics.effort(q, qd, np.zeros_like(q))
         return max(float((left / np.abs(self._dynamics.inertia(q)).sum(axis=1)).min()), GENTLEST_STOP)
 
 
 class StopTorque:
-    """What a stop may ask of the joints' torques.
+    """The joint torques that a stop may use.
 
-    Every torque of the rigid arm along the stop stays within its share of the limit. Where the motion itself would take
-    more if it were not stopped, the stop may, too.
+    All torques of the rigid arm along the stop stay within their share of the limits. If the uninterrupted motion
+    would need more, the stop may use as much.
 
     Args:
         dynamics: Inverse dynamics with the declared payload.
         state: State at which the stop begins.
         limits: Torque limits of the joints, shape (n,) [N m].
-        asked: Largest that the motion itself would ask from now on, shape (n,) [N m]; None: what it asks now.
+        asked: Largest torques that the uninterrupted motion would need, shape (n,) [N m]; None for those at the
+            start.
     """
 
     def __init__(
@@ -88,16 +91,16 @@ class StopTorque:
         self._before = dynamics.torque(state.q, state.qd, state.qdd) - dynamics.gravity(state.q)
 
     def holds(self, stop: JointStop | PathStop, *, rebound: bool = True) -> bool:
-        """Whether a stop keeps to it.
+        """Return whether a stop keeps within these torques.
 
-        The very start is what the motion already asks for: only what follows is the stop's own doing. Thirty-two
-        moments, since torque peaks where a joint's ramp ends: nine in ten of the stops that ask for too much do so
-        where the whole stop's ramp ends, so that moment is looked at first.
+        The torque at the very start belongs to the motion; only what follows is caused by the stop. Thirty-two
+        moments are checked, since torque peaks where a joint's acceleration ramp ends. Nine in ten of the stops that
+        need too much do so where the whole stop's ramp ends, so that moment is checked first.
 
         Args:
             stop: The stop.
-            rebound: Whether the limits themselves must hold for what the flexible arm swings beyond the rigid one, at
-                both ends of the stop.
+            rebound: Whether the overshoot of the flexible arm, at both ends of the stop, must stay within the limits
+                themselves.
         """
         ramp = stop.acceleration / stop.jerk
         ends = min(math.ceil(ramp / stop.duration * MOMENTS), MOMENTS) if stop.duration > 0.0 else MOMENTS
@@ -125,15 +128,15 @@ class StopTorque:
 
 
 def largest_torque(dynamics: InverseDynamics, path: Path, velocity: float, acceleration: float) -> Floats:
-    """Upper bound of the torques of a motion along a path, whatever its profile, shape (n,) [N m].
+    """Upper bound of the torques of a motion along a path with any profile, shape (n,) [N m].
 
-    Along q(x) the torque is m(x) ẍ + c(x) ẋ² + g(x): it is largest at one of the corners of the range of ẋ² and ẍ.
-    Seventeen places on the way are looked at.
+    Along q(x) the torque is m(x) ẍ + c(x) ẋ² + g(x), so it is largest at a corner of the range of ẋ² and ẍ. Seventeen
+    points of the path are checked.
 
     Args:
         dynamics: Inverse dynamics with the declared payload.
-        path: Path of the stop.
-        velocity: Limit for the path's parameter [rad/s].
+        path: Path of the motion.
+        velocity: Velocity limit of the path's parameter [rad/s].
         acceleration: Acceleration of the path's parameter [rad/s^2].
     """
     most = np.zeros(len(path.posture(path.start)))
@@ -146,14 +149,14 @@ def largest_torque(dynamics: InverseDynamics, path: Path, velocity: float, accel
 def acceleration_on_way(
     dynamics: InverseDynamics, path: Path, start: Floats, way: Floats, velocity: float, limits: Floats
 ) -> float:
-    """Largest acceleration of a path's parameter with which torques stay within their share [rad/s^2].
+    """Largest acceleration of a path's parameter that keeps the torques within their share [rad/s^2].
 
     Args:
         dynamics: Inverse dynamics with the declared payload.
         path: Path of the motion.
-        start: Parameter where it is looked at first, shape (m,) [rad].
-        way: From there to where it is looked at last, shape (m,) [rad].
-        velocity: Largest there [rad/s].
+        start: Parameter at the first point to check, shape (m,) [rad].
+        way: Difference from there to the last point to check, shape (m,) [rad].
+        velocity: Largest velocity on this part [rad/s].
         limits: Torque limits of the joints, shape (n,) [N m].
     """
     room = math.inf
@@ -165,7 +168,7 @@ def acceleration_on_way(
 def _on_way(
     dynamics: InverseDynamics, path: Path, start: Floats, way: Floats, velocity: float, acceleration: float
 ) -> Iterator[tuple[Floats, Floats]]:
-    """Torques at places on a path: without acceleration, and more for each rad/s^2 of the parameter [N m]."""
+    """Torques at points of a path: without acceleration [N m], and per unit of the parameter's acceleration."""
     farthest, still = float(np.abs(way).max()), np.zeros_like(start)
     along = way / farthest if farthest > 0.0 else still
     speed = min(velocity, math.sqrt(acceleration * farthest)) * along
@@ -178,13 +181,13 @@ def _on_way(
 
 
 def torque_along(dynamics: InverseDynamics, references: Floats, period: float) -> Floats:
-    """Largest torques of references that are known, by central differences, shape (n,) [N m].
+    """Largest torques along known references, by central differences, shape (n,) [N m].
 
-    Every `LOOK_EVERY`th is looked at, and the last.
+    Every `LOOK_EVERY`th reference is checked, and the last one.
 
     Args:
         dynamics: Inverse dynamics with the declared payload.
-        references: One a tick, shape (k, n) [rad], k >= 3.
+        references: References, one for each tick, shape (k, n) [rad], k >= 3.
         period: Tick [s].
     """
     q, qd, qdd = central_differences(references, period)

@@ -1,4 +1,4 @@
-"""What the safety system does: reduced speed, and stops of UR's categories 0, 1 and 2."""
+"""Actions of the safety system: reduced speed, and stops of UR's categories 0, 1 and 2."""
 
 from tvist_controller.events import Emit
 from tvist_controller.motion import MotionControl
@@ -8,20 +8,20 @@ from tvist_protocol.transitions import Activity, after
 
 
 class SafetyControl:
-    """Carries out what the inputs of the safety system ask for, and what it finds.
+    """Carries out what the safety system's inputs request and what its faults require.
 
     Args:
-        motion: What is stopped.
-        emit: Takes what happens.
+        motion: The robot's motion.
+        emit: Emits events.
     """
 
     def __init__(self, motion: MotionControl, emit: Emit) -> None:
         self._motion, self._emit = motion, emit
         self._goes_on = False
-        """Whether the motion that a safeguard has paused goes on by itself when that is released."""
+        """Whether the motion that a safeguard has paused resumes by itself when the safeguard is released."""
 
     def reduce(self, *, reduced: bool) -> None:
-        """Slow motions down on their way, or let them go on; a stream, whose time is its client's, is stopped."""
+        """Slow motions down, or let them speed up again; stop a stream, since its client determines its timing."""
         motion, system = self._motion, self._motion.safety
         if reduced == system.reduced:
             return
@@ -34,10 +34,10 @@ class SafetyControl:
         self._emit("warning", why=f"safety_mode is {motion.safety_mode.name}: speed is {share}")
 
     def safeguard(self, *, stopped: bool) -> None:
-        """Stop by category 2, or allow motion again: a motion pauses and then goes on, a stream ends.
+        """Stop with category 2, or allow motion again: a motion pauses and later resumes, a stream ends.
 
         Args:
-            stopped: Whether the safeguard asks for the stop.
+            stopped: Whether the safeguard requests the stop.
         """
         motion, system = self._motion, self._motion.safety
         if stopped == system.safeguard:
@@ -50,7 +50,7 @@ class SafetyControl:
             return
         why = "a safeguard asked for a stop"
         if not motion.activity.moving:
-            # Nothing moves, nothing ends, and yet it is what keeps the robot from moving from now on.
+            # Although nothing moves and nothing ends, this now keeps the robot from moving.
             self._emit("safety_stop", why=why, category=2, duration=0.0, way=0.0)
             return
         if after(motion.activity, "pause") is None:
@@ -62,11 +62,11 @@ class SafetyControl:
         self._emit("safety_stop", why=why, category=2, duration=duration, way=way)
 
     def stay_paused(self) -> None:
-        """A client has paused the motion, too: it waits for its `resume`."""
+        """Note that a client has paused the motion as well, which then waits for its `resume`."""
         self._goes_on = False
 
     def emergency(self, whose: Emergency) -> None:
-        """Stop by category 1: on the way, then without power until it is released."""
+        """Stop with category 1: on the path, then without power until it is released."""
         pressed = self._motion.safety.emergencies
         if whose not in pressed:
             pressed.add(whose)
@@ -74,7 +74,7 @@ class SafetyControl:
             self._motion.end("power_off", why, kind="safety_stop", category=1)
 
     def end_emergency(self, whose: Emergency) -> None:
-        """Release an emergency stop; the power stays off until it is switched on."""
+        """Release an emergency stop; the power stays off until it is switched on again."""
         self._motion.safety.emergencies.discard(whose)
 
     def release(self) -> None:
@@ -84,11 +84,11 @@ class SafetyControl:
         self._motion.safety.emergencies.clear()
 
     def cut_power(self, why: str, latched: Latched | None = None) -> None:
-        """Stop by category 0: the brakes close at once.
+        """Stop with category 0: the brakes close at once.
 
         Args:
-            why: The reason, for a person.
-            latched: What the safety system has found, until it is restarted; None: nothing.
+            why: The reason, for people.
+            latched: Violation or fault that the safety system latches until it is restarted; None if there is none.
         """
         if latched is not None:
             self._motion.safety.latched = latched

@@ -1,4 +1,4 @@
-"""What the safety system allows: inputs that ask for less, and what stays until it is restarted."""
+"""State of the safety system: inputs that restrict motion, and faults that are latched until a restart."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -21,22 +21,22 @@ _LIVE = frozenset({*_MOTION, "power_on", "power", "unlock_protective_stop"})
 
 @dataclass
 class SafetySystem:
-    """Its inputs, and what it has found. Any of these can be on beside whatever the robot is doing."""
+    """Inputs and latched faults. Each is independent of the robot's activity."""
 
     reduced: bool = False
     """Whether the speed is reduced."""
     safeguard: bool = False
-    """Whether a safeguard asks for a stop."""
+    """Whether a safeguard requests a stop."""
     emergencies: set[Emergency] = field(default_factory=set)
     """Emergency stops that are pressed."""
     latched: Latched | None = None
-    """What it has found wrong, until it is restarted."""
+    """Fault or violation that is latched until a restart."""
 
     def mode(self, activity: Activity) -> SafetyMode:
-        """The gravest of what holds, as RTDE numbers it.
+        """Return the most severe of the present conditions, as RTDE's safety mode.
 
         Args:
-            activity: What the robot is doing.
+            activity: Present activity of the robot.
         """
         if self.latched is not None:
             return _LATCHED[self.latched]
@@ -47,14 +47,14 @@ class SafetySystem:
         return activity.safety_mode(reduced=self.reduced)
 
     def check(self, trigger: str, activity: Activity) -> None:
-        """Refuse what it does not allow.
+        """Refuse a command that the safety system does not allow.
 
         Args:
-            trigger: A command's `type`.
-            activity: What the robot is doing.
+            trigger: `type` of the command.
+            activity: Present activity of the robot.
 
         Raises:
-            RefusalError: It is that.
+            RefusalError: The command is not allowed.
         """
         mode = self.mode(activity)
         if trigger in _LIVE and self.latched is not None:
@@ -67,15 +67,15 @@ class SafetySystem:
             raise RefusalError("wrong_mode", "", why)
 
     def clear(self) -> None:
-        """Release safeguard and emergency stops, and forget what was found; the speed stays reduced where it is."""
+        """Release safeguard and emergency stops, and clear the latched fault; reduced speed stays as it is."""
         self.safeguard, self.latched = False, None
         self.emergencies.clear()
 
     def restart(self) -> None:
-        """Forget what it has found.
+        """Clear the latched fault.
 
         Raises:
-            RefusalError: Nothing.
+            RefusalError: There is none.
         """
         if self.latched is None:
             why = "the safety system has found no violation or fault: there is no need to restart it"

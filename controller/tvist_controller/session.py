@@ -1,4 +1,4 @@
-"""Control of the arm by lease. It knows no motion, network or clock: the time is an argument."""
+"""Control of the arm by lease. Motion, network and clock are not involved: the time is an argument."""
 
 from dataclasses import dataclass, replace
 
@@ -7,20 +7,20 @@ from tvist_protocol.replies import Code, Refused
 
 @dataclass(frozen=True)
 class Lease:
-    """Control, held by one client."""
+    """Control that one client holds."""
 
     client: str
     token: str
     seconds: float
-    """How long it lasts without a sign of life [s]."""
+    """Duration without renewal [s]."""
     ends: float
-    """Time at which it is lost without one [s]."""
+    """Time at which it ends if it is not renewed [s]."""
     session: str | None
-    """Session whose going ends it at once; empty where the client's token does not say; None where it had none."""
+    """Session whose end ends the lease; empty if the client's token does not name it, None if it had no token."""
 
 
 class NoControlError(Exception):
-    """A command that needs control came without it."""
+    """A command that needs control came from a client without it."""
 
     def __init__(self, code: Code, why: str, where: str = "token") -> None:
         super().__init__(why)
@@ -30,17 +30,17 @@ class NoControlError(Exception):
 
     @property
     def reply(self) -> Refused:
-        """The answer."""
+        """The reply to the command."""
         return Refused(code=self.code, where=self.where, why=self.why)
 
 
 def check_token(lease: Lease | None, token: str, where: str = "token") -> Lease:
-    """The lease that a token names.
+    """Return the lease that a token names.
 
     Args:
-        lease: The present one.
+        lease: Present lease.
         token: The token.
-        where: Field that holds it.
+        where: Field that contains it.
 
     Raises:
         NoControlError: No client has control, or the token is another client's or an old one.
@@ -57,7 +57,7 @@ def check_free(lease: Lease | None, client: str) -> None:
     """Check that a client may take control.
 
     Raises:
-        NoControlError: Another one has it.
+        NoControlError: Another client has it.
     """
     if lease is not None and lease.client != client:
         why = f"control is held by {lease.client!r} until it releases it"
@@ -80,13 +80,13 @@ class Session:
         """Give control to a client; one that already has it gets a new lease.
 
         Args:
-            client: Its name.
-            seconds: How long the lease lasts without a sign of life [s].
+            client: Name of the client.
+            seconds: Duration of the lease without renewal [s].
             now: Time [s].
-            session: Session whose going ends it at once; None where nothing tells of its going.
+            session: Session whose end ends the lease; None if its end will not be reported.
 
         Raises:
-            NoControlError: Another client holds it.
+            NoControlError: Another client has control.
         """
         check_free(self.lease, client)
         self.lease = self._grant(client, seconds, now, session)
@@ -103,10 +103,10 @@ class Session:
         return self.lease
 
     def hand_over(self, client: str, now: float, session: str | None = None) -> None:
-        """Keep the present lease for another client, from now on: it has only to take it.
+        """Reserve the lease for another client from now on, which only has to take it.
 
         Args:
-            client: Its name.
+            client: Name of the other client.
             now: Time [s].
             session: Session of the client, see `take`.
         """
@@ -118,11 +118,11 @@ class Session:
         self.lease = None
 
     def expired(self, now: float) -> bool:
-        """Whether the lease has run out."""
+        """Return whether the lease has run out."""
         return self._timeouts and self.lease is not None and now >= self.lease.ends
 
     def client_gone(self, client: str, session: str) -> bool:
-        """A client's session has ended; True where the lease ends with it."""
+        """Handle the end of a client's session; return True if the lease ends with it."""
         return self.lease is not None and (self.lease.client, self.lease.session) == (client, session)
 
     def _grant(self, client: str, seconds: float, now: float, session: str | None) -> Lease:

@@ -1,4 +1,4 @@
-"""What takes the messages that a controller puts out."""
+"""Receiver of the messages that a controller produces."""
 
 from typing import Literal
 
@@ -7,13 +7,13 @@ from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, State, Truth
 
 Topic = Literal["state", "event", "truth", "telemetry", "io"]
-"""What is told without being asked for."""
+"""Topic of messages that are published without a request."""
 
 
 class Sink:
-    """Takes messages in the controller's thread. Nothing here may raise, and nothing may wait but in lockstep.
+    """Takes messages in the controller's thread. No method may raise, and none may block except in lockstep.
 
-    Each method lets its message go unless it is overridden.
+    By default each method ignores its message.
     """
 
     def state(self, state: State) -> None:
@@ -23,10 +23,10 @@ class Sink:
         """Take an event; it comes before the state of its tick."""
 
     def truth(self, truth: Truth) -> None:
-        """Take what no robot can know, where that is told."""
+        """Take what a real robot cannot measure, if it is published."""
 
     def io(self, io: Io) -> None:
-        """Take inputs, outputs and registers, where they changed; they come before the state of their tick."""
+        """Take changed inputs, outputs and registers; they precede the state of their tick."""
 
     def journal(self, entry: Entry) -> None:
-        """Take what reached the controller before the tick of that number."""
+        """Take an input of the controller, which precedes the tick of its number."""

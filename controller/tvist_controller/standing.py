@@ -1,4 +1,4 @@
-"""What others than its own thread may know of a controller."""
+"""The part of a controller's state that other threads may read."""
 
 from typing import NamedTuple
 
@@ -13,12 +13,12 @@ class Standing(NamedTuple):
     lease: Lease | None
     """Lease of the client that has control."""
     basis: PlanBasis
-    """What plans for commands depend on."""
+    """State that plans for commands depend on."""
     clock: ClockHold | None
     """Hold of the client that has the clock."""
 
     def sessions_of(self, client: str) -> set[str | None]:
-        """Sessions with whose going a client loses control or the clock; empty where it has neither."""
+        """Sessions whose end takes control or the clock from a client; empty if it has neither."""
         rights = (self.lease, self.clock)
         return {right.session for right in rights if right is not None and right.client == client}
 

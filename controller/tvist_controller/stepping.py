@@ -1,6 +1,6 @@
-"""The right to step time in lockstep: the holder of the clock has it, or else the holder of the lease.
+"""The right to step time in lockstep: the holder of the clock has it; if there is none, the holder of the lease.
 
-It knows no motion, network or clock.
+Motion, network and clock are not involved.
 """
 
 from dataclasses import dataclass
@@ -11,16 +11,16 @@ from tvist_protocol.simulation import SimulationStep
 
 @dataclass(frozen=True)
 class ClockHold:
-    """The clock, held by one client."""
+    """The hold of one client on the clock."""
 
     client: str
     token: str
     session: str | None
-    """Session whose going ends it; empty where the client's token does not say; None where it had none."""
+    """Session whose end ends the hold; empty if the client's token does not name it, None if it had no token."""
 
 
 def check_clock_token(hold: ClockHold | None, token: str) -> ClockHold:
-    """The hold of the clock that a token names.
+    """Return the hold of the clock that a token names.
 
     Raises:
         NoControlError: No client holds the clock, or the token is another client's or an old one.
@@ -36,7 +36,7 @@ def check_clock_free(hold: ClockHold | None, client: str) -> None:
     """Check that a client may take the clock.
 
     Raises:
-        NoControlError: Another one has it.
+        NoControlError: Another client has it.
     """
     if hold is not None and hold.client != client:
         raise NoControlError(
@@ -45,19 +45,19 @@ def check_clock_free(hold: ClockHold | None, client: str) -> None:
 
 
 def may_step(hold: ClockHold | None, lease: Lease | None, token: str) -> bool:
-    """Whether a token lets time pass: the clock's where somebody holds it, otherwise the lease's."""
+    """Return whether a token may advance time: the clock's token if a client holds the clock, else the lease's."""
     right = lease if hold is None else hold
     return right is not None and right.token == token
 
 
 def check_step_token(hold: ClockHold | None, lease: Lease | None, token: str) -> str:
-    """Check that a token lets time pass.
+    """Check that a token may advance time.
 
     Returns:
-        Name of the client that it is of.
+        Name of the client that the token belongs to.
 
     Raises:
-        NoControlError: It does not.
+        NoControlError: It may not.
     """
     if hold is None:
         return check_token(lease, token).client
@@ -68,13 +68,13 @@ def check_step_token(hold: ClockHold | None, lease: Lease | None, token: str) ->
 
 
 def check_step(hold: ClockHold | None, lease: Lease | None, step: SimulationStep) -> str:
-    """Check the tokens of a step: whoever lets time pass need not be who may send set-points.
+    """Check the tokens of a step; advancing time and sending set-points are separate rights.
 
     Returns:
         Name of the client that steps.
 
     Raises:
-        NoControlError: One of them does not give the right that is needed, or is missing.
+        NoControlError: A token is missing or does not give the required right.
     """
     client = check_step_token(hold, lease, step.token)
     if step.motion_token is not None:
@@ -86,7 +86,7 @@ def check_step(hold: ClockHold | None, lease: Lease | None, step: SimulationStep
 
 
 class ClockLease:
-    """One holder of the clock at a time. Nothing here runs out: where a client lets time pass nothing does."""
+    """One holder of the clock at a time. The hold does not time out, since nothing does when a client advances time."""
 
     def __init__(self) -> None:
         self._granted = 0
@@ -96,20 +96,20 @@ class ClockLease:
         """Give the clock to a client; one that already holds it gets a new token.
 
         Args:
-            client: Its name.
-            session: Session whose going ends it; None where nothing tells of its going.
+            client: Name of the client.
+            session: Session whose end ends the hold; None if its end will not be reported.
 
         Raises:
             NoControlError: Another client holds it.
         """
         check_clock_free(self.hold, client)
         self._granted += 1
-        # A lease's token has a number where this one has a word: neither is ever taken for the other.
+        # A lease's token has a number in this place, so the two kinds of tokens cannot be confused.
         self.hold = ClockHold(client, f"{client}#clock{self._granted}", session)
         return self.hold
 
     def release(self, token: str) -> None:
-        """Give the clock back.
+        """Release the clock.
 
         Raises:
             NoControlError: See `check_clock_token`.
@@ -118,7 +118,7 @@ class ClockLease:
         self.hold = None
 
     def client_gone(self, client: str, session: str) -> bool:
-        """A client's session has ended; True where it held the clock, which is free then."""
+        """Handle the end of a client's session; return True if it held the clock, which is then free."""
         if self.hold is None or (self.hold.client, self.hold.session) != (client, session):
             return False
         self.hold = None

@@ -1,4 +1,4 @@
-"""Why a robot stands: for who comes after the event that said so."""
+"""Reason why a robot is stopped, for clients that connect after the event."""
 
 from tvist_protocol.info import StopReason
 from tvist_protocol.modes import RobotMode, SafetyMode
@@ -11,7 +11,7 @@ _KEEP_POWER = frozenset({SafetyMode.PROTECTIVE_STOP, SafetyMode.SAFEGUARD_STOP})
 
 
 class StopReasons:
-    """Remembers the event of each stop that may still hold, by the safety mode that it is the reason of."""
+    """Remembers the event of each stop that may still hold, by the safety mode that it caused."""
 
     def __init__(self) -> None:
         self._events: dict[SafetyMode, Event] = {}
@@ -21,33 +21,33 @@ class StopReasons:
 
         Args:
             event: Event of kind `protective_stop` or `safety_stop`.
-            mode: What the safety system allows now: the gravest of what holds, which another stop may have led to.
+            mode: Present safety mode, the most severe of all conditions; another stop may have caused it.
         """
         cause = _cause(event, mode)
         if cause is not None:
-            self._events.pop(cause, None)  # the newest is the last
+            self._events.pop(cause, None)  # moves the newest to the end
             self._events[cause] = event
 
     def update(self, robot: RobotMode, safety: SafetyMode) -> None:
-        """Forget what is over: a robot that may move is stopped by nothing any more."""
+        """Discard stops that are over: if the robot may move, no stop holds any more."""
         if self._events and safety in _MAY_MOVE and robot is RobotMode.RUNNING:
             self._events.clear()
 
     def forget(self) -> None:
-        """Forget everything: the robot was put into a mode."""
+        """Discard all stops, since the robot was set to a mode."""
         self._events.clear()
 
     def present(self, robot: RobotMode, safety: SafetyMode) -> StopReason | None:
-        """The stop that keeps the robot from moving.
+        """Return the stop that keeps the robot from moving.
 
-        Where the safety system allows motion again and the power is still off, that is the last one that took it.
+        If the safety system allows motion again and the power is still off, that is the last stop that cut the power.
 
         Args:
-            robot: The robot's mode.
-            safety: What the safety system allows.
+            robot: Present robot mode.
+            safety: Present safety mode.
 
         Returns:
-            None where there is none, or no event told of it.
+            None if there is none, or it had no event.
         """
         event = None
         if safety not in _MAY_MOVE:
@@ -59,7 +59,7 @@ class StopReasons:
 
 
 def _cause(event: Event, mode: SafetyMode) -> SafetyMode | None:
-    """The safety mode that an event is the reason of, NORMAL for a loss of power alone; None: it cannot be told."""
+    """Safety mode that an event explains, NORMAL for a loss of power alone; None if it is not known."""
     if event.kind == "protective_stop":
         return SafetyMode.PROTECTIVE_STOP
     if event.category == 2:

@@ -1,4 +1,4 @@
-"""How long stops last and how far they go: what a safety report asks of a robot."""
+"""Stopping times and distances, as a safety report requires them."""
 
 from functools import cache
 
@@ -14,16 +14,16 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.info import Stopping
 
 SPEEDS = (0.33, 0.66, 1.0)
-"""Shares of a joint's velocity at which the stop begins, as UR's manuals give them [-]."""
+"""Shares of a joint's velocity at which stops begin, as in UR's manuals [-]."""
 POSTURES = 500
-"""Random postures among which the one is found that takes most torque to hold: the arm stretched out."""
+"""Number of random postures searched for the one that needs most torque to hold: the arm stretched out."""
 
 
 def stopping(description: RobotDescription) -> tuple[Stopping, ...]:
-    """Stops without payload and with the rated one, of the joint that takes the longest.
+    """Return the stops without payload and with the rated one, of the joint that takes the longest.
 
-    Each is of one joint that turns alone, with the others at rest and the arm stretched out, either way. They take
-    twenty ticks to find, once for each description.
+    In each stop a single joint turns, in either direction, while the others are at rest and the arm is stretched out.
+    Computing them takes as long as twenty ticks, once for each description.
 
     Args:
         description: The robot.
@@ -58,7 +58,7 @@ def _found(described: bytes) -> tuple[Stopping, ...]:
 
 
 def _stretched(description: RobotDescription, dynamics: InverseDynamics) -> Floats:
-    """The posture that takes the largest share of a joint's torque to hold."""
+    """Return the posture that needs the largest share of a joint's torque to hold."""
     random, limits = np.random.default_rng(0), np.array(description.limits.torque)
     named = [np.array(pose) for pose in description.poses.values()]
     postures = [*named, *random.uniform(-np.pi, np.pi, (POSTURES, description.joints))]

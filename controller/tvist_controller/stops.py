@@ -1,4 +1,4 @@
-"""How to come to rest: what decision 13 calls a permitted stop, and the quickest of them."""
+"""Planning of stops: what decision 13 calls a permitted stop, and the quickest of them."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator
@@ -17,51 +17,53 @@ from tvist_plant.description import RobotDescription
 S = TypeVar("S", JointStop, PathStop)
 
 STEP = 0.8
-"""From one deceleration that is tried to the next [-]."""
+"""Ratio of one tried deceleration to the previous one [-]."""
 HARDER = 1.05
-"""A stop that is harder than the motion's own braking by this is ahead of it nowhere, although a filter that varies
-may brake a little harder than its reference [-]."""
+"""A stop that brakes harder than the motion by this factor is never ahead of it, although a filter that varies may
+brake a little harder than its reference [-].
+"""
 SLOW = 3e-3
-"""Below this a shaped motion may turn back by what interpolation undershoots [rad/s]."""
+"""Speed below which a shaped motion may turn back slightly because of interpolation [rad/s]."""
 SOON = 0.02
-"""A motion that brakes no sooner than this is behind a stop by then [s]."""
+"""A motion that starts braking later than this is ahead of a stop by then [s]."""
 COUNTED = 0.9
-"""Share of the present velocity that a motion is counted on to keep until it brakes [-]."""
+"""Share of its present velocity that a motion is assumed to keep until it brakes [-]."""
 ROUNDING = 1e-12
-"""Difference of two positions that is none [rad]."""
+"""Differences between positions below this are rounding errors [rad]."""
 
 
 class References(Protocol):
-    """References of a motion that are still to come."""
+    """Future references of a motion."""
 
     samples: list[Floats]
-    """The path's parameter at the two shaped references played last and at those to come that are known, one a tick,
-    each of shape (m,) [rad]."""
+    """The path's parameter at the last two shaped references played and at the known future ones, one for each tick,
+    each of shape (m,) [rad].
+    """
     rests: bool
-    """Whether they are known until they rest."""
+    """Whether the references are known until they come to rest."""
 
     def until(self, ticks: int) -> None:
-        """See that so many references to come are known, or all until they rest."""
+        """Ensure that this many future references are known, or all of them until they come to rest."""
 
     @property
     def last(self) -> int:
-        """Index of the last one that has moved, for those that rest; 0: none has."""
+        """Index of the last reference that moved, if they come to rest; 0 if none moved."""
 
 
 @dataclass(frozen=True)
 class StopPlan:
-    """A stop and what limits it."""
+    """A stop and its limits."""
 
     trajectory: JointStop | PathStop | None
-    """None: what is under way runs out by itself."""
+    """Trajectory of the stop; None if the present motion runs out by itself."""
     acceleration: float | None
-    """Limit it keeps [rad/s^2]; None: the motion's own."""
+    """Acceleration limit of the stop [rad/s^2]; None for the motion's own."""
     limited: bool
-    """Whether that is not what was wanted."""
+    """Whether the limit differs from the requested one."""
     duration: float | None
-    """Until it rests [s]; None where that is too far ahead to say."""
+    """Time until rest [s]; None if it is too far ahead to tell."""
     way: float | None
-    """Until it rests, of the joint that turns most [rad]; likewise."""
+    """Angle until rest of the joint that turns most [rad]; None if it is too far ahead to tell."""
 
 
 class StopPlanner:
@@ -78,35 +80,37 @@ class StopPlanner:
         self._dynamics = dynamics
         self._torque, self._position = np.array(limits.torque), np.array(limits.position)
         self.highest, self.jerk = min(limits.acceleration), min(limits.jerk)
-        """Limits that no stop exceeds [rad/s^2, rad/s^3]."""
+        """Largest acceleration and jerk of any stop [rad/s^2, rad/s^3]."""
         self.period = period
         """Tick [s]."""
 
     def on_path(
         self, state: Target, newest: Floats, forecast: Forecast, wanted: float | None, *, certain: bool = True
     ) -> PathStop | None:
-        """The quickest stop along the path of a motion that is certain to be permitted.
+        """Return the quickest stop along a motion's path that is certain to be permitted.
 
-        Never ahead of the motion, and never later at rest, is a stop that brakes harder than the motion ever will,
-        with more jerk; and a gentler one that is over before the motion, braking as hard as it may, could be.
+        Two kinds of stops are never ahead of the motion and never come to rest later: those that brake harder than
+        the motion ever will, with more jerk; and gentler ones that end before the motion could, even if it braked as
+        hard as possible.
 
         Args:
             state: State of the path's parameter, a tick before the newest shaped reference.
-            newest: The parameter there, shape (m,) [rad].
-            forecast: What is known of the motion.
-            wanted: Deceleration asked for [rad/s^2]; None for as much as possible.
-            certain: False: take the quickest that keeps the torque, for a motion that will not rest for long.
+            newest: Parameter of the newest shaped reference, shape (m,) [rad].
+            forecast: Forecast of the motion.
+            wanted: Requested deceleration [rad/s^2]; None for the largest possible.
+            certain: False to return the quickest stop within the torque limits, for a motion that will not rest for
+                long.
 
         Returns:
-            None where none is certain, or the motion is about to rest by itself.
+            None if no stop is certain to be permitted, or the motion is about to come to rest by itself.
         """
         speed, rise = forecast.path.forwards(state.qd), forecast.path.forwards(state.qdd)
         hardest = self._keeping(state, forecast, self.highest)
         if hardest is None:
             return None
         in_time = forecast.steady + COUNTED * max(speed, 0.0) / forecast.braking
-        # What hardly moves may turn back a little, what brakes with as much jerk as a stop may be as quick, and what is
-        # about to rest is quicker than anything within the limits.
+        # A motion that is very slow may turn back a little, one that brakes with as much jerk as a stop may be as
+        # quick, and one that is about to rest is quicker than anything within the limits.
         creeps = speed < SLOW
         jerks = HARDER * forecast.jerk > hardest.jerk and forecast.steady < SOON
         rests = rise < 0.0 and speed <= 1.1 * rise * rise / (2.0 * hardest.jerk)
@@ -126,21 +130,22 @@ class StopPlanner:
         wanted: float | None,
         asked: Floats | None = None,
     ) -> PathStop | None:
-        """The quickest stop along the path of a motion that is run ahead.
+        """Return the quickest stop along the path of a motion that is simulated ahead.
 
         Args:
-            ahead: The motion; it is run ahead as far as a stop lasts. One that may turn back is known until it rests.
+            ahead: The motion, which is simulated for as long as a stop lasts. If it may turn back, it is known until
+                it rests.
             state: State, see `on_path`.
             forecast: Forecast, see `on_path`.
-            wanted: Requested stop, see `on_path`.
-            asked: Largest torques that the motion itself would ask for from now on, shape (n,) [N m]; None: they are
-                not known, and a stop may ask for its share alone.
+            wanted: Requested deceleration, see `on_path`.
+            asked: Largest torques that the uninterrupted motion would need, shape (n,) [N m]; None if they are not
+                known, so that a stop may only use its share.
 
         Returns:
-            None where none is permitted but to let the motion run out.
+            None if no stop is permitted, so that the motion has to run out.
         """
         newest = ahead.samples[1]
-        along: list[float] = []  # how far it has come at each tick that is known
+        along: list[float] = []  # distance of the motion at each known tick
 
         def permitted(stop: PathStop) -> bool:
             ticks = math.ceil(stop.duration / self.period)
@@ -155,25 +160,25 @@ class StopPlanner:
         return self._quickest_on_path(state, newest, forecast, wanted, permitted, asked)
 
     def asked(self, ahead: Floats) -> Floats:
-        """Largest torques that a motion asks for from now on, shape (n,) [N m].
+        """Largest torques that a motion needs from now on, shape (n,) [N m].
 
         Args:
-            ahead: Its `References`, shape (k, n) [rad].
+            ahead: Its future references, shape (k, n) [rad].
         """
         return torque_along(self._dynamics, ahead, self.period)
 
     def by_joints(
         self, state: Target, wanted: float | None, clear: Callable[[JointStop], bool]
     ) -> JointStop | None:
-        """The quickest stop of every joint by itself that is clear all along and keeps the torque.
+        """Return the quickest stop with independent joints that is clear all the way and within the torque limits.
 
         Args:
             state: State of the newest shaped reference.
-            wanted: Deceleration asked for [rad/s^2]; None for as much as possible.
-            clear: Whether nothing meets on its way.
+            wanted: Requested deceleration [rad/s^2]; None for the largest possible.
+            clear: Returns whether the whole way of a stop is clear.
 
         Returns:
-            None where there is none.
+            None if there is no such stop.
         """
         torque = StopTorque(self._dynamics, state, self._torque)
         stops = (self.stop(state, acceleration) for acceleration in self._ladder(wanted))
@@ -182,7 +187,7 @@ class StopPlanner:
         return _first(within, lambda stop, rebound: torque.holds(stop, rebound=rebound) and fits(stop))
 
     def stop(self, state: Target, acceleration: float) -> JointStop:
-        """A stop of every joint by itself within an acceleration [rad/s^2], whatever it asks for."""
+        """Return a stop with independent joints within an acceleration [rad/s^2], whatever torque it needs."""
         return JointStop(
             state.q, state.qd, state.qdd, acceleration=acceleration, jerk=self.jerk, period=self.period
         )
@@ -211,16 +216,16 @@ class StopPlanner:
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
 
     def _keeping(self, state: Target, forecast: Forecast, acceleration: float) -> MotionLimits | None:
-        """Limits of a stop's parameter with which no joint passes an acceleration [rad/s^2], nor the jerk of any stop.
+        """Limits for a stop's parameter that keep all joints within an acceleration [rad/s^2] and the jerk of stops.
 
-        The velocity is the highest that the stop may have, while it takes the present acceleration back.
+        The velocity is the highest that can occur in the stop while the present acceleration is reduced.
         """
         speed, rise = abs(forecast.path.forwards(state.qd)), abs(forecast.path.forwards(state.qdd))
         fastest = speed + self.period * rise + rise * rise / self.jerk
         return forecast.path.keeping(MotionLimits(fastest, acceleration, self.jerk), fastest)
 
     def _ladder(self, wanted: float | None) -> Iterator[float]:
-        """Decelerations in the order in which they are tried: down from the wanted one, then up from it."""
+        """Decelerations in the order in which they are tried: down from the requested one, then up from it."""
         first = self.highest if wanted is None else min(max(wanted, GENTLEST_STOP), self.highest)
         down = first
         while down > GENTLEST_STOP:
@@ -236,7 +241,7 @@ class StopPlanner:
 
 
 def _first(stops: Iterable[S], holds: Callable[[S, bool], bool]) -> S | None:
-    """The first stop that holds counting the rebound, else the first that holds without; each is made once."""
+    """The first stop that holds with the rebound, else the first that holds without it; each is created once."""
     made = []
     for stop in stops:
         if holds(stop, True):

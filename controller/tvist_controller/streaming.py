@@ -1,10 +1,10 @@
-"""A stream of set-points that is followed, and what was counted of all streams."""
+"""The present stream of set-points, and the counts of all streams."""
 
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.trajectory import SetpointStream
 
 TIMEOUT = 0.25
-"""A stream without set-points for this long is stopped [s]."""
+"""Time without set-points after which a stream is stopped [s]."""
 
 
 class Streaming:
@@ -12,18 +12,18 @@ class Streaming:
 
     def __init__(self) -> None:
         self.stream: SetpointStream | None = None
-        """The one that is followed."""
+        """The present stream."""
         self._heard = 0.0
         self._refused: str | None = None
         self._late, self._lost, self._limited = 0, 0, 0
 
     @property
     def sequence(self) -> int | None:
-        """Newest set-point taken in; None without a stream, or before its first."""
+        """Sequence number of the newest accepted set-point; None without a stream or before its first set-point."""
         return None if self.stream is None else self.stream.sequence
 
     def begin(self, stream: SetpointStream, now: float) -> None:
-        """Follow a stream from a time on [s]."""
+        """Follow a stream; takes the present time [s]."""
         self.stream, self._heard, self._refused = stream, now, None
 
     def offer(self, sequence: int, q: Floats, now: float) -> None:
@@ -33,18 +33,18 @@ class Streaming:
             self.stream.offer(sequence, q)
 
     def refuse(self, why: str) -> None:
-        """Remember why a set-point was not taken: where none follows that is, this is what went wrong."""
+        """Remember why a set-point was rejected, to be reported if no valid one follows."""
         self._refused = why
 
     def silence(self, now: float) -> str | None:
-        """In words, that set-points have failed to come; None while they come."""
+        """Return a sentence if set-points have stopped coming; None while they come."""
         if self.stream is None or now - self._heard < TIMEOUT:
             return None
         refused = "" if self._refused is None else f"; the last one was refused: {self._refused}"
         return f"no set-point for {TIMEOUT:g} s{refused}"
 
     def end(self) -> bool:
-        """Follow it no longer, and keep its counts; whether there was one."""
+        """Stop following the stream, and add up its counts; return whether there was one."""
         if self.stream is None:
             return False
         self._late, self._lost, self._limited = self.counters()
@@ -52,7 +52,7 @@ class Streaming:
         return True
 
     def counters(self) -> tuple[int, int, int]:
-        """Late, lost and limited set-points since the start, the present stream's included."""
+        """Late, lost and limited set-points since the start, including the present stream's."""
         stream = self.stream
         late, lost, limited = (stream.late, stream.lost, stream.limited) if stream else (0, 0, 0)
         return self._late + late, self._lost + lost, self._limited + limited

@@ -1,4 +1,4 @@
-"""The rest of what moves: whether it stays clear, and how long it lasts."""
+"""Check of the remaining motion: whether it stays clear, and how long it lasts."""
 
 import numpy as np
 
@@ -18,11 +18,11 @@ from tvist_shaping.base import Filter
 
 
 class WayAhead:
-    """Looks at what the control line is going to do.
+    """Examines the future motion of the control line.
 
     Args:
         cycle: The control line.
-        outlook: On it.
+        outlook: Forecast of the control line.
         collisions: Collision model of the arm.
     """
 
@@ -34,22 +34,22 @@ class WayAhead:
 
     @property
     def met(self) -> Meeting | None:
-        """What the last reference that was not played would have led to."""
+        """Meeting that the latest refused reference would have led to."""
         return self._guard.met
 
     def begin(self) -> None:
-        """Watch a stream that begins from rest."""
+        """Start to monitor a stream that begins from rest."""
         self._guard.begin(self._cycle.newest)
         self._cycle.guard = self._guard
 
     def until_rest(self, plan: StopPlan | None = None) -> tuple[float | None, float | None]:
-        """How long it takes until the shaped reference rests [s], and how far the joint that turns most turns [rad].
+        """Time until the shaped reference rests [s], and the angle that the joint that turns most still turns [rad].
 
         Args:
-            plan: A stop that has begun; None for whatever is under way.
+            plan: A stop that has begun; None for the present motion.
 
         Returns:
-            None and None where it is too far ahead to say.
+            None and None if rest is too far ahead to tell.
         """
         if plan is not None:
             return plan.duration, plan.way
@@ -60,20 +60,20 @@ class WayAhead:
         return max(last - 1, 0) * PERIOD, float(np.abs(ahead[-1] - ahead[1]).max())
 
     def after_stream(self, end: JointStop) -> Meeting | None:
-        """What would meet while a stream comes to rest through the filter.
+        """Return the meeting that would occur while a stream comes to rest through the filter, if any.
 
         Args:
-            end: Its reference.
+            end: Reference of the end of the stream.
         """
         if self._tail_is_spacious(end):
             return None
         return self._on(self._outlook.foresee(trajectory=end))
 
     def rest_of_way(self, tvist: Filter | None) -> Meeting | None:
-        """What would meet on the rest of what moves; of a stream, in the quickest stop from here.
+        """Return the meeting that would occur on the rest of the motion, if any; for a stream, in the quickest stop.
 
         Args:
-            tvist: A filter to come; None for the present one.
+            tvist: A new filter; None for the present one.
         """
         cycle, collisions = self._cycle, self._collisions
         if cycle.at_rest:
@@ -92,14 +92,14 @@ class WayAhead:
         return None if found is None else found[1]
 
     def check_payload(self, payload: Payload, tvist: Filter | None) -> None:
-        """Check the rest of what moves with another payload, and put it into the collision model.
+        """Check the rest of the motion with another payload, and put the payload into the collision model.
 
         Args:
-            payload: What the controller is to believe that the arm carries.
-            tvist: Filter that comes with it; None for the present one.
+            payload: New declared payload.
+            tvist: New filter for it; None for the present one.
 
         Raises:
-            RefusalError: Something would meet; nothing has changed.
+            RefusalError: There would be a collision; nothing has changed.
         """
         collisions, q = self._collisions, self._cycle.position
         before = collisions.carried
@@ -113,10 +113,10 @@ class WayAhead:
             raise RefusalError("collision", "com", why, CLEARANCE)
 
     def check_filter(self, tvist: Filter) -> None:
-        """Check the rest of what comes to rest through the filter off any line, with another filter.
+        """Check with another filter the rest of a motion that comes to rest through the filter and is not on a path.
 
         Raises:
-            RefusalError: Something would meet.
+            RefusalError: There would be a collision.
         """
         cycle = self._cycle
         if cycle.guard is None or cycle.stopping or not cycle.trajectory.foreseeable:
@@ -126,7 +126,7 @@ class WayAhead:
             raise RefusalError("collision", "name", f"{met} on the rest of the way", CLEARANCE)
 
     def _tail_is_spacious(self, end: JointStop) -> bool:
-        """Whether there is room for whatever a filter makes of the references that it may still read."""
+        """Return whether there is room for any output of a filter from the references that it may still use."""
         cycle = self._cycle
         if cycle.tvist.peak > 1.0:
             return False
@@ -136,7 +136,7 @@ class WayAhead:
         return self._guard.is_spacious(q, window + self._guard.turned(qd, qdd, end.acceleration, end.jerk))
 
     def _on(self, ahead: Floats | None) -> Meeting | None:
-        """The first pair that meets on references that are known, one a tick, shape (k, n)."""
+        """Return the first pair of bodies that meets along known references, one for each tick, shape (k, n)."""
         if ahead is None:
             return None
         steps = np.abs(np.diff(ahead, axis=0)).max(axis=0)

@@ -1,4 +1,4 @@
-"""How fast it is on this machine: each part alone, the whole line, a served robot, and how many of them."""
+"""Speed on this machine: of each part, of the whole control line, of a served robot, and the number of robots."""
 
 import asyncio
 from collections.abc import Callable
@@ -10,15 +10,15 @@ from tvist_lab.benchmark.parts import parts
 from tvist_lab.benchmark.ur_interfaces import ur_interfaces
 
 OF_MANY = 0.4
-"""Share of the time for one robot that each number of robots is watched."""
+"""Time for which each number of robots is measured, as a share of the time for one robot [-]."""
 
 
 def bench(seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Measure everything.
+    """Run all measurements.
 
     Args:
-        seconds: How long to watch a served robot; 0: not at all.
-        tell: Told of what is measured next.
+        seconds: How long to measure a served robot; 0 to skip this.
+        tell: Called with a description of each measurement before it starts.
     """
     result: dict[str, Any] = parts(tell)
     if seconds > 0.0:

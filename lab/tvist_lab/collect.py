@@ -1,4 +1,4 @@
-"""Gather what a robot publishes, from a client."""
+"""Collection of a robot's messages by a client."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,7 +18,7 @@ class Collected:
     truths: list[Truth] = field(default_factory=list)
 
     def recording(self) -> Recording:
-        """The messages as columns, from the first to the last tick of which everything has arrived.
+        """Return the messages as columns, from the first to the last tick of which all messages have arrived.
 
         On a network the truth of a tick may come before or after its state.
         """
@@ -31,7 +31,7 @@ class Collected:
 
 @contextmanager
 def collect(robot: Robot) -> Iterator[Collected]:
-    """Everything the robot publishes while the block runs."""
+    """Collect everything that the robot publishes while the block runs."""
     collected = Collected()
     ends = [
         robot.on_state(collected.states.append),

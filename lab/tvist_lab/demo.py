@@ -21,36 +21,36 @@ from tvist_lab.served import served_robot
 
 
 class DemoError(RuntimeError):
-    """The demonstration did not run."""
+    """The demonstration failed."""
 
 
 @dataclass(frozen=True)
 class Demo:
-    """What came out."""
+    """Result of the demonstration."""
 
     report: dict[str, Any]
     """Report of `tvist paper`, with the checks."""
     recording: Path
     figures: list[Path]
     equal: bool
-    """The replay gave equal states and the recording equal figures."""
+    """Whether the replay gave equal states, and the recording equal figures."""
     verdict: str
-    """The checks in words."""
+    """Result of the checks in words."""
 
 
 def run_demo(folder: Path, seed: int, progress: Callable[[str], None]) -> Demo:
-    """Run it.
+    """Run the demonstration.
 
-    The figures are those of the server's own recording, in which nothing is missing however busy the machine is;
-    what this client received on the way is measured beside them.
+    The figures come from the server's own recording, which is complete however busy the machine is. The figures from
+    the messages that this client received are compared with them.
 
     Args:
-        folder: For recording and figures; an earlier demonstration's recording there is replaced.
+        folder: Folder for recording and figures; the recording of an earlier demonstration in it is replaced.
         seed: Seed of noise and gear errors.
-        progress: Told of each motion done.
+        progress: Called after each motion.
 
     Raises:
-        DemoError: The robot did not come up or went away, or its recording cannot be measured.
+        DemoError: The robot did not start or disconnected, or its recording cannot be measured.
     """
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "demo.mcap"
@@ -82,7 +82,7 @@ def run_demo(folder: Path, seed: int, progress: Callable[[str], None]) -> Demo:
 async def _run(
     path: Path, seed: int, progress: Callable[[str], None]
 ) -> tuple[Experiment, dict[tuple[str, str], Recording]]:
-    """Move the arm; the experiment still to be measured, and what this client received of each motion."""
+    """Move the arm; return the experiment, not yet measured, and the client's own recording of each motion."""
     live = {}
     options = ["--record", str(path), "--truth", "--seed", str(seed)]
     async with served_robot(options) as (robot, _), robot.control("demo") as arm:
@@ -99,7 +99,7 @@ async def _run(
 def _measure(
     done: Experiment, live: dict[tuple[str, str], Recording], content: RecordingFile
 ) -> tuple[bool, int]:
-    """Judge each motion by the recording; whether the live stream, where all of it arrived, gives the same."""
+    """Judge each motion by the recording; return whether the live stream, if it arrived completely, gives the same."""
     same, lost = True, 0
     for key, received in live.items():
         ticks = received["tick"]

@@ -1,4 +1,4 @@
-"""A robot in this process, as fast as it computes, behind the same client as one on the network."""
+"""A robot in this process, as fast as it computes, with the same client as a robot on the network."""
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -12,14 +12,14 @@ from tvist_server.config import ServeConfig
 
 
 def free_setup(config: ServeConfig | None = None, **changes: object) -> Setup:
-    """The default robot with a free clock and its truth told, or another one.
+    """Return a setup with a free clock and published truth, by default of the default robot.
 
     Args:
-        config: How it would be served, clock and truth included.
+        config: Configuration to start from, except clock and truth.
         changes: Fields of `ServeConfig` to change.
 
     Raises:
-        ConfigError: A change names no field, or has no value for it.
+        ConfigError: A change names no field, or has an invalid value.
     """
     from tvist_server.config import from_mapping
 
@@ -31,6 +31,6 @@ def free_setup(config: ServeConfig | None = None, **changes: object) -> Setup:
 
 @asynccontextmanager
 async def robot_in_process(setup: Setup) -> AsyncIterator[Robot]:
-    """A client of a robot in this process."""
+    """Run a robot in this process, and yield a client of it."""
     async with Robot.over(LoopbackTransport(LoopbackHost(setup))) as robot:
         yield robot

@@ -1,4 +1,4 @@
-"""Recordings on disk: MCAP files of one robot, whole or cut short, back into memory."""
+"""Reader of recordings: MCAP files of one robot, complete or truncated."""
 
 import os
 import re
@@ -26,55 +26,55 @@ from tvist_protocol.stream import Event, State, Truth
 MAGIC = b"\x89MCAP0\r\n"
 """First bytes of every MCAP file."""
 RECORD_LIMIT = 2**28
-"""Longest record believed [bytes]: a damaged length must not ask for all memory."""
+"""Longest accepted record [bytes], so that a damaged length cannot exhaust the memory."""
 
 _TOPIC = re.compile(r"tvist/(?P<robot>[^/]+)/(?P<kind>\w+)")
 _KINDS: dict[str, type[State | Event | Truth | Entry]] = {tag(k): k for k in (State, Event, Truth, Entry)}
 _DAMAGE = (McapError, ZstdError, ValueError, OverflowError, MemoryError)
-"""What an altered record raises: a false checksum is a ValueError, a length may be beyond memory."""
+"""Exceptions for a damaged record: a wrong checksum is a ValueError, and a length may exceed the memory."""
 
 
 class RecordingFileError(RecordingError):
-    """A file that is no recording of a robot."""
+    """The file is not a recording of a robot."""
 
 
 @dataclass(frozen=True)
 class RecordingFile:
-    """What stands in a file."""
+    """Content of a recording."""
 
     robot: str
     """Name of the robot."""
     info: Info | None
-    """The robot when the recording began; None in a file of another program."""
+    """Description of the robot when the recording began; None in a file of another program."""
     start: dict[str, Any] | None
-    """How its server was started; None in a file of another program."""
+    """How the robot's server was started; None in a file of another program."""
     states: tuple[State, ...]
-    """Recorded states, at least one; NaN where a number was not finite."""
+    """Recorded states, at least one; NaN for numbers that were not finite."""
     events: tuple[Event, ...]
     """Recorded events."""
     truths: tuple[Truth, ...]
     """Recorded truth; empty unless the robot published it."""
     journal: tuple[Entry, ...]
-    """What reached the controller."""
+    """Inputs of the controller."""
     complete: bool
     """Whether the file was closed properly, and read to its end."""
     dropped: Mapping[str, int] | None
-    """Messages the recorder had no room for, by kind; None where the file does not say."""
+    """Number of messages that the recorder dropped, by kind; None if the file does not contain it."""
     note: str | None
-    """A sentence where something is missing."""
+    """A sentence if something is missing."""
 
     @cached_property
     def recording(self) -> Recording:
-        """States, truth and events as columns."""
+        """Return states, truth and events as columns."""
         return Recording.from_states(self.states, self.events, self.truths, self.info)
 
 
 def read(path: str | os.PathLike[str]) -> RecordingFile:
-    """Read a recording. What is cut short or damaged is read up to there, and says so.
+    """Read a recording. A truncated or damaged file is read up to the damage, which `note` reports.
 
     Raises:
-        RecordingFileError: It cannot be opened, is no MCAP file, holds none or several robots' states, or no
-            state at all.
+        RecordingFileError: The file cannot be opened, is not an MCAP file, or contains no state or the states of
+            several robots.
     """
     path = Path(path)
     content = _Content(path)
@@ -91,7 +91,7 @@ def read(path: str | os.PathLike[str]) -> RecordingFile:
 
 @dataclass
 class _Content:
-    """What has been read so far."""
+    """Content read so far."""
 
     path: Path
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -185,7 +185,7 @@ class _Content:
 
 
 def _records(stream: IO[bytes]) -> Iterator[McapRecord]:
-    """Records in order; those of a chunk only if the whole of it is sound."""
+    """Yield records in order; those of a chunk only if the whole chunk is intact."""
     for record in StreamReader(
         stream, emit_chunks=True, validate_crcs=True, record_size_limit=RECORD_LIMIT
     ).records:

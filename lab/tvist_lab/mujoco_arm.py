@@ -1,4 +1,4 @@
-"""The flexible arm in MuJoCo as a plant: a second implementation to put at the end of a controller's line."""
+"""The flexible arm in MuJoCo as a plant: a second implementation for a controller to drive."""
 
 import math
 
@@ -8,17 +8,17 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.plant import Measurement, PlantError, PlantTruth
 
 TIMESTEP = 0.00025
-"""Time step of MuJoCo at which it agrees with `FlexibleArm` [s]."""
+"""Time step at which MuJoCo agrees with `FlexibleArm` [s]."""
 
 
 class MujocoArm:
-    """The arm in MuJoCo: a `Plant`, which can be neither pushed nor broken and does not know its modes.
+    """The arm in MuJoCo: a `Plant` without external pushes, faults and true modes.
 
-    Nothing is left to chance: it has neither sensor noise nor gear errors, and seeds mean nothing to it.
+    It is deterministic: it has neither sensor noise nor gear errors, and ignores seeds.
 
     Args:
         description: The arm.
-        payload: What it carries.
+        payload: Carried payload.
     """
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
@@ -31,7 +31,7 @@ class MujocoArm:
 
     @property
     def payload(self) -> Payload:
-        """What the arm carries."""
+        """Carried payload."""
         return self._payload
 
     def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:  # noqa: ARG002
@@ -59,7 +59,7 @@ class MujocoArm:
         return Measurement(q=arm.q, qd=arm.qd, moment=arm.moment(), accelerometer=self._force.copy())
 
     def truth(self) -> PlantTruth:
-        """What no robot can know, at the present state."""
+        """Return what a real robot cannot measure, at the present state."""
         arm = self._arm
         return PlantTruth(
             motor_q=arm.motor_q,

@@ -1,4 +1,4 @@
-"""Recordings in memory: what a robot published, as one array a column, ready to be measured."""
+"""Recordings in memory: a robot's messages as one array per column, ready for metrics."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -38,28 +38,29 @@ STATE_COLUMNS = (
 )
 """Fields of a `state`, each of which becomes a column of the same name."""
 TRUTH_PREFIX = "truth_"
-"""Before the name of a field of `truth`, where it is a column."""
+"""Prefix of the column names of fields of `truth`."""
 
 
 class RecordingError(ValueError):
-    """A recording lacks what is asked of it, or what it is made of does not fit together."""
+    """A recording lacks requested data, or its parts do not fit together."""
 
 
 @dataclass(frozen=True)
 class Recording:
-    """States of one robot over increasing ticks, with the events between them.
+    """States of one robot at increasing ticks, with the events between them.
 
-    Ticks may be missing (a slow reader loses states); the time of a row is `time`, never its index times the
+    Ticks may be missing, since a slow reader loses states; the time of a row is `time`, never its index times the
     period.
     """
 
     columns: Mapping[str, Floats]
-    """Name to values, shape (T,) or (T, k); units as in the messages (SI, rad); NaN where a field was null or
-    shorter than in other rows. A column `truth_*` is what no robot can know."""
+    """Name to values, shape (T,) or (T, k), in the units of the messages (SI, rad); NaN if a field was null or
+    shorter than in other rows. Columns `truth_*` contain what a real robot cannot measure.
+    """
     events: tuple[Any, ...] = ()
-    """Events in order of tick; each has `tick`, `kind`, `id`, `code`, `why`."""
+    """Events in the order of their ticks; each has `tick`, `kind`, `id`, `code`, `why`."""
     info: Any = None
-    """The robot's `info` message, where there is one."""
+    """The robot's `info` message, if there is one."""
 
     def __post_init__(self) -> None:
         lengths = {name: len(column) for name, column in self.columns.items()}
@@ -81,16 +82,16 @@ class Recording:
         truths: Iterable[Any] = (),
         info: Any = None,
     ) -> "Recording":
-        """Turn messages into columns.
+        """Convert messages to columns.
 
-        A state that is put again (a robot in lockstep repeats its last one) counts once. A tick without truth
-        has NaN in the truth columns.
+        A repeated state (a robot in lockstep repeats its last one) counts once. A tick without truth has NaN in the
+        truth columns.
 
         Args:
-            states: With the fields of `STATE_COLUMNS` as attributes, in any order.
-            events: With `tick` as attribute.
-            truths: With `tick` and other fields as attributes; each field becomes a column `truth_<field>`.
-            info: Kept as it is.
+            states: Objects with the fields of `STATE_COLUMNS` as attributes, in any order.
+            events: Objects with the attribute `tick`.
+            truths: Objects with `tick` and other fields as attributes; each field becomes a column `truth_<field>`.
+            info: Stored unchanged.
 
         Raises:
             RecordingError: There is no state.
@@ -115,7 +116,7 @@ class Recording:
         return name in self.columns
 
     def __getitem__(self, name: str) -> Floats:
-        """Values of a column, shape (T,) or (T, k).
+        """Return the values of a column, shape (T,) or (T, k).
 
         Raises:
             RecordingError: There is no column of that name.
@@ -143,7 +144,7 @@ class Recording:
         """Time between ticks [s].
 
         Raises:
-            RecordingError: Fewer than two states.
+            RecordingError: There are fewer than two states.
         """
         if len(self) < 2:
             raise RecordingError("the period of a recording shows from two states on")
@@ -152,15 +153,15 @@ class Recording:
 
     @property
     def missing_ticks(self) -> int:
-        """Ticks between the first and the last row that have no row."""
+        """Number of ticks between the first and the last row that have no row."""
         tick = self["tick"]
         return int(tick[-1] - tick[0]) + 1 - len(self) if len(self) else 0
 
     def between(self, first_tick: int, last_tick: int) -> "Recording":
-        """The rows and events of a range of ticks, both ends included.
+        """Return the rows and events in a range of ticks, both ends included.
 
         Raises:
-            RecordingError: No row lies in it.
+            RecordingError: There is no row in the range.
         """
         tick = self["tick"]
         first, past = np.searchsorted(tick, [first_tick, last_tick + 1])
@@ -171,12 +172,12 @@ class Recording:
         return replace(self, columns=columns, events=events)
 
     def index(self, tick: int) -> int:
-        """Index of the first row at or after a tick; the length of the recording where there is none."""
+        """Index of the first row at or after a tick; the length of the recording if there is none."""
         return int(np.searchsorted(self["tick"], tick))
 
 
 def _fields(message: Any) -> list[str]:
-    """Names of a message's numeric fields but its time, from a msgspec struct or a plain object."""
+    """Names of a message's numeric fields except its time, from a msgspec struct or a plain object."""
     names = getattr(message, "__struct_fields__", None)
     names = list(vars(message)) if names is None else list(names)
     return [
@@ -187,7 +188,7 @@ def _fields(message: Any) -> list[str]:
 
 
 def _column(values: list[Any]) -> Floats:
-    """Numbers or lists of numbers, one a row; null and what a shorter list lacks become NaN."""
+    """Convert numbers or lists of numbers, one per row; null and missing entries become NaN."""
     width = max(
         (len(value) for value in values if isinstance(value, (list, tuple, np.ndarray))), default=None
     )

@@ -1,4 +1,4 @@
-"""Run a recording's commands again, free of any clock, and compare what comes out bit by bit."""
+"""Replay of a recording's inputs without a clock, with a bit-by-bit comparison of the output."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -16,29 +16,29 @@ from tvist_server.recording import Recorder
 
 
 class ReplayError(TvistError):
-    """A recording cannot be replayed; the sentence says why."""
+    """A recording cannot be replayed; the message says why."""
 
 
 @dataclass
 class Replay:
-    """States, events and truths of the second run."""
+    """States, events and truths of the replay."""
 
     states: list[State] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     truths: list[Truth] = field(default_factory=list)
     first_difference: str | None = None
-    """First difference from the first run; None if there is none."""
+    """First difference from the original; None if there is none."""
     notes: list[str] = field(default_factory=list)
-    """What a person should know of it."""
+    """Remarks for the user."""
 
 
 def replay(setup: Setup, journal: Sequence[Entry], states: Sequence[State]) -> Replay:
-    """Give a new controller the same messages at the same ticks.
+    """Give a new controller the same inputs at the same ticks.
 
     Args:
-        setup: How the recorded controller started.
-        journal: What reached it.
-        states: What it put out, from its first tick on; only their number and values are used.
+        setup: Initial setup of the recorded controller.
+        journal: Inputs of the recorded controller.
+        states: Its states, from its first tick on; only their number and values are used.
     """
     controller, presence, done = Controller(setup), Presence(), Replay()
     entries = iter(journal)
@@ -59,20 +59,20 @@ def replay(setup: Setup, journal: Sequence[Entry], states: Sequence[State]) -> R
 def replay_file(
     content: RecordingFile, output: Path | None = None, own_shapers: Sequence[OwnShaper] = ()
 ) -> Replay:
-    """Replay a recording from its own start.
+    """Replay a recording with its own setup.
 
     Args:
         content: The recording, from the server's first tick on.
-        output: MCAP file for the second run.
-        own_shapers: Shapers from files that the robot was served with, loaded again. Where a file has changed since, a
-            note says so.
+        output: MCAP file for the replay's own recording.
+        own_shapers: Shapers from files that the robot was served with, loaded again. A note reports each file that
+            has changed since.
 
     Raises:
-        ReplayError: The recording does not say how its robot started, or begins too late; or a shaper from a file is
-            missing, or is one too many.
-        ValueError: What it says of the start is wrong.
+        ReplayError: The recording does not contain its robot's setup, or begins too late; or a shaper from a file is
+            missing or not needed.
+        ValueError: The recorded setup is invalid.
     """
-    if not content.start:  # a recording made from outside has an empty one
+    if not content.start:  # empty in recordings made by another program
         raise ReplayError(
             "the recording has no initial setup of its robot; only tvist serve --record writes it"
         )
@@ -88,7 +88,7 @@ def replay_file(
 
 
 def _used(start: dict[str, Any], given: Sequence[OwnShaper]) -> tuple[list[OwnShaper], list[str]]:
-    """The shapers from files in the order in which they were loaded, and a note for each file that has changed."""
+    """Return the shapers from files in the order in which they were loaded, and a note for each changed file."""
     try:
         recorded = checked(start.get("own_shapers", []), list[RecordedShaper])
     except ProtocolError as error:
@@ -142,7 +142,7 @@ def _tick(controller: Controller, setup: Setup, done: Replay) -> None:
 
 def _give(controller: Controller, entry: Entry, presence: Presence) -> None:
     match entry.kind:
-        case "client_seen":  # of recordings made before sessions were told apart
+        case "client_seen":  # in recordings from before sessions were distinguished
             presence.seen(entry.client or "", entry.session or "")
         case "client_gone":
             presence.gone(entry.client or "", entry.session or "")

@@ -1,4 +1,4 @@
-"""The design of a fixed shaper that is robust over a whole workspace."""
+"""Design of a fixed shaper that is robust over a whole workspace."""
 
 import numpy as np
 
@@ -10,10 +10,11 @@ TOLERANCE = 0.05
 
 
 def robust_over(name: str, f_d: tuple[float, float], zeta: tuple[float, float]) -> tuple[float, float]:
-    """Design of a fixed shaper for a whole workspace.
+    """Return the design of a fixed shaper for a whole workspace.
 
-    The shortest that leaves at most 5 % anywhere; where none does, the one that leaves least at worst. Damping is
-    taken to fall linearly from its highest value at the lowest frequency to its lowest at the highest.
+    It is the shortest one that leaves at most 5 % anywhere; if none does, the one with the smallest worst case. The
+    damping ratio is assumed to fall linearly from its highest value at the lowest frequency to its lowest value at
+    the highest frequency.
 
     Args:
         name: Name of the shaper.
@@ -21,7 +22,7 @@ def robust_over(name: str, f_d: tuple[float, float], zeta: tuple[float, float]) 
         zeta: Lowest and highest damping ratio [-].
 
     Returns:
-        Design frequency [Hz] and damping [-].
+        Design frequency [Hz] and damping ratio [-].
     """
     frequencies = np.linspace(*f_d, 60)
     damping = _damping(frequencies, f_d, zeta)

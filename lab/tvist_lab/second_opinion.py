@@ -1,8 +1,8 @@
-"""A second opinion on the plant: the same arm built in MuJoCo from the same numbers and nothing else of ours.
+"""Verification of the plant: the same arm built in MuJoCo from the same description, independently of our model.
 
-Bodies, virtual joints and lumps are placed by the description's Denavit-Hartenberg parameters; MuJoCo finds
-the dynamics and integrates them (semi-implicit Euler with implicit damping, first order). The two have the
-description in common; gear errors and sensor noise are left out. Needs the package `mujoco`.
+Bodies, virtual joints and lumps are placed by the description's Denavit-Hartenberg parameters; MuJoCo computes the
+dynamics and integrates them (semi-implicit Euler with implicit damping, first order). Only the description is shared;
+gear errors and sensor noise are left out. Requires the package `mujoco`.
 """
 
 import mujoco
@@ -22,17 +22,17 @@ PERIOD = 0.002
 class SecondOpinion:
     """The flexible arm and its drives in MuJoCo.
 
-    A motor is a rotor of inertia B in a body of its own, a gear the spring of a fixed tendon from its angle
-    to the joint's. Velocity gain and friction's slope at rest are joint damping, which MuJoCo takes
+    A motor is a rotor of inertia B in a separate body; a gear is the spring of a fixed tendon between its angle and
+    the joint's. The velocity gain and the slope of friction at rest are joint damping, which MuJoCo integrates
     implicitly; the rest of the drive is a torque on the rotor.
 
     Args:
         description: The robot.
-        payload: What it carries.
+        payload: Carried payload.
         timestep: Time step of MuJoCo's integrator, a fraction of 2 ms [s]. 1 ms is unstable for the UR5e.
 
     Raises:
-        ValueError: 2 ms is no multiple of the time step.
+        ValueError: 2 ms is not a multiple of the time step.
     """
 
     def __init__(self, description: RobotDescription, payload: Payload, timestep: float) -> None:
@@ -67,7 +67,7 @@ class SecondOpinion:
         self._command = np.zeros((3, description.joints))
 
     def reset(self, command: DriveCommand) -> Floats:
-        """Static equilibrium under a command, integrators preloaded; link-side q, shape (n,) [rad]."""
+        """Set static equilibrium under a command, with preloaded integrators; return link-side q, shape (n,) [rad]."""
         data = self._data
         mujoco.mj_resetData(self._model, data)
         self._command = np.array([command.q, command.qd, command.torque])
@@ -82,7 +82,7 @@ class SecondOpinion:
         return self.q
 
     def step(self, command: DriveCommand) -> Floats:
-        """One period of 2 ms, the drives going linearly to this command; link-side q, shape (n,) [rad]."""
+        """Simulate 2 ms while the drives approach the command linearly; return link-side q, shape (n,) [rad]."""
         start, end = self._command, np.array([command.q, command.qd, command.torque])
         data = self._data
         for k in range(self._steps):
@@ -167,7 +167,7 @@ def _build(description: RobotDescription, payload: Payload, timestep: float) -> 
     spec.option.timestep = timestep
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0.0, 0.0, -9.81]
-    # A state that is no longer finite stays so, to be noticed; MuJoCo would start anew at zero by itself.
+    # Keep a non-finite state, so that it is detected; by default MuJoCo would restart at zero.
     spec.option.disableflags = int(
         mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_AUTORESET
     )
@@ -219,7 +219,7 @@ def _build(description: RobotDescription, payload: Payload, timestep: float) -> 
 
 
 def _add_mass(body: "mujoco.MjsBody", mass: float, com: tuple[float, float, float], inertia: Tensor) -> None:
-    """Give a body its mass, its centre and its inertia about it (xx xy xz yy yz zz)."""
+    """Set a body's mass, centre of mass and inertia about it (xx xy xz yy yz zz)."""
     xx, xy, xz, yy, yz, zz = inertia
     body.mass, body.ipos, body.fullinertia = mass, list(com), [xx, yy, zz, xy, xz, yz]
     body.explicitinertial = True

@@ -1,4 +1,4 @@
-"""A robot served by a process of its own, as a user would start it."""
+"""A robot served by a separate process, as a user would start it."""
 
 import asyncio
 import socket
@@ -12,35 +12,35 @@ from tvist_client.errors import ClientError
 from tvist_client.robot import Robot
 
 _BIND = "import os, sys; os.sched_setaffinity(0, {int(sys.argv[1])}); os.execv(sys.argv[2], sys.argv[2:])"
-"""Binds itself to a processor, and becomes the program behind."""
+"""Binds its process to a processor, and then executes the program given after it."""
 PATIENCE = 300.0
-"""How long a robot may take to answer at first [s]: a cold start compiles, on a slow machine for minutes."""
+"""Longest wait for a robot's first answer [s]; a cold start compiles, which takes minutes on a slow machine."""
 
 
 class ServedError(RuntimeError):
-    """The served robot did not come up, or did not end well."""
+    """The served robot did not start, or failed at its end."""
 
 
 def free_port() -> int:
-    """A TCP port of 127.0.0.1 that nobody listens on."""
+    """Return a free TCP port of 127.0.0.1."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
 
 
 def free_endpoint() -> str:
-    """An endpoint on this machine that nobody listens on."""
+    """Return a free endpoint on this machine."""
     return f"tcp/127.0.0.1:{free_port()}"
 
 
 @dataclass(frozen=True)
 class Served:
-    """A server that answers."""
+    """A server that has answered."""
 
     endpoint: str
     pid: int
     took: float
-    """From its start until it answered [s]."""
+    """Time from its start until it answered [s]."""
     robot: Robot
     """A client of the robot, or the first of several."""
 
@@ -54,14 +54,14 @@ async def served(
     core: int | None = None,
     patience: float = PATIENCE,
 ) -> AsyncIterator[Served]:
-    """`tvist serve` with options, and a client of it; SIGTERM and a clean exit at the end.
+    """Run `tvist serve` with options, and connect a client; at the end, send SIGTERM and check the exit code.
 
     Args:
         options: Options of `tvist serve`, besides the endpoint.
-        name: The robot's name, or that of one of several.
+        name: Name of the robot, or of one of several.
         several: Whether the options name the robots.
-        core: Processor the server is bound to.
-        patience: How long it may take to answer at first [s].
+        core: Processor to bind the server to.
+        patience: Longest wait for the first answer [s].
 
     Raises:
         ServedError: It does not answer, or its exit code is not 0.
@@ -90,7 +90,7 @@ async def served(
 
 @asynccontextmanager
 async def served_robot(options: Sequence[str], name: str = "ur5e") -> AsyncIterator[tuple[Robot, str]]:
-    """Serve one robot, see `served`; gives a client of it and its endpoint.
+    """Serve one robot, see `served`; yield a client of it and its endpoint.
 
     Raises:
         ServedError: It does not answer, or its exit code is not 0.

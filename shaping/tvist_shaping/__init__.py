@@ -1,4 +1,4 @@
-"""Time-varying input shaping: a filter that takes the vibration out of a reference, on line."""
+"""Time-varying input shaping: a filter that removes vibration from a reference in real time."""
 
 from tvist_shaping.aimed import AimedFilter
 from tvist_shaping.base import Filter

@@ -1,4 +1,4 @@
-"""Compile a function with numba; where numba is missing the plain Python function serves."""
+"""Compile functions with numba, or use them as plain Python if numba is not installed."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
@@ -7,10 +7,10 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def compiled(function: F) -> F:
-    """Compiled `function`; its Python source stays reachable as `.py_func`. The cache survives the process.
+    """Compile a function; its Python source remains available as `.py_func`. The cache outlives the process.
 
-    numba notices a change of the file a kernel stands in, not of the files it calls into: a kernel and what
-    it calls stand in one file.
+    numba detects changes of the file that contains a kernel, but not of the files with functions that it calls. A
+    kernel and the functions that it calls are therefore in the same file.
     """
     try:
         from numba import njit

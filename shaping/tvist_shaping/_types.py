@@ -1,4 +1,4 @@
-"""The one array type of the package."""
+"""The package's only array type."""
 
 from typing import TypeAlias
 

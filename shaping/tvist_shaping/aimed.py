@@ -1,4 +1,4 @@
-"""A filter that is told where a motion will end, and takes the weights of that place from the start."""
+"""A filter that knows where a motion will end, and uses the weights for that configuration from the start."""
 
 import numpy as np
 import numpy.typing as npt
@@ -8,11 +8,11 @@ from tvist_shaping.steady import SMOOTH, Design, SteadyFilter
 
 
 class AimedFilter(SteadyFilter):
-    """Filter for motions with a known end, since the vibration after a motion is that of the arm at its end.
+    """Filter for motions with a known end, since the vibration after a motion has the modes of the arm at its end.
 
-    Weights that do not change cannot exceed the limits of what they shape, need no averaging and do not lag behind
-    the arm. In motion, where the arm is still elsewhere, they fit less. Where no end is told, for a stream, it is a
-    `SteadyFilter`.
+    Constant weights cannot exceed the limits of the reference, need no averaging, and do not lag behind the arm.
+    During the motion, while the arm is elsewhere, they fit less well. If no end is known, as in a stream, the filter
+    behaves like a `SteadyFilter`.
     """
 
     def __init__(self, design: Design, estimator: Estimator, *, joints: int, smooth: int = SMOOTH) -> None:
@@ -22,10 +22,10 @@ class AimedFilter(SteadyFilter):
         self.excess = 0.0
 
     def aim(self, q: npt.ArrayLike | None) -> None:
-        """Take the weights of where a motion will end; the reference must be at rest.
+        """Use the weights for the end of a motion; the reference must be at rest.
 
         Args:
-            q: Sample at the end, shape (width,); None: it is not known.
+            q: Sample at the end, shape (width,); None if it is not known.
         """
         if q is None:
             self._start()

@@ -1,4 +1,4 @@
-"""Amplitudes of undamped shapers whose impulses stand at equal distances."""
+"""Amplitudes of undamped shapers with equally spaced impulses."""
 
 import math
 
@@ -11,23 +11,24 @@ from tvist_shaping.errors import DesignError
 def ripple(humps: int, V: float) -> Floats:
     """Amplitudes of the extra-insensitive shapers: impulses half a period apart, humps of equal height V.
 
-    Without damping the residual vibration of N = humps + 2 impulses is a polynomial of degree N - 1 in cos(π f/2f_d),
-    and the one that stays at V over the widest band is Chebyshev's (as in Dolph's antenna arrays, Proc. IRE 34, 1946):
+    Without damping, the residual vibration of N = humps + 2 impulses is a polynomial of degree N - 1 in cos(π
+    f/2f_d). The polynomial that stays within V over the widest band is Chebyshev's (as in Dolph's antenna arrays,
+    Proc. IRE 34, 1946):
 
         V(f) = V |T_{N-1}(x₀ cos(π f/2f_d))|,    T_{N-1}(x₀) = 1/V.
 
-    For one hump this is ((1+V)/4, (1-V)/2, (1+V)/4), for two and three the shapers of Singhose, Porter, Tuttle and
-    Singer (J. Dyn. Sys. Meas. Control 119, 1997); with none it is zv.
+    For one hump the amplitudes are ((1+V)/4, (1-V)/2, (1+V)/4). For two and three humps they are the shapers of
+    Singhose, Porter, Tuttle and Singer (J. Dyn. Sys. Meas. Control 119, 1997); without humps they are those of zv.
 
     Args:
         humps: Number of humps, 0 to 10.
-        V: Their height [-], 1e-4 to 0.5.
+        V: Height of the humps [-], 1e-4 to 0.5.
 
     Returns:
-        Amplitudes [-], shape (humps + 2,), sum 1, positive, symmetric.
+        Amplitudes [-], shape (humps + 2,), with sum 1, positive and symmetric.
 
     Raises:
-        DesignError: A number is out of range.
+        DesignError: An argument is out of range.
     """
     if not 0 <= humps <= 10:
         raise DesignError("humps", humps, "0 to 10")
@@ -51,19 +52,20 @@ def widening(humps: int, V: float) -> float:
 def modified(n: int, t: float) -> Floats:
     """Amplitudes of the modified zero-vibration shapers MZV(n, t) (known from Klipper).
 
-    n impulses at equal distances in t periods, with n - 1 zeros of the residual at 1 + i/τ times the frequency,
-    τ = t (n-2)/(n-2t-1) and i = 0 … n-2: the first at the design, the others above it. In w = exp(2πi f t/(n-1)f_d)
-    the residual is a polynomial, and its zeros stand at equal angles from 2πt/(n-1) round to its mirror image.
+    n equally spaced impulses in t periods, with n - 1 zeros of the residual at 1 + i/τ times the design frequency, τ
+    = t (n-2)/(n-2t-1) and i = 0 … n-2: the first zero is at the design frequency, the others are above it. In w =
+    exp(2πi f t/(n-1)f_d) the residual is a polynomial whose zeros are equally spaced in angle, from 2πt/(n-1) round
+    to its mirror image.
 
     Args:
         n: Number of impulses, 3 to 30.
         t: Duration in periods [-], 0 < t < (n-1)/2.
 
     Returns:
-        Amplitudes [-], shape (n,), sum 1, none negative, symmetric.
+        Amplitudes [-], shape (n,), with sum 1, non-negative and symmetric.
 
     Raises:
-        DesignError: A number is out of range, or an amplitude would be negative.
+        DesignError: An argument is out of range, or an amplitude would be negative.
     """
     if not 3 <= n <= 30:
         raise DesignError("n", n, "3 to 30 impulses")

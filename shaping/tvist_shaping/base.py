@@ -1,4 +1,4 @@
-"""What every filter is: a delay line, an estimator, and weights that follow the modes."""
+"""Base of all filters: a delay line, an estimator, and weights that depend on the modes."""
 
 import copy
 from abc import ABC, abstractmethod
@@ -20,23 +20,23 @@ Posture = Callable[[Floats], Floats]
 class Filter(ABC):
     """Time-varying shaping of a sampled reference, one filter for all joints.
 
-    A sample is the joint angles, or the parameter of a path that the joints go along (`reset`): then the shaped
-    parameter stays a parameter, and the shaped reference on its path however that curves. The modes are always those
-    at the joint angles that the shaped sample stands for.
+    A sample consists of the joint angles, or of the parameter of a path that the joints follow (see `reset`). In the
+    second case the shaped sample is also a parameter, so the shaped reference stays on the path, however that curves.
+    The modes are always evaluated at the joint angles that the shaped sample represents.
 
     Attributes:
-        name: What it is called: of a shaper, or of a design.
+        name: Name of the filter's shaper or design.
         estimator: The modes as functions of q.
-        joints: How many joints the arm has: entries of a sample, unless samples are parameters of a path.
-        period: h [s].
-        f_d: Damped frequencies it works with [Hz], shape (modes,).
-        zeta: Damping ratios it works with [-], shape (modes,).
-        excess: Share by which the shaped acceleration may exceed the reference's, as far as it is known and kept
-            small: who makes the reference can stay that much below a limit [-].
-        clipped: Whether it could not do what it should at the last tick: a delay was beyond what it holds, or a mode
-            beyond what its estimator believes.
-        fault: Why the shaper's function failed when it was asked last; None: it did not. A filter in the middle of a
-            motion cannot stop dead, so it goes on with the last weights it had, and somebody should stop the motion.
+        joints: Number of joints of the arm, and of entries of a sample unless samples are parameters of a path.
+        period: Sampling period h [s].
+        f_d: Damped frequencies in use [Hz], shape (modes,).
+        zeta: Damping ratios in use [-], shape (modes,).
+        excess: Share by which the shaped acceleration may exceed the reference's, if such a bound is known and small
+            [-]. The generator of the reference can stay below its limit by this share.
+        clipped: Whether the filter was limited at the last tick: a delay exceeded the buffer, or a mode was outside
+            its estimator's bounds.
+        fault: Why the shaper's function failed in its last call; None if it did not. A filter cannot stop abruptly
+            during a motion, so it continues with its last weights, and the caller should stop the motion.
     """
 
     name: str
@@ -50,17 +50,17 @@ class Filter(ABC):
     fault: str | None
 
     def __init__(self, name: str, estimator: Estimator, joints: int, period: float, capacity: int) -> None:
-        """The parts that all filters have; a filter of its own kind then calls `reset`.
+        """Initialize the common parts of all filters; a derived class then calls `reset`.
 
         Args:
-            name: What it is called.
+            name: Name of the filter.
             estimator: The estimator.
-            joints: Joints of the arm, >= 1.
+            joints: Number of joints of the arm, >= 1.
             period: Time between two samples h [s], > 0.
-            capacity: Samples to keep.
+            capacity: Number of samples to keep.
 
         Raises:
-            FilterError: A number is out of range.
+            FilterError: An argument is out of range.
         """
         if joints < 1:
             raise FilterError("joints", joints, "at least 1")
@@ -71,7 +71,7 @@ class Filter(ABC):
         self.excess, self.clipped, self.fault = 0.0, False, None
         self._line = DelayLine(joints, capacity)
         self._reach = capacity
-        """Number of the newest samples that weights may use."""
+        """Number of newest samples that the weights may use."""
         self._posture: Posture | None = None
         self._q_star: Floats = np.zeros(joints)
         """Shaped sample of the last tick."""
@@ -79,40 +79,40 @@ class Filter(ABC):
     @property
     @abstractmethod
     def delay(self) -> float:
-        """Time of the last weight of the last tick [s]: how much later the shaped reference ends."""
+        """Time of the last tick's last weight [s], by which the shaped reference ends later."""
 
     @property
     @abstractmethod
     def mean_delay(self) -> float:
-        """Mean delay of the weights of the last tick [s]: the lag behind a reference of constant velocity."""
+        """Mean delay of the last tick's weights [s], which is the lag behind a reference of constant velocity."""
 
     @property
     def peak(self) -> float:
-        """Factor by which the velocity and acceleration may exceed the reference's while the weights stay as they are.
+        """Factor by which velocity and acceleration may exceed the reference's while the weights are constant.
 
-        The sum of the weights' magnitudes [-], 1 where none is negative.
+        It is the sum of the weights' magnitudes [-], which is 1 if none is negative.
         """
         return 1.0
 
     @abstractmethod
     def _start(self) -> None:
-        """Weights for the modes at the last shaped reference, nothing remembered."""
+        """Compute the weights for the modes at the last shaped reference, without any history."""
 
     @abstractmethod
     def _weigh(self) -> None:
-        """Weights of the next tick, and with them the next shaped reference."""
+        """Compute the weights of the next tick, and from them the next shaped reference."""
 
     @property
     def width(self) -> int:
-        """Entries of a sample."""
+        """Number of entries of a sample."""
         return self._line.joints
 
     def reset(self, q: npt.ArrayLike, posture: Posture | None = None) -> None:
-        """Start anew at rest: the reference has been at q for ever.
+        """Restart at rest, as if the reference had always been at q.
 
         Args:
             q: First sample, finite: joint angles [rad], shape (joints,); or a parameter of a path, shape (width,).
-            posture: Function from a parameter to the joint angles there; None: samples are joint angles.
+            posture: Function from a parameter to the joint angles; None if samples are joint angles.
 
         Raises:
             ShapingError: q has another shape.
@@ -126,11 +126,11 @@ class Filter(ABC):
         self._q_star[:] = sample
         self._start()
 
-    def aim(self, q: npt.ArrayLike | None) -> None:  # noqa: B027  most filters do not care
-        """Hear where the motion that begins now will end; the reference must be at rest.
+    def aim(self, q: npt.ArrayLike | None) -> None:  # noqa: B027  most filters ignore this
+        """Set where the motion that begins now will end; the reference must be at rest.
 
         Args:
-            q: Sample at the end, shape (width,); None: it is not known, as in a stream.
+            q: Sample at the end, shape (width,); None if it is not known, as in a stream.
         """
 
     def filter(self, q_ref: npt.ArrayLike) -> Floats:
@@ -140,7 +140,7 @@ class Filter(ABC):
             q_ref: Reference x_i, shape (width,), finite: joint angles [rad], or the parameter of a path.
 
         Returns:
-            Shaped reference x*_i, shape (width,), the caller's own.
+            Shaped reference x*_i, shape (width,), as a new array.
 
         Raises:
             ShapingError: q_ref has another shape.
@@ -150,51 +150,51 @@ class Filter(ABC):
         return self._q_star.copy()
 
     def fork(self) -> Self:
-        """An independent copy that goes on from here.
+        """Return an independent copy of the present state.
 
-        For the same samples it gives the same bits as this filter, and whatever it is given changes nothing here:
-        so one can run ahead to see what this one is going to do.
+        For equal samples it gives the same bits as this filter, and its use does not change this filter. So a copy
+        can be run ahead to predict the output of this filter.
 
         Returns:
-            The copy, with an estimator of its own; use it in the thread of the original.
+            The copy, with its own estimator; use it in the same thread as the original.
         """
         other = copy.copy(self)
         other._part()  # noqa: SLF001  one of its own kind
         return other
 
     def _part(self) -> None:
-        """Replace what is changed in place by copies: a new copy of the filter shares it still."""
+        """Replace everything that is modified in place by copies, since a new copy of the filter still shares it."""
         self.estimator, self._line = self.estimator.fork(), self._line.fork()
         self._q_star = self._q_star.copy()
 
     @property
     def settled(self) -> bool:
-        """Whether all that it may still read is one sample, so that its output rests."""
+        """Whether all samples that the filter may still use are equal, so that its output is constant."""
         return self._line.still > self._reach
 
     def window(self) -> Floats:
-        """Samples of the reference that it may still read, the oldest first, shape (k, width)."""
+        """Samples of the reference that the filter may still use, the oldest first, shape (k, width)."""
         return self._line.newest(self._line.capacity)
 
     def _modes(self) -> tuple[Floats, Floats]:
-        """Modes at the last shaped reference: followed in motion, anew where any weights give the same.
+        """Modes at the last shaped reference: followed in motion, computed anew where all weights give the same.
 
-        Where the line holds one sample as far as weights may reach, and did a tick ago, so that the shaped reference
-        rests on it.
+        This is the case if the part of the delay line that weights may use contains a single value, and did so a tick
+        ago, so that the shaped reference rests at that value.
         """
         q = self._angles(self._q_star)
         return self.estimator.settle(q) if self.settled else self.estimator.estimate(q)
 
     def _angles(self, sample: Floats) -> Floats:
-        """Joint angles that a sample stands for, shape (joints,) [rad]."""
+        """Return the joint angles that a sample represents, shape (joints,) [rad]."""
         return sample if self._posture is None else self._posture(sample)
 
     def _widen(self, width: int) -> None:
-        """Take samples of another width from now on."""
+        """Accept samples of another width from now on."""
         self._line, self._q_star = DelayLine(width, self._line.capacity), np.zeros(width)
 
     def _check_made(self) -> None:
-        """Refuse a shaper that fails at once: there are no weights yet to go on with.
+        """Refuse a shaper that fails at once, since there are no weights yet to continue with.
 
         Raises:
             ShaperFailureError: The shaper fails.
@@ -203,10 +203,10 @@ class Filter(ABC):
             raise ShaperFailureError(self.name, self.fault)
 
     def take_over(self, other: "Filter") -> None:
-        """Go on where another filter is: with the reference it was given, from the shaped one it gave.
+        """Continue from another filter: with the reference that it was given, and from its last shaped sample.
 
         Args:
-            other: The filter to go on from; it is left as it is.
+            other: Filter to continue from; it is not changed.
 
         Raises:
             ShapingError: The other filter has a different number of joints.

@@ -1,4 +1,4 @@
-"""The shapers by name."""
+"""Catalogue of shapers by name."""
 
 from collections.abc import Mapping
 from difflib import get_close_matches
@@ -73,7 +73,7 @@ SHAPERS: Mapping[str, Shaper] = MappingProxyType(
 
 
 def shaper(name: str) -> Shaper:
-    """Look a shaper up by its name.
+    """Look up a shaper by its name.
 
     Args:
         name: One of `SHAPERS`.

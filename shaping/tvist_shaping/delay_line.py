@@ -1,8 +1,8 @@
-"""A delay line with fractional delays: what lets an impulse stand between two ticks.
+"""A delay line with fractional delays, so that impulses can lie between two ticks.
 
-A delay rounded to ticks lets the shaped reference jump when the delay moves on by one (Fig. 7 of the paper);
-an interpolated one moves through. The interpolation is Lagrange's through four samples: it has no state, so a
-delay may change every tick without a transient, and it reproduces cubics exactly (the paper's source for
+If delays were rounded to ticks, the shaped reference would jump whenever a delay changes by one tick (Fig. 7 of the
+paper); with interpolation it changes smoothly. Lagrange interpolation through four samples is used: it has no state,
+so a delay may change at every tick without a transient, and it reproduces cubics exactly (the paper's source for
 fractional delays is Laakso et al., 1996).
 """
 
@@ -17,23 +17,23 @@ from tvist_shaping._types import Floats
 from tvist_shaping.errors import DelayError, ShapingError
 
 _MARGIN = 3
-"""Samples a delay needs beyond itself: two older ones to interpolate, and the newest has delay 0."""
+"""Number of samples that a delay needs beyond itself: two older ones for interpolation, and the newest with delay 0."""
 
 
 @compiled
 def gather(buffer: Floats, newest: int, A: Floats, delays: Floats, first: Floats, out: Floats) -> int:
-    """Weighted sum of delayed samples; the formula is in `DelayLine.gather`.
+    """Compute a weighted sum of delayed samples; the formula is in `DelayLine.gather`.
 
     Args:
-        buffer: Ring of samples, shape (capacity, joints).
-        newest: Row of the newest sample; older ones stand before it, modulo capacity.
+        buffer: Ring buffer of samples, shape (capacity, joints).
+        newest: Row of the newest sample; older ones precede it, modulo capacity.
         A: Amplitudes [-], shape (N,).
         delays: Delays [ticks], shape (N,).
         first: Scratch, shape (joints,).
         out: Result, shape (joints,).
 
     Returns:
-        Index of the first delay the buffer does not hold; -1 if it holds all: only then is `out` written.
+        Index of the first delay that exceeds the buffer, or -1; `out` is written only in the latter case.
     """
     capacity, joints = buffer.shape
     for j in range(A.shape[0]):
@@ -42,8 +42,8 @@ def gather(buffer: Floats, newest: int, A: Floats, delays: Floats, first: Floats
     for j in range(A.shape[0]):
         delay = delays[j]
         whole = int(delay)
-        # Four nodes at the delays start … start + 3, the delay between the second and the third of them;
-        # below one tick there is nothing newer to take, and it is between the first and the second.
+        # Interpolate between nodes at the delays start … start + 3, with the delay between the second and the third.
+        # Below one tick there is no newer sample, so the delay is between the first and the second.
         start = max(whole - 1, 0)
         s = delay - start
         w0 = -(s - 1.0) * (s - 2.0) * (s - 3.0) / 6.0
@@ -58,7 +58,7 @@ def gather(buffer: Floats, newest: int, A: Floats, delays: Floats, first: Floats
         for k in range(joints):
             x = buffer[near, k]
             if delay != whole:
-                # The weights sum to 1: taken on differences, they leave a constant the same to the last bit.
+                # The weights sum to 1. Applied to differences, they preserve a constant to the last bit.
                 x += (
                     w0 * (buffer[n0, k] - x)
                     + w1 * (buffer[n1, k] - x)
@@ -74,14 +74,13 @@ def gather(buffer: Floats, newest: int, A: Floats, delays: Floats, first: Floats
 
 
 class DelayLine:
-    """The last samples of a reference, readable at any delay between two of them.
+    """The latest samples of a reference, which can be read at any fractional delay.
 
     Attributes:
-        joints: Entries of a sample.
-        capacity: Samples held.
+        joints: Number of entries of a sample.
+        capacity: Number of samples in the buffer.
         max_delay: Longest delay that can be read [ticks].
-        still: How many of the newest samples are the same to the last bit, at least 1. It counts on beyond the
-            capacity.
+        still: Number of newest samples that are equal to the last bit, at least 1. It may exceed the capacity.
     """
 
     joints: int
@@ -90,14 +89,14 @@ class DelayLine:
     still: int
 
     def __init__(self, joints: int, capacity: int) -> None:
-        """A line filled with zeros.
+        """Create a line filled with zeros.
 
         Args:
-            joints: Entries of a sample, >= 1.
-            capacity: Samples held, >= 4; the longest delay is three ticks less.
+            joints: Number of entries of a sample, >= 1.
+            capacity: Number of samples in the buffer, >= 4; the longest delay is three ticks less.
 
         Raises:
-            ShapingError: joints or capacity is below that.
+            ShapingError: joints or capacity is too small.
         """
         if joints < 1 or capacity <= _MARGIN:
             raise ShapingError(
@@ -115,7 +114,7 @@ class DelayLine:
         return f"DelayLine(joints={self.joints}, capacity={self.capacity})"
 
     def fill(self, q: npt.ArrayLike) -> None:
-        """Let the reference have been at q for ever.
+        """Fill the line as if the reference had always been at q.
 
         Args:
             q: Sample, shape (joints,), finite.
@@ -128,7 +127,7 @@ class DelayLine:
         self.still, self._bits = self.capacity, sample.tobytes()
 
     def push(self, q: npt.ArrayLike) -> None:
-        """Append the newest sample; the oldest is forgotten.
+        """Append the newest sample, and drop the oldest.
 
         Args:
             q: Sample, shape (joints,), finite.
@@ -139,20 +138,20 @@ class DelayLine:
         sample = self._sample(q)
         self._newest = (self._newest + 1) % self.capacity
         self._buffer[self._newest] = sample
-        bits = sample.tobytes()  # the quickest way to compare
+        bits = sample.tobytes()  # the fastest comparison
         self.still = self.still + 1 if bits == self._bits else 1
         self._bits = bits
 
     def newest(self, count: int) -> Floats:
-        """The last samples, oldest first, shape (count, joints); count is at most the capacity."""
+        """The latest samples, oldest first, shape (count, joints); count is at most the capacity."""
         ages = np.arange(count - 1, -1, -1)
         return self._buffer[(self._newest - ages) % self.capacity]
 
     def take_over(self, other: "DelayLine") -> None:
-        """Hold what another line holds; where that is shorter, its oldest sample has been there for ever.
+        """Copy the content of another line; if that is shorter, its oldest sample fills the rest.
 
         Args:
-            other: The line to copy from; it is left as it is.
+            other: The line to copy from; it is not changed.
 
         Raises:
             ShapingError: The other line contains samples of a different shape.
@@ -166,7 +165,7 @@ class DelayLine:
         self.still = other.still if other.still < other.capacity else max(other.still, self.capacity)
 
     def fork(self) -> Self:
-        """An independent copy that holds the same samples."""
+        """Return an independent copy with the same samples."""
         other = copy.copy(self)
         other._part()  # noqa: SLF001  one of its own kind
         return other
@@ -176,10 +175,10 @@ class DelayLine:
 
             y = x(d_1) + Σ_{j>1} A_j (x(d_j) - x(d_1))
 
-        which is Σ A_j x(d_j) for ΣA = 1, written so that a constant reference comes out as the same floats. A
-        whole delay takes the sample itself; one between two samples the cubic through the four around it; one
-        below a tick the cubic through the newest four. (A cubic may pass the samples it joins: by at most 1/8
-        of what they span, 1/3 below one tick, and not noticeably where the reference is smooth.)
+        This equals Σ A_j x(d_j) for ΣA = 1, in a form that returns a constant reference as exactly the same floats. A
+        whole delay uses the sample itself; a delay between two samples uses the cubic through the four nearest
+        samples; a delay below one tick uses the cubic through the newest four. (A cubic may overshoot the samples: by
+        at most 1/8 of their range, or 1/3 below one tick, and negligibly if the reference is smooth.)
 
         Args:
             A: Amplitudes [-], shape (N,), sum 1.
@@ -187,7 +186,7 @@ class DelayLine:
             out: Array that receives y, shape (joints,).
 
         Raises:
-            DelayError: A delay is outside that range or not a number; `out` is left as it was.
+            DelayError: A delay is outside that range or not a number; `out` is not changed.
         """
         refused = gather(self._buffer, self._newest, A, delays, self._first, out)
         if refused >= 0:

@@ -1,36 +1,36 @@
-"""What can be wrong, one class a condition; each keeps its data as attributes beside a readable sentence.
+"""Errors, with one class for each condition; each has its data as attributes and a readable message.
 
 ShapingError
-├── ImpulseError          A and τ are no impulse train
+├── ImpulseError          A and τ are not an impulse train
 ├── ParameterError        a parameter is out of its range
-│   ├── ShaperRangeError  f_d or ζ no shaper is defined for
-│   ├── DesignError       a parameter of a shaper's design is wrong
-│   └── EstimatorError    an estimator's parameter is wrong
-├── UnknownShaperError    a name that is not in the catalogue
-├── ShaperFailureError    a shaper's function fails, or breaks what its shaper declares
+│   ├── ShaperRangeError  f_d or ζ is outside the range of a shaper
+│   ├── DesignError       a parameter of a shaper's design is invalid
+│   └── EstimatorError    an estimator's parameter is invalid
+├── UnknownShaperError    a name is not in the catalogue
+├── ShaperFailureError    a shaper's function fails, or violates its shaper's declaration
 ├── ConvergenceError      a design has no solution
-├── DelayError            a delay the line does not hold
-└── FilterError           shaper, estimator and delay line do not fit each other
+├── DelayError            a delay exceeds the delay line
+└── FilterError           shaper, estimator and delay line do not fit together
 """
 
 from collections.abc import Sequence
 
 
 class ShapingError(ValueError):
-    """Root of what this package raises on purpose."""
+    """Base class of all errors that this package raises deliberately."""
 
 
 class ImpulseError(ShapingError):
-    """Amplitudes and times that are no impulse train with unit sum."""
+    """Amplitudes and times are not an impulse train with unit sum."""
 
 
 class ParameterError(ShapingError):
-    """A parameter that is out of its range.
+    """A parameter is out of its range.
 
     Attributes:
-        field: The parameter's name.
-        value: What was given.
-        limit: What is allowed, in words.
+        field: Name of the parameter.
+        value: Given value.
+        limit: Permitted range, in words.
     """
 
     def __init__(self, field: str, value: object, limit: str) -> None:
@@ -41,22 +41,22 @@ class ParameterError(ShapingError):
 
 
 class ShaperRangeError(ParameterError):
-    """A mode no shaper is defined for.
+    """A mode is outside the range of a shaper.
 
     Attributes:
-        field: The parameter's name, `f_d` or `zeta`.
-        value: What was given, f_d in [Hz], zeta in [-].
-        limit: The range it leaves, in words.
+        field: Name of the parameter, `f_d` or `zeta`.
+        value: Given value, f_d in [Hz], zeta in [-].
+        limit: Permitted range, in words.
     """
 
 
 class UnknownShaperError(ShapingError):
-    """A name that is not in the catalogue.
+    """A name is not in the catalogue.
 
     Attributes:
-        name: What was asked for.
-        known: The names there are.
-        nearest: The known name most like it, None where none is.
+        name: Given name.
+        known: Available names.
+        nearest: The most similar available name; None if none is similar.
     """
 
     def __init__(self, name: str, known: Sequence[str], nearest: str | None) -> None:
@@ -68,14 +68,14 @@ class UnknownShaperError(ShapingError):
 
 
 class DesignError(ParameterError):
-    """A parameter of a shaper's design is wrong."""
+    """A parameter of a shaper's design is invalid."""
 
 
 class ShaperFailureError(ShapingError):
-    """A shaper's function raises, gives no weights, or gives others than its shaper declares.
+    """A shaper's function raises an exception, returns no weights, or returns weights that violate the declaration.
 
     Attributes:
-        name: The shaper's name.
+        name: Name of the shaper.
         why: What is wrong, and for which modes.
     """
 
@@ -86,15 +86,15 @@ class ShaperFailureError(ShapingError):
 
 
 class ConvergenceError(ShapingError):
-    """Equations that define a shaper and have no solution that was found."""
+    """No solution was found for the equations that define a shaper."""
 
 
 class DelayError(ShapingError):
-    """A delay outside what the delay line holds.
+    """A delay exceeds the delay line.
 
     Attributes:
-        delay: What was asked for [ticks].
-        limit: The longest delay the line holds [ticks].
+        delay: Given delay [ticks].
+        limit: Longest delay of the line [ticks].
     """
 
     def __init__(self, delay: float, limit: float) -> None:
@@ -104,16 +104,16 @@ class DelayError(ShapingError):
 
 
 class EstimatorError(ParameterError):
-    """A parameter of an estimator is wrong."""
+    """A parameter of an estimator is invalid."""
 
 
 class FilterError(ShapingError):
-    """Shaper, estimator and delay line do not fit each other; the message says which and what to do.
+    """Shaper, estimator and delay line do not fit together; the message says what to change.
 
     Attributes:
-        field: What does not fit: `duration` [s], `zeta_max` [-], `period` [s], `max_delay` [s] or `joints`.
-        value: What it is.
-        limit: What it would have to be, in words.
+        field: The value that does not fit: `duration` [s], `zeta_max` [-], `period` [s], `max_delay` [s] or `joints`.
+        value: Present value.
+        limit: Required value, in words.
     """
 
     def __init__(self, field: str, value: float, limit: str, advice: str = "") -> None:

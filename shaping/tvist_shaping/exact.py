@@ -1,17 +1,19 @@
-"""Extra-insensitive shapers that are exact under damping: humps of height V, and V at f_d where there is a hump.
+"""Extra-insensitive shapers that are exact with damping: humps of height V, and V at f_d if a hump is there.
 
-`ripple` has the undamped ones. With damping neither their times nor their amplitudes are right any more: taken times
-K^j they leave less than V, and the band is narrower than it could be. Here the conditions themselves are solved. With
-N = humps + 2 impulses, T_d = 1, s = 2π(ζ/√(1-ζ²) + i), c = Re s, r the true frequency over the design's, and
+`ripple` computes the undamped ones. With damping, neither their times nor their amplitudes are exact: with amplitudes
+multiplied by K^j they leave less than V, and their band is narrower than possible. Here the conditions themselves are
+solved. With N = humps + 2 impulses, T_d = 1, s = 2π(ζ/√(1-ζ²) + i), c = Re s, and r the ratio of true to design
+frequency,
 
     E(r) = Σ A_j exp(r (s τ_j - c τ_N))    (|E| is the residual of `sensitivity`)
 
-there are N - 1 zeros E = 0 and between them N - 2 humps |E| = V, d|E|/dr = 0; the middle one of all these stands at
-r = 1. Together with ΣA = 1 that is as many equations as unknowns A_j, τ_j and r. Solved from no damping upwards.
+has N - 1 zeros E = 0 and between them N - 2 humps |E| = V, d|E|/dr = 0; the middle one of all these is at r = 1.
+Together with ΣA = 1 there are as many equations as unknowns A_j, τ_j and r. They are solved from zero damping
+upwards.
 
-The damping cannot be anything: the highest zero moves up and runs away to infinity. A shaper ends where it is at
-1.8 times the design frequency. (Fits of third degree in ζ to the shapers of two and three humps are in print and in
-printer firmware, valid to 0.3 and 0.2; their times are in *undamped* periods.)
+The damping is limited, because the highest zero moves up to infinity as damping increases. A shaper ends when this
+zero is at 1.8 times the design frequency. (Cubic fits in ζ to the shapers with two and three humps have been
+published, and are used in printer firmware, valid to 0.3 and 0.2; their times are in *undamped* periods.)
 """
 
 import math
@@ -26,25 +28,25 @@ from tvist_shaping.newton import solve
 from tvist_shaping.tabulated import Tabulated
 
 HIGHEST_ZERO = 1.8
-"""Largest frequency of the highest zero, in design frequencies [-]."""
+"""Largest permitted frequency of the highest zero, relative to the design frequency [-]."""
 
 
 class HumpShaper:
-    """The equations for a number of humps and their height."""
+    """The equations for a given number and height of humps."""
 
     def __init__(self, humps: int, V: float) -> None:
-        """Set up the shaper.
+        """Set up the equations.
 
         Args:
             humps: Number of humps, at least 1.
-            V: Their height [-].
+            V: Height of the humps [-].
 
         Raises:
-            DesignError: A number is out of range, see `ripple`.
+            DesignError: An argument is out of range, see `ripple`.
         """
         self.humps, self.V, self.N = humps, V, humps + 2
         degree = humps + 1
-        # Zeros and humps of Chebyshev's polynomial: where the undamped shaper has them.
+        # Zeros and humps of Chebyshev's polynomial, which are those of the undamped shaper.
         x = np.cos(np.arange(1, 2 * degree) * math.pi / (2 * degree)) / widening(humps, V)
         features = 2.0 / math.pi * np.arccos(x)
         self.start: Floats = np.concatenate(
@@ -52,7 +54,7 @@ class HumpShaper:
         )
 
     def follow(self, zeta: float, near: Floats) -> tuple[Floats, Floats, Floats]:
-        """Unknowns, amplitudes [-] and times in damped periods [-] at ζ, from the unknowns at another."""
+        """Unknowns, amplitudes [-] and times in damped periods [-] at ζ, from the unknowns at a nearby ζ."""
         x = solve(lambda points: self._equations(zeta, points), near)
         A, tau, _, _ = self._split(x[None])
         return x, A[0], tau[0]
@@ -71,7 +73,7 @@ class HumpShaper:
         return round(zeta, 2)
 
     def _split(self, points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """Amplitudes, times, zeros and humps, shape (M, …) each."""
+        """Split the unknowns into amplitudes, times, zeros and humps, shape (M, …) each."""
         N, one = self.N, np.ones((len(points), 1))
         A, tau = points[:, :N], np.hstack([0.0 * one, points[:, N : 2 * N - 1]])
         below, above = np.split(points[:, 2 * N - 1 :], 2, axis=1)
@@ -97,14 +99,14 @@ class HumpShaper:
 
 
 def exact(humps: int, V: float) -> Tabulated:
-    """The shaper of some humps of height V, up to the highest damping there is for it.
+    """Return the shaper with humps of height V, up to its highest possible damping.
 
     Args:
-        humps: 1 to 10.
+        humps: Number of humps, 1 to 10.
         V: Height of the humps [-], 1e-4 to 0.5.
 
     Raises:
-        DesignError: A number is out of range.
+        DesignError: An argument is out of range.
     """
     shaper = HumpShaper(humps, V)
     return Tabulated(
@@ -120,14 +122,14 @@ EI, EI2, EI3 = (
 
 
 def ei_exact(f_d: float, zeta: float) -> Impulses:
-    """One hump of height V = 5 % under any damping up to 0.52; `ei` where there is none.
+    """One hump of height V = 5 % with any damping up to 0.52; equal to `ei` without damping.
 
     Args:
         f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
         zeta: Damping ratio of the mode [-], 0 <= ζ < 0.52.
 
     Returns:
-        A [-] and τ [s], each of shape (3,), of the equations at the top.
+        A [-] and τ [s], each of shape (3,), from this module's equations.
 
     Raises:
         ShaperRangeError: f_d or ζ is outside the range above.
@@ -136,14 +138,14 @@ def ei_exact(f_d: float, zeta: float) -> Impulses:
 
 
 def ei2_exact(f_d: float, zeta: float) -> Impulses:
-    """Two humps of height V = 5 % under any damping up to 0.32; `ei2` where there is none.
+    """Two humps of height V = 5 % with any damping up to 0.32; equal to `ei2` without damping.
 
     Args:
         f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
         zeta: Damping ratio of the mode [-], 0 <= ζ < 0.32.
 
     Returns:
-        A [-] and τ [s], each of shape (4,), of the equations at the top.
+        A [-] and τ [s], each of shape (4,), from this module's equations.
 
     Raises:
         ShaperRangeError: f_d or ζ is outside the range above.
@@ -152,14 +154,14 @@ def ei2_exact(f_d: float, zeta: float) -> Impulses:
 
 
 def ei3_exact(f_d: float, zeta: float) -> Impulses:
-    """Three humps of height V = 5 % under any damping up to 0.2; `ei3` where there is none.
+    """Three humps of height V = 5 % with any damping up to 0.2; equal to `ei3` without damping.
 
     Args:
         f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
         zeta: Damping ratio of the mode [-], 0 <= ζ < 0.2.
 
     Returns:
-        A [-] and τ [s], each of shape (5,), of the equations at the top.
+        A [-] and τ [s], each of shape (5,), from this module's equations.
 
     Raises:
         ShaperRangeError: f_d or ζ is outside the range above.

@@ -1,17 +1,17 @@
 """Transition from one filter to another while the reference moves.
 
-The two are fed the same reference, and the output is y = o + s (n - o): o the old one's, n the new one's, s the
-share of the new one, from 0 to 1. While s stands still, y is a mean of o and n and keeps every limit that both
-keep. While it moves,
+Both filters get the same reference, and the output is y = o + s (n - o), with o the old filter's output, n the new
+one's, and s the share of the new one, from 0 to 1. While s is constant, y is a mean of o and n and keeps all limits
+that both keep. While s changes,
 
     ÿ = (1 - s) ö + s n̈ + 2 ṡ (ṅ - ȯ) + s̈ (n - o),
 
-so a fade of a fixed length leaves the limits wherever the motion itself uses them to the full. (To shorten the
-delay is to play the motion faster than it comes, and a motion at its limits cannot be.) Hence s goes as fast as the
-room that the motion leaves, and no faster than it could be stopped again if the motion took that room away at the
-jerk limit; or, where n is later than o, no faster than it is over when a joint at its limit of acceleration has come to
-that of velocity, for until then s cannot be stopped, but slows down by itself. Where there is no room it waits; where
-the reference rests, o and n agree and nothing is left to fade.
+so a fade of fixed duration would exceed the limits whenever the motion itself uses them fully. (Shortening the delay
+means playing the motion faster than it comes, which is impossible for a motion at its limits.) Hence s moves as fast
+as the motion leaves room for. It never moves faster than it could be stopped again if the motion took that room away
+at the jerk limit. If n lags behind o, s cannot be stopped until a joint that accelerates at its limit has reached its
+velocity limit, but it slows down by itself; its speed is then limited such that the fade does not end before that. If
+there is no room, s waits; when the reference is at rest, o and n agree and there is nothing left to fade.
 """
 
 import copy
@@ -27,27 +27,27 @@ from tvist_shaping.base import Filter
 from tvist_shaping.errors import FilterError
 
 NEGLIGIBLE = 1e-10
-"""Distance between two outputs that makes no difference [rad]."""
+"""Difference between two outputs that has no effect [rad]."""
 ROUNDING = 1e-7
-"""Share of the acceleration limit that the step from almost 1 to 1 may add [-]."""
+"""Share of the acceleration limit that the last step to s = 1 may add [-]."""
 EQUAL = 1e-6
-"""Difference of two mean delays that counts as zero [s]."""
+"""Difference between two mean delays that counts as zero [s]."""
 STRAIGHT = 1e-6
-"""Share of the farthest a joint may go in a tick by which it may be off the straight line of the others [-]."""
+"""Deviation of a joint from the straight line of the others that is tolerated, as a share of its largest step [-]."""
 QUICKEST = 0.3
-"""A fade takes no less time [s], however much room there is: it is meant to be slow against the vibration."""
+"""Shortest duration of a fade [s], however much room there is, since it has to be slow compared with the vibration."""
 PUSH = 0.4
-"""Share of the limits of acceleration and jerk with which s is hurried and comes to rest at 1 [-]."""
+"""Share of the limits of acceleration and jerk that s uses to speed up, and to come to rest at 1 [-]."""
 STOP = 0.5
-"""Share of the room that is counted on for stopping s [-]."""
+"""Share of the room that is assumed to be available for stopping s [-]."""
 MARGIN = 0.02
-"""Share of the acceleration limit that is not counted as room, at least [-]."""
+"""Smallest share of the acceleration limit that is excluded from the room [-]."""
 COAST = 0.5
-"""Share of the way left that s may go on by itself, where it cannot be stopped but does no harm [-]."""
+"""Share of the remaining way that s may coast while it cannot be stopped but exceeds no limit [-]."""
 BACK = 0.5
-"""Share of a joint's velocity that the fade may take away: no joint is to turn back for it [-]."""
+"""Share of a joint's velocity that the fade may remove, so that no joint turns back [-]."""
 EASE = 0.02
-"""Time in which ṡ eases to the highest that is safe [s]."""
+"""Time constant with which ṡ approaches its highest safe value [s]."""
 
 
 @compiled
@@ -60,20 +60,19 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
     period: float,
     lag: tuple[float, float],
 ) -> tuple[float, float, float]:
-    """One tick of a fade.
+    """Compute one tick of a fade.
 
     Args:
-        old: The old filter's output two ticks ago, one tick ago and now [rad], shape (3, joints).
-        new: The new filter's, likewise.
-        out: What was given out, likewise; its last row is written.
-        progress: Of the tick before: s [-], 0 to 1; ṡ [1/s], >= 0; s̈ that ṡ was wanted to change at [1/s²].
-        limits: For every joint: velocity [rad/s], acceleration [rad/s²], and how fast the motion's acceleration
-            changes at most [rad/s³].
+        old: The old filter's output at the last three ticks, the present one last [rad], shape (3, joints).
+        new: The new filter's output, in the same form.
+        out: The fade's output, in the same form; its last row is written.
+        progress: State of the previous tick: s [-], 0 to 1; ṡ [1/s], >= 0; requested rate of change of ṡ, s̈ [1/s²].
+        limits: Limits for every joint: velocity [rad/s], acceleration [rad/s²], and jerk of the motion [rad/s³].
         period: Tick [s].
-        lag: How much longer the new filter's mean delay is than the old one's [s], and its rate of change [-].
+        lag: Excess of the new filter's mean delay over the old one's [s], and its rate of change [-].
 
     Returns:
-        s, ṡ and s̈ of this tick; s is 1 where the fade is over.
+        s, ṡ and s̈ of this tick; s is 1 when the fade is complete.
     """
     share, rate, slope = progress
     velocity, acceleration, jerk = limits
@@ -89,16 +88,16 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
     if (1.0 - share) * apart <= ROUNDING * acceleration * h2:
         out[2] = new[2]
         return 1.0, 0.0, 0.0
-    least, most = -math.inf, math.inf  # of s, for the limits of this tick
-    # Highest ṡ from which s comes to rest at 1 with a part of the jerk limit.
+    least, most = -math.inf, math.inf  # bounds of s for the limits of this tick
+    # Highest ṡ from which s can come to rest at 1 with a share of the jerk limit.
     left, push = 1.0 - share, PUSH * jerk / widest
     safe = min(2.0 / QUICKEST, 0.5 * push ** (1.0 / 3.0) * (6.0 * left) ** (2.0 / 3.0))
     safe = min(safe, min(jerk / acceleration, 0.2 / period) * left)
-    # Room is what the motion leaves after another tick; one that can take all of it in a tick is believed to take half.
+    # The room is what the motion leaves after another tick. If it could take all of it in a tick, assume half.
     counted = acceleration - max(MARGIN * acceleration, min(jerk * period, 0.5 * acceleration))
-    # What there is to slow s with, when the motion may have taken it away, and how fast s may go where it has.
+    # Bounds for stopping s after the motion has taken the room away, and for moving s without room.
     brake, closed, coast, back = math.inf, math.inf, math.inf, math.inf
-    # In this time s slows down to a quarter by itself, where a joint without room holds it.
+    # Time in which s slows down to a quarter by itself, while a joint has no room.
     slows = 0.0
     for k in range(joints):
         d = new[2, k] - old[2, k]
@@ -115,31 +114,32 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
         old_qdd = (old[2, k] - 2.0 * old[1, k] + old[0, k]) / h2
         new_qdd = (new[2, k] - 2.0 * new[1, k] + new[0, k]) / h2
         old_qd, new_qd = (old[2, k] - old[1, k]) / period, (new[2, k] - new[1, k]) / period
-        # A filter whose parameters vary may exceed the reference's limits by itself.
+        # A filter with varying parameters may exceed the reference's limits by itself.
         qdd_max = (1.0 + ROUNDING) * max(acceleration, abs(old_qdd), abs(new_qdd))
         qd_max = (1.0 + ROUNDING) * max(velocity, abs(old_qd), abs(new_qd))
-        # The differences of the output are linear in s: a limit is an interval of s.
+        # The differences of the output are linear in s, so each limit is an interval of s.
         middle = -sign * (old[2, k] - 2.0 * out[1, k] + out[0, k]) / size
         least = max(least, middle - qdd_max * h2 / size)
         most = min(most, middle + qdd_max * h2 / size)
         middle = -sign * (old[2, k] - out[1, k]) / size
         least = max(least, middle - qd_max * period / size)
         most = min(most, middle + qd_max * period / size)
-        # Stopping s takes room on the far side of the motion's own acceleration. The motion may close it at the
-        # jerk limit, and until then a velocity of room²/(2 jerk) can be taken back.
+        # Stopping s uses the room opposite to the motion's own acceleration. The motion may take this room away at
+        # the jerk limit; until then, a velocity of room²/(2 jerk) can be removed.
         qdd, qd = share * new_qdd + left * old_qdd, share * new_qd + left * old_qd
         room = counted + sign * qdd
         turning = 2.0 * abs(d - new[1, k] + old[1, k])
-        if abs(d) < turning:  # d passes through zero: what was the far side is the near one in a tick
+        if abs(d) < turning:  # d passes through zero, so the sides are swapped within a tick
             room, size = min(room, counted - sign * qdd), turning
         brake, closed = min(brake, max(room, 0.0) / size), min(closed, max(room, 0.0) / jerk)
-        # A longer delay holds the joint back. Where the joint accelerates at its limit, d grows, and s slows down by
-        # itself, as 1/d²: that takes nothing of its acceleration. It lasts until the joint is at its highest velocity,
-        # which is to be before s is 1.
+        # A longer delay holds the joint back. While the joint accelerates at its limit, d grows and s slows down by
+        # itself, as 1/d², which uses none of the joint's acceleration. This lasts until the joint is at its highest
+        # velocity, which has to be before s is 1.
         lasts = max(qd_max + sign * qd, 0.0) / acceleration + 2.0 * acceleration / jerk
         grows = (later + min(drift, 0.0) * lasts) * acceleration - qd_max * abs(drift)  # |ḋ| at the least
         shrinks = sign * qdd < 0.0 and sign * (new_qd - old_qd) < -1e-4 * velocity
-        # Joints off one straight line may each hold s, one after the other, and nothing is sure of an end.
+        # Joints off a common straight line may block s one after the other, so the end of the fade would be
+        # uncertain.
         aside = (
             abs(d * along - (new[2, first] - old[2, first]) * (new[2, k] - new[0, k]))
             > STRAIGHT * widest * velocity * period
@@ -151,11 +151,11 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
             coast = min(coast, COAST * left * (width + grows * lasts) / (lasts * width))
         if sign * qd < 0.0:
             back = min(back, BACK * abs(qd) / size)
-    rest = 2.0 * STOP * left  # ṡ² by s̈: from which s rests at 1
+    rest = 2.0 * STOP * left  # ṡ² divided by s̈ for coming to rest at s = 1
     slow = min(0.5 * STOP * brake * closed, math.sqrt(rest * min(brake, PUSH * acceleration / widest)))
     slow = max(slow, min(coast, math.sqrt(rest * PUSH * acceleration / widest)))
     safe = min(safe, slow, back)
-    # Towards these ṡ eases; from this one and no faster s can just be stopped, with all the room there is.
+    # ṡ approaches `safe` gradually. At `hard`, s can just be stopped if all of the room is available.
     hard = max(min(0.5 * brake * closed, math.sqrt(2.0 * left * brake)), coast)
     wish = (safe - rate) / (EASE if safe > rate else period)
     slope = max(min(wish, slope + push * period), slope - jerk / widest * period)
@@ -163,11 +163,11 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
     wanted = max(rate + period * slope, 0.0)
     if wanted > hard:
         wanted, slope = hard, min(slope, 0.0)
-    if least > most:  # joints that want different things: none gets more than its room
+    if least > most:  # joints with contradictory bounds: none gets more than its room
         s = share + period * max(rate - period * brake, 0.0)
     else:
         s = min(max(share + period * wanted, least), most)
-    # Not even the limits may drive s on: where d passes through zero they would drive it without end.
+    # Even the limits must not speed s up: when d passes through zero, they would do so without bound.
     s = min(max(s, share), share + period * max(rate, wanted), 1.0)
     for k in range(joints):
         out[2, k] = old[2, k] + s * (new[2, k] - old[2, k])
@@ -175,17 +175,18 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
 
 
 class Fade:
-    """Shapes like one filter to begin with, like another in the end, and keeps a motion's limits in between.
+    """Shapes like one filter at the beginning, like another at the end, and keeps a motion's limits in between.
 
-    For as long as the reference keeps limits of velocity, acceleration and jerk, the output keeps those of velocity
-    and acceleration; where one of the filters exceeds them by itself, as time-varying ones do a little, it exceeds
-    them by no more. All joints fade together: a straight line stays one. How long it takes is up to the motion; it
-    is over at the latest when the reference has rested for as long as both filters last.
+    As long as the reference keeps limits of velocity, acceleration and jerk, the output keeps those of velocity and
+    acceleration. If one of the filters exceeds them by itself, as time-varying ones slightly do, the output exceeds
+    them by no more than that filter. All joints fade together, so a straight line stays straight. The duration
+    depends on the motion; the fade is complete at the latest when the reference has been at rest for the duration of
+    both filters.
 
     Attributes:
-        old: The filter it comes from.
-        new: The filter it goes to.
-        share: How much of the output is the new filter's [-], 0 to 1.
+        old: Filter at the beginning.
+        new: Filter at the end.
+        share: Share of the new filter in the output [-], 0 to 1.
     """
 
     old: Filter
@@ -195,18 +196,18 @@ class Fade:
     def __init__(
         self, old: Filter, new: Filter, *, velocity: float, acceleration: float, jerk: float
     ) -> None:
-        """A fade at its beginning.
+        """Create a fade at its beginning.
 
         Args:
-            old: The filter in force; whatever it does goes on without a step.
-            new: The filter to come. It takes over what the old one knows of the motion.
-            velocity: Limit of the motion, for every joint [rad/s], > 0.
-            acceleration: Limit of the motion, for every joint [rad/s²], > 0.
-            jerk: Limit of the motion, for every joint [rad/s³], > 0.
+            old: Present filter, whose output continues without a step.
+            new: New filter. It takes over the old filter's history of the motion.
+            velocity: Velocity limit of the motion, for every joint [rad/s], > 0.
+            acceleration: Acceleration limit of the motion, for every joint [rad/s²], > 0.
+            jerk: Jerk limit of the motion, for every joint [rad/s³], > 0.
 
         Raises:
             FilterError: A limit is out of range, or the filters have different periods.
-            ShapingError: The filters have different joints.
+            ShapingError: The filters have different numbers of joints.
         """
         for name, value in (("velocity", velocity), ("acceleration", acceleration), ("jerk", jerk)):
             if not 0.0 < value < math.inf:
@@ -225,14 +226,14 @@ class Fade:
 
     @property
     def finished(self) -> bool:
-        """Whether the output is the new filter's, from the last one on."""
+        """Whether the last output was entirely the new filter's, as all later ones will be."""
         return self.share == 1.0
 
     def fork(self) -> Self:
-        """An independent copy that goes on from here, with copies of both filters; see `Filter.fork`."""
+        """Return an independent copy of the present state, with copies of both filters; see `Filter.fork`."""
         other = copy.copy(self)
         other.old, other.new = self.old.fork(), self.new.fork()
-        if self.new.estimator is self.old.estimator:  # one that both ask remembers what either asked
+        if self.new.estimator is self.old.estimator:  # both use its state
             other.new.estimator = other.old.estimator
         other._history = self._history.copy()  # noqa: SLF001  one of its own kind
         return other
@@ -244,7 +245,7 @@ class Fade:
             q_ref: Reference x_i, shape (width,), finite: joint angles [rad], or the parameter of a path.
 
         Returns:
-            Shaped reference x*_i, shape (width,), the caller's own.
+            Shaped reference x*_i, shape (width,), as a new array.
 
         Raises:
             ShapingError: q_ref has another shape.
@@ -256,7 +257,7 @@ class Fade:
         old, new, out = history
         old[2], new[2] = self.old.filter(q_ref), self.new.filter(q_ref)
         out[2] = old[2]
-        if self._ticks < 2:  # it takes three samples to know an acceleration
+        if self._ticks < 2:  # an acceleration needs three samples
             self._ticks += 1
             self._later = self.new.mean_delay - self.old.mean_delay
         else:

@@ -1,4 +1,4 @@
-"""How a shaper's function may fail, and what to say of it."""
+"""Failures of a shaper's function, and their descriptions."""
 
 from typing import Final
 
@@ -6,25 +6,25 @@ from tvist_shaping._types import Floats
 from tvist_shaping.errors import ShaperFailureError
 
 FAILURES: Final = (Exception, SystemExit)
-"""What a function that somebody else wrote may raise. Control+C is not its doing."""
+"""Exceptions that a user's function may raise; Control+C is not among them."""
 ROUNDING: Final = 1e-6
-"""Share by which a figure may be beyond what its shaper declares [-]."""
+"""Share by which a value may exceed its shaper's declaration, because of rounding [-]."""
 
 
 def failure(error: BaseException, f_d: Floats, zeta: Floats) -> str:
-    """What went wrong, and for which modes; it goes on after a shaper's name.
+    """Describe an error and its modes, as a phrase to follow a shaper's name.
 
     Args:
-        error: What the function raised.
-        f_d: Damped frequencies it was asked for [Hz], shape (modes,).
-        zeta: Damping ratios it was asked for [-], shape (modes,).
+        error: Exception that the function raised.
+        f_d: Damped frequencies passed to the function [Hz], shape (modes,).
+        zeta: Damping ratios passed to the function [-], shape (modes,).
     """
     asked = ", ".join(f"f_d = {f:g} Hz and ζ = {z:g}" for f, z in zip(f_d, zeta, strict=True))
     return f"{words(error)} for {asked}"
 
 
 def words(error: BaseException) -> str:
-    """What goes on after a shaper's name: `raises ValueError: …`, or what it gives that is wrong."""
+    """Return a phrase to follow a shaper's name: `raises ValueError: …`, or what is wrong with its result."""
     if isinstance(error, ShaperFailureError):
         return error.why
     said = " ".join(str(error).split())[:200]

@@ -18,21 +18,21 @@ class TvistFilter(Filter):
 
         x*_i = Σ_j A_j(ζ) x(t_i - τ_j(f_d)),    (f_d, ζ) = estimator(x*_{i-1})
 
-    (eq. (10)): the impulses of *this* tick gather samples of the past. Their sum is 1 at every tick, so a
-    reference at rest passes unchanged whatever the parameters do, and the last value is the reference's own.
-    All joints get the same impulses: a straight line in joint space stays one. A curve stays one where its parameter is
-    shaped (`reset`).
+    (eq. (10)): the impulses of the *present* tick are applied to past samples. Their sum is 1 at every tick, so a
+    reference at rest passes unchanged however the parameters change, and the final value equals the reference's. All
+    joints get the same impulses, so a straight line in joint space stays straight. A curve is preserved if its
+    parameter is shaped (see `reset`).
 
     Attributes:
         shaper: The shaper.
         estimator: The estimator.
-        joints: Entries of a sample.
-        period: h [s].
-        max_delay: Longest delay the filter keeps samples for [s].
+        joints: Number of joints of the arm.
+        period: Sampling period h [s].
+        max_delay: Longest delay for which samples are kept [s].
         f_d: Damped frequencies of the last tick [Hz], shape (modes,).
         zeta: Damping ratios of the last tick [-], shape (modes,).
-        clipped: Whether one of them was held at the estimator's `f_d_min` or `zeta_max`. No delay is: the constructor
-            refuses what may be beyond max_delay.
+        clipped: Whether one of them was clamped to the estimator's `f_d_min` or `zeta_max`. Delays are never clipped,
+            since the constructor refuses combinations that could exceed max_delay.
         impulses: Impulses of the last tick.
     """
 
@@ -54,19 +54,19 @@ class TvistFilter(Filter):
         period: float = 0.002,
         max_delay: float = 1.0,
     ) -> None:
-        """A filter at rest at q = 0; `reset` puts it where the arm is.
+        """Create a filter at rest at q = 0; `reset` moves it to the arm's configuration.
 
         Args:
-            shaper: Its impulses for one mode; those of several modes are convolved.
+            shaper: Shaper for one mode; the impulses of several modes are convolved.
             estimator: The modes as functions of q.
-            joints: Entries of a sample, >= 1.
+            joints: Number of joints of the arm, >= 1.
             period: Time between two samples h [s], > 0.
-            max_delay: Longest delay samples are kept for [s], > 0.
+            max_delay: Longest delay for which samples are kept [s], > 0.
 
         Raises:
-            FilterError: A number is out of range; or the shaper would last longer than max_delay at the
-                estimator's lowest frequency; or the estimator's highest damping is beyond the shaper's.
-            EstimatorError: The estimator needs more joints.
+            FilterError: An argument is out of range; or the shaper would be longer than max_delay at the estimator's
+                lowest frequency; or the estimator's highest damping ratio exceeds the shaper's.
+            EstimatorError: The estimator requires more joints.
             ShaperFailureError: The shaper's function fails for the modes at q = 0.
         """
         if not 0.0 < period < math.inf:
@@ -90,9 +90,9 @@ class TvistFilter(Filter):
                 f"less than {shaper.zeta_max:g}, as shaper {shaper.name!r} demands",
                 "take another shaper or an estimator with a lower highest damping",
             )
-        # One tick more than max_delay, against rounding of τ/h; the rest is what interpolation wants.
+        # One tick more than max_delay, for rounding of τ/h; the others are for interpolation.
         super().__init__(shaper.name, estimator, joints, period, math.ceil(max_delay / period) + 5)
-        self._reach = math.ceil(longest / period) + 3  # the last three are interpolation's
+        self._reach = math.ceil(longest / period) + 3  # three are for interpolation
         self._longest = longest
         self.shaper = shaper
         self.max_delay = max_delay
@@ -108,33 +108,33 @@ class TvistFilter(Filter):
 
     @property
     def delay(self) -> float:
-        """Time of the last impulse of the last tick [s]: how much later the shaped reference ends."""
+        """Time of the last tick's last impulse [s], by which the shaped reference ends later."""
         return self.impulses.duration
 
     @property
     def mean_delay(self) -> float:
-        """Mean delay of the impulses of the last tick [s]."""
+        """Mean delay of the last tick's impulses [s]."""
         return self.impulses.mean_delay
 
     @property
     def peak(self) -> float:
-        """See `Filter.peak`: the shaper's own, once for each mode."""
+        """See `Filter.peak`: the product of the shaper's own, once for each mode."""
         return float(self.shaper.peak**self.estimator.modes)
 
     def replace(self, *, shaper: Shaper | None = None, estimator: Estimator | None = None) -> "TvistFilter":
-        """A filter with another shaper or estimator that goes on where this one is.
+        """Return a filter with another shaper or estimator that continues from the state of this one.
 
-        In motion its output is another than this one's would have been: `Fade` leads from one to the other.
+        During a motion its output differs from this one's; `Fade` provides a smooth transition.
 
         Args:
             shaper: Another shaper; None for the same.
             estimator: Another estimator; None for a fork of the same.
 
         Returns:
-            The new filter; this one is left as it is.
+            The new filter; this one is not changed.
 
         Raises:
-            FilterError: The two do not fit, as in the constructor.
+            FilterError: Shaper and estimator do not fit together, as in the constructor.
         """
         changed = TvistFilter(
             self.shaper if shaper is None else shaper,
@@ -150,7 +150,7 @@ class TvistFilter(Filter):
         self._suppress(self.estimator.settle(self._angles(self._q_star)))
 
     def _suppress(self, modes: tuple[Floats, Floats]) -> None:
-        """Impulses for these modes."""
+        """Set the impulses for these modes."""
         self.f_d, self.zeta = modes
         self.clipped = self.estimator.clipped
         try:
@@ -161,9 +161,9 @@ class TvistFilter(Filter):
             self.fault = None
 
     def _train(self) -> Impulses:
-        """What the shaper gives for the present modes."""
+        """Compute the shaper's impulses for the present modes."""
         give, f_d, zeta = self.shaper.impulses, self.f_d, self.zeta
-        if len(f_d) == 1:  # one mode is what most have, and without lists it is quicker
+        if len(f_d) == 1:  # the usual case, faster without lists
             impulses = give(f_d.item(), zeta.item())
         else:
             impulses = product([give(f, z) for f, z in zip(f_d.tolist(), zeta.tolist(), strict=True)])
@@ -174,6 +174,6 @@ class TvistFilter(Filter):
         return impulses
 
     def _weigh(self) -> None:
-        """Impulses of this tick, for the modes at the last shaped reference: the z⁻¹ of Figure 8; what they gather."""
+        """Compute this tick's impulses for the modes at the last shaped reference (z⁻¹ in Figure 8), and apply them."""
         self._suppress(self._modes())
         self._line.gather(self.impulses.A, self.impulses.tau / self.period, self._q_star)

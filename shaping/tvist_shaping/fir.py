@@ -1,17 +1,17 @@
-"""A short positive filter against several modes: weights of the newest samples, found by a small quadratic programme.
+"""A short positive filter against several modes: weights of the newest samples from a small quadratic programme.
 
-For poles s_k = -σ_k ± iω_k and weights h_n ≥ 0 at t_n = n h₀, what remains of mode k after the last weight is
+For poles s_k = -σ_k ± iω_k and weights h_n ≥ 0 at t_n = n h₀, the residual of mode k after the last weight is
 
     E_k = Σ_n h_n exp(σ_k (t_n - T)) (cos ω_k t_n, sin ω_k t_n).
 
-The programme asks for little of it with little energy in the weights, at a fixed sum and mean delay:
+The programme minimises this residual and the energy in the weights, for a given sum and mean delay:
 
     min  ρ T/(2 h₀) Σ h_n²/g_n + ½ Σ_k w_k |E_k|²     over h ≥ 0, Σ h_n = 1, Σ h_n t_n = D,
 
-g_n = clip((T - t_n)/EDGE, 0, 1) letting weights fade out towards the length T. Each of the lower modes stands in it
-twice, a little lower and a little higher than it is believed to be, which makes the filter forgive errors. The dual
-has one unknown a row and no constraints; Newton's method solves it in a few steps from where it was a moment ago.
-T follows slowly: longer where more remains than is allowed, shorter where less does.
+with g_n = clip((T - t_n)/EDGE, 0, 1), which makes the weights fade out towards the length T. Each of the lower modes
+has two terms, at a slightly lower and a slightly higher frequency than estimated, which makes the filter tolerate
+errors. The dual has one unknown per row and no constraints; Newton's method solves it in a few steps from the
+previous solution. T follows slowly: it increases if the residual exceeds the permitted one, and decreases otherwise.
 """
 
 import math
@@ -25,42 +25,42 @@ from tvist_shaping._types import Floats
 from tvist_shaping.errors import FilterError
 
 EDGE = 0.012
-"""Over which the weights fade out at the end [s]."""
+"""Length of the fade-out of the weights at the end [s]."""
 ENERGY = 0.01
-"""ρ: price of the energy in the weights [-]."""
+"""ρ: weight of the energy in the weights [-]."""
 STEPS = 60
-"""Newton steps before it begins anew from cold."""
+"""Number of Newton steps before a restart from zero."""
 SOLVED = 1e-9
-"""Residual of the dual's gradient that counts as zero [-]."""
+"""Norm of the dual's gradient that counts as zero [-]."""
 SCALE = 0.03
-"""Scale of the mean delay's row, so that all rows have the same magnitude [s]."""
+"""Scale of the mean delay's row, which gives all rows the same magnitude [s]."""
 QUICKEST = 0.15
-"""Largest change of the length in its own seconds a second [-]."""
+"""Largest relative change of the length per second [1/s]."""
 GAIN = 0.3
-"""Gain of the servo for the length [-]."""
+"""Gain of the control loop for the length [-]."""
 
 
 @dataclass(frozen=True)
 class FirDesign:
-    """What the filter is to reach; one entry a mode.
+    """Requirements for the filter, with one entry for each mode.
 
     Raises:
-        FilterError: The tuples differ in length or are empty, or a number is out of range.
+        FilterError: The tuples are empty or have different lengths, or a value is out of range.
     """
 
     spread: tuple[float, ...] = (0.015, 0.02, 0.03, 0.0)
-    """How far a mode may be off, either way; 0: it stands in the programme once [-]."""
+    """Relative error of a mode's frequency to tolerate, in both directions; 0 for a single term [-]."""
     residual: tuple[float, ...] = (0.05, 0.05, 0.08, 0.2)
-    """What may remain of it [-]."""
+    """Permitted residual of each mode [-]."""
     weight: tuple[float, ...] = (1000.0, 1000.0, 200.0, 50.0)
-    """Its price w [-]."""
+    """Weight w of each mode's residual [-]."""
     shortest: float = 0.05
-    """Bounds of the length [s]."""
+    """Shortest length [s]."""
     longest: float = 0.15
-    """[s]"""
+    """Longest length [s]."""
 
     def __post_init__(self) -> None:
-        """Check what the compiled programme takes for granted."""
+        """Check what the compiled functions rely on."""
         for name, least in (("spread", 0.0), ("residual", 1e-6), ("weight", 1e-6)):
             values = getattr(self, name)
             if not len(values) == len(self.spread) >= 1:
@@ -87,18 +87,18 @@ class FirDesign:
 
 
 class Programme(NamedTuple):
-    """One design's quadratic programme of R rows: what it wants, its last solution, and room to solve it in."""
+    """Quadratic programme of a design with R rows: requirements, latest solution, and working memory."""
 
     spread: Floats
     """`spread` of `FirDesign`, shape (modes,)."""
     weight: Floats
     """`weight` of `FirDesign`, shape (modes,)."""
     dual: Floats
-    """Unknowns of the dual, shape (R,): where to begin; the solution afterwards."""
+    """Unknowns of the dual, shape (R,): initial values, and afterwards the solution."""
     taps: Floats
-    """Result, shape (N,), sum 1."""
+    """Result, shape (N,), with sum 1."""
     remains: Floats
-    """What remains of each mode, root of the sum of squares over its rows [-], shape (modes,)."""
+    """Residual of each mode, as the root of the sum of squares over its rows [-], shape (modes,)."""
     rows: Floats
     """Scratch, shape (R, N)."""
     hessian: Floats
@@ -106,7 +106,7 @@ class Programme(NamedTuple):
 
     @classmethod
     def of(cls, wanted: FirDesign, taps: int) -> "Programme":
-        """The programme of a design, without a solution."""
+        """Create the programme of a design, without a solution."""
         R = wanted.rows
         return cls(
             spread=np.array(wanted.spread, dtype=float),
@@ -119,7 +119,7 @@ class Programme(NamedTuple):
         )
 
     def fork(self) -> "Programme":
-        """A copy with the present solution."""
+        """Return a copy with the present solution."""
         return self._replace(
             dual=self.dual.copy(),
             taps=self.taps.copy(),
@@ -133,7 +133,7 @@ class Programme(NamedTuple):
 def solve(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops over rows and weights
     f_d: Floats, zeta: Floats, length: float, mean: float, period: float, programme: Programme
 ) -> bool:
-    """The weights for modes and a length.
+    """Compute the weights for given modes and length.
 
     Args:
         f_d: Damped frequencies [Hz], shape (modes,).
@@ -141,10 +141,10 @@ def solve(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
         length: T [s].
         mean: Mean delay D [s].
         period: h₀ [s].
-        programme: What is wanted; its `dual`, `taps` and `remains` are changed.
+        programme: The programme; its `dual`, `taps` and `remains` are changed.
 
     Returns:
-        Whether it was solved; otherwise taps are the best there are.
+        Whether it was solved; otherwise the taps are the best that were found.
     """
     spread, weight, dual, taps, remains, rows, hessian = programme
     R, N, modes = dual.shape[0], taps.shape[0], f_d.shape[0]
@@ -161,7 +161,7 @@ def solve(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
         sigma = omega * zeta[k] / math.sqrt(1.0 - zeta[k] * zeta[k])
         for side in range(2 if spread[k] > 0.0 else 1):
             factor = 1.0 + (2 * side - 1) * spread[k] if spread[k] > 0.0 else 1.0
-            # A weight a tick further is a turn and a growth further: no sine has to be computed.
+            # Each tick multiplies a weight's term by a constant rotation and growth, so no sine has to be computed.
             turn = np.exp(complex(sigma * factor * period, omega * factor * period))
             value = complex(math.exp(-sigma * factor * length), 0.0)
             for n in range(N):
@@ -176,7 +176,7 @@ def solve(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
             dual[0] = ENERGY
         value = _ascend(dual, rows, room, price, taps)
         for _ in range(STEPS):
-            if _gradient(dual, rows, price, taps, hessian) <= SOLVED:  # not so where it is no number
+            if _gradient(dual, rows, price, taps, hessian) <= SOLVED:  # False for NaN
                 solved = True
                 break
             if not _newton(rows, room, price, taps, hessian):
@@ -216,7 +216,7 @@ def solve(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
 
 @compiled
 def _ascend(dual: Floats, rows: Floats, room: Floats, price: Floats, taps: Floats) -> float:
-    """Value of the dual, and the weights that belong to it."""
+    """Return the value of the dual, and compute the corresponding weights."""
     R, N = rows.shape
     value = float(dual[0])
     for i in range(R):
@@ -235,7 +235,7 @@ def _ascend(dual: Floats, rows: Floats, room: Floats, price: Floats, taps: Float
 
 @compiled
 def _gradient(dual: Floats, rows: Floats, price: Floats, taps: Floats, hessian: Floats) -> float:
-    """Length of the dual's gradient, which is left in the column before the last."""
+    """Return the norm of the dual's gradient, which is stored in the second to last column."""
     R, N = rows.shape
     square = 0.0
     for i in range(R):
@@ -251,7 +251,7 @@ def _gradient(dual: Floats, rows: Floats, price: Floats, taps: Floats, hessian: 
 
 @compiled
 def _newton(rows: Floats, room: Floats, price: Floats, taps: Floats, hessian: Floats) -> bool:  # noqa: C901, PLR0912  a kernel
-    """Newton's step into the last column, by Cholesky's factors."""
+    """Compute Newton's step in the last column, by Cholesky factorisation."""
     R, N = rows.shape
     for i in range(R):
         for j in range(i + 1):

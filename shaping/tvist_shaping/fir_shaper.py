@@ -1,4 +1,4 @@
-"""A shaper that is a FIR filter: weights of the newest samples, as a function of the modes."""
+"""A user-defined shaper that is a FIR filter: weights of the newest samples, as a function of the modes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,29 +14,29 @@ from tvist_shaping.impulses import Impulses
 from tvist_shaping.steady import Design
 
 MAX_TAPS = 500
-"""Taps of the longest filter: one second at 500 Hz."""
+"""Largest number of taps of a filter: one second at 500 Hz."""
 
 
 @dataclass(frozen=True, slots=True)
 class FirShaper:
-    """A shaper of your own that is a FIR filter.
+    """A user-defined shaper that is a FIR filter.
 
-    A filter made of it asks for new taps every fourth tick and averages them over 0.4 s, so that they move without
-    kinks while the arm moves. Taps that are always the same are a function that does not look at the modes.
+    Its filter computes new taps every fourth tick and averages them over 0.4 s, so that they change smoothly while
+    the arm moves. For constant taps, use a function that ignores the modes.
 
     Attributes:
-        name: What it is called on the wire and in tables.
-        description: What it does, in one line.
-        function: (f_d [Hz], ζ [-]), each of shape (modes,), the lowest mode first -> weights h_n of the samples of n
+        name: Name on the wire and in tables.
+        description: Description in one line.
+        function: (f_d [Hz], ζ [-]), each of shape (modes,), the lowest mode first -> weights h_n of the samples n
             ticks ago [-], shape (N,) with N at most `taps`, sum 1.
         taps: Largest number of taps, 1 to 500.
         modes: Number of modes passed to the function, 1 to 8.
-        peak: Σ|h_n| at the most, by which it may exceed its reference's velocity and acceleration; 1 where no tap is
+        peak: Upper bound of Σ|h_n|, by which it may exceed its reference's velocity and acceleration; 1 if no tap is
             negative [-].
         period: Tick [s].
 
     Raises:
-        DesignError: A number is out of range.
+        DesignError: A value is out of range.
     """
 
     name: str
@@ -58,15 +58,15 @@ class FirShaper:
             raise DesignError("period", self.period, "a finite number of seconds above 0")
 
     def weights(self, f_d: Floats, zeta: Floats) -> Floats:
-        """What `function` gives, checked and filled up with zeros, shape (taps,).
+        """Call `function`, check its result and pad it with zeros, shape (taps,).
 
         Args:
             f_d: Damped frequencies [Hz], shape (modes,).
             zeta: Damping ratios [-], shape (modes,).
 
         Raises:
-            Exception: Whatever the function raises.
-            ShaperFailureError: The function's taps do not sum to 1, or do not match the declaration.
+            Exception: Any exception that the function raises.
+            ShaperFailureError: The taps do not sum to 1, or do not match the declaration.
         """
         given = np.array(self.function(f_d.copy(), zeta.copy()), dtype=float)
         if given.ndim != 1 or not 1 <= given.size <= self.taps:
@@ -87,7 +87,7 @@ class FirShaper:
         return np.pad(given, (0, self.taps - given.size))
 
     def impulses(self, f_d: float, zeta: float) -> Impulses:
-        """The taps as impulses, where every mode is the same one: what the other figures of a shaper are made from.
+        """Return the taps as impulses, with all modes equal, to compute the shaper's other properties.
 
         Args:
             f_d: Damped frequency of the mode [Hz].
@@ -101,12 +101,12 @@ class FirShaper:
         return Impulses(weights[:last], self.period * np.arange(last, dtype=np.float64))
 
     def design(self) -> Design:
-        """This shaper as a design for `SteadyFilter`."""
+        """Convert this shaper to a design for `SteadyFilter`."""
         return _Weights(self)
 
 
 class _Weights(Design):
-    """A `FirShaper`'s taps, which depend on nothing but the modes."""
+    """A `FirShaper`'s taps, which depend only on the modes."""
 
     def __init__(self, shaper: FirShaper) -> None:
         self._shaper = shaper
@@ -117,18 +117,18 @@ class _Weights(Design):
         return f"{self.name!r}"
 
     def copy(self) -> "_Weights":
-        """Itself: it remembers nothing."""
+        """Return this object itself, since it has no state."""
         return self
 
     def fork(self) -> Self:
-        """Itself: it remembers nothing."""
+        """Return this object itself, since it has no state."""
         return self
 
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
-        """Taps for these modes; see `Design.start`."""
+        """Compute the taps for these modes; see `Design.start`."""
         taps[:] = self._shaper.weights(f_d, zeta)
         return True
 
     def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:  # noqa: ARG002
-        """Taps for these modes; see `Design.go_on`."""
+        """Compute the taps for these modes; see `Design.go_on`."""
         return self.start(f_d, zeta, taps)

@@ -1,12 +1,13 @@
 """Impulse trains A, τ of the input shapers, as functions of a mode's damped frequency and damping ratio.
 
-Every shaper here has impulses at equal distances, amplitudes a_j without damping, and takes damping in by
+Every shaper here has equally spaced impulses with amplitudes a_j without damping, and accounts for damping by
 
     A_j = a_j K^j / Σ_i a_i K^i,    τ_j = j s T_d,    K = exp(-2π s ζ/√(1-ζ²)),    T_d = 1/f_d,
 
-K being the factor by which the mode decays in the distance s T_d between two impulses. A zero of the residual
-vibration at f_d stays one under any damping. The shapers that want V instead of zero at f_d (ei, ei3) get
-less than V when ζ > 0: safe, if not the widest band their length could give. Those of `tvist_shaping.exact` get V.
+where K is the factor by which the mode decays in the distance s T_d between two impulses. A zero of the residual
+vibration at f_d remains one with any damping. The shapers that leave V instead of zero at f_d (ei, ei3) leave less
+than V if ζ > 0: this is safe, but not the widest possible band for their length. The shapers of `tvist_shaping.exact`
+leave V.
 """
 
 import math
@@ -20,22 +21,22 @@ from tvist_shaping.amplitudes import modified, ripple
 from tvist_shaping.errors import ImpulseError, ShaperRangeError
 
 V = 0.05
-"""Residual vibration the extra-insensitive shapers allow themselves [-]."""
+"""Residual vibration that the extra-insensitive shapers permit [-]."""
 
 F_D_RANGE = (1e-6, 1e6)
-"""Damped frequencies a shaper is made for [Hz]: wide enough for anything that swings, no time overflows."""
+"""Range of damped frequencies of a shaper [Hz]: wide enough for any vibration, without overflow of times."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Impulses:
-    """A train of impulses: what the reference is convolved with, eqs. (1)-(3) of the paper.
+    """A train of impulses, with which the reference is convolved, eqs. (1)-(3) of the paper.
 
     Attributes:
-        A: Amplitudes [-], shape (N,), read-only, sum 1.
+        A: Amplitudes [-], shape (N,), read-only, with sum 1.
         tau: Times [s], shape (N,), read-only, ascending from 0 (two modes may share a time).
 
     Raises:
-        ImpulseError: Shapes differ, a value is not finite, times do not ascend from 0, or |ΣA - 1| >= 1e-9.
+        ImpulseError: The shapes differ, a value is not finite, times do not ascend from 0, or |ΣA - 1| >= 1e-9.
     """
 
     A: Floats
@@ -62,37 +63,37 @@ class Impulses:
 
     @classmethod
     def _by_construction(cls, A: Floats, tau: Floats) -> "Impulses":
-        """Impulses whose maker guarantees what the constructor checks: one of these is made every tick."""
+        """Create impulses whose validity the caller guarantees, since this happens at every tick."""
         impulses = object.__new__(cls)
         impulses._hold(A, tau)
         return impulses
 
     @property
     def duration(self) -> float:
-        """Time of the last impulse [s]: how much later than its reference the shaped reference ends."""
+        """Time of the last impulse [s], by which the shaped reference ends later than the unshaped one."""
         return float(self.tau[-1])
 
     @property
     def mean_delay(self) -> float:
-        """Σ A_j τ_j [s]: how far the shaped reference lags behind a reference of constant velocity."""
+        """Σ A_j τ_j [s], by which the shaped reference lags behind a reference of constant velocity."""
         return float(self.A @ self.tau)
 
 
 UNSHAPED = Impulses(np.ones(1), np.zeros(1))
-"""The single impulse that changes nothing."""
+"""The single impulse that leaves a reference unchanged."""
 
 
 def check_mode(f_d: float, zeta: float, zeta_max: float = 1.0, instead: str = "") -> None:
-    """Refuse a mode that a shaper is not made for.
+    """Refuse a mode outside a shaper's range.
 
     Args:
         f_d: Damped frequency [Hz].
         zeta: Damping ratio [-].
-        zeta_max: Limit that ζ must be below [-].
-        instead: What to take for a higher one, in words.
+        zeta_max: Exclusive upper limit of ζ [-].
+        instead: What to use for a higher ζ, in words.
 
     Raises:
-        ShaperRangeError: f_d is not 1e-6 to 1e6 Hz, or ζ not 0 <= ζ < zeta_max.
+        ShaperRangeError: f_d is not within 1e-6 to 1e6 Hz, or not 0 <= ζ < zeta_max.
     """
     if not F_D_RANGE[0] <= f_d <= F_D_RANGE[1]:
         raise ShaperRangeError("f_d", f_d, f"{F_D_RANGE[0]:g} to {F_D_RANGE[1]:g} Hz")
@@ -102,7 +103,7 @@ def check_mode(f_d: float, zeta: float, zeta_max: float = 1.0, instead: str = ""
 
 
 def damped(a: Floats, periods: Floats, f_d: float, zeta: float) -> Impulses:
-    """Amplitudes of an undamped shaper, damping taken in: each decays as the mode does until then.
+    """Apply damping to the amplitudes of an undamped shaper: each decays as the mode does until then.
 
     Args:
         a: Amplitudes without damping [-], shape (N,), sum positive.
@@ -118,7 +119,7 @@ def damped(a: Floats, periods: Floats, f_d: float, zeta: float) -> Impulses:
 
 
 def _train(a: Sequence[float], distance: float, f_d: float, zeta: float) -> Impulses:
-    """Impulses a_j K^j, normalised, `distance` damped periods apart: the formula at the top."""
+    """Impulses a_j K^j, normalised, `distance` damped periods apart; the formula is in the module's docstring."""
     check_mode(f_d, zeta)
     K = math.exp(-2.0 * math.pi * distance * zeta / math.sqrt(1.0 - zeta * zeta))
     decayed = [a_j * K**j for j, a_j in enumerate(a)]
@@ -148,8 +149,8 @@ def none(f_d: float, zeta: float) -> Impulses:
 def zv(f_d: float, zeta: float) -> Impulses:
     """Zero-vibration shaper, eqs. (4)-(7) of the paper (Singer and Seering, 1990).
 
-    The second impulse starts an oscillation that meets the first one's in opposite phase half a damped period
-    later, when it has decayed by K = exp(-ζπ/√(1-ζ²)).
+    The second impulse starts an oscillation half a damped period later, in opposite phase to that of the first one,
+    which has decayed by K = exp(-ζπ/√(1-ζ²)) by then.
 
     Args:
         f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
@@ -167,14 +168,14 @@ def zv(f_d: float, zeta: float) -> Impulses:
 def zvd(f_d: float, zeta: float) -> Impulses:
     """Zero-vibration-and-derivative shaper (Singer and Seering, 1990): zv convolved with itself.
 
-    The residual vibration and its derivative by frequency vanish at f_d.
+    The residual vibration and its derivative with respect to frequency vanish at f_d.
 
     Args:
         f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
         zeta: Damping ratio of the mode [-], 0 <= ζ < 1.
 
     Returns:
-        A = (1, 2K, K²)/(1+K)² [-] and τ = (0, 1/2, 1)/f_d [s], each of shape (3,); K as for `zv`.
+        A = (1, 2K, K²)/(1+K)² [-] and τ = (0, 1/2, 1)/f_d [s], each of shape (3,), with K as for `zv`.
 
     Raises:
         ShaperRangeError: f_d or ζ is outside the range above.
@@ -183,14 +184,14 @@ def zvd(f_d: float, zeta: float) -> Impulses:
 
 
 def zvdd(f_d: float, zeta: float) -> Impulses:
-    """Zero vibration and its first two derivatives by frequency (Singer and Seering, 1990): zv three times over.
+    """Zero vibration and its first two derivatives by frequency (Singer and Seering, 1990): three zv in series.
 
     Args:
         f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
         zeta: Damping ratio of the mode [-], 0 <= ζ < 1.
 
     Returns:
-        A = (1, 3K, 3K², K³)/(1+K)³ [-] and τ = (0, 1/2, 1, 3/2)/f_d [s], each of shape (4,); K as for `zv`.
+        A = (1, 3K, 3K², K³)/(1+K)³ [-] and τ = (0, 1/2, 1, 3/2)/f_d [s], each of shape (4,), with K as for `zv`.
 
     Raises:
         ShaperRangeError: f_d or ζ is outside the range above.
@@ -199,7 +200,7 @@ def zvdd(f_d: float, zeta: float) -> Impulses:
 
 
 def zvddd(f_d: float, zeta: float) -> Impulses:
-    """Zero vibration and its first three derivatives by frequency (Singer and Seering, 1990): zv four times over.
+    """Zero vibration and its first three derivatives by frequency (Singer and Seering, 1990): four zv in series.
 
     Args:
         f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
@@ -218,7 +219,7 @@ def zvddd(f_d: float, zeta: float) -> Impulses:
 def mzv(f_d: float, zeta: float) -> Impulses:
     """Modified zero-vibration shaper MZV(3, 3/4): three impulses in three quarters of a period (known from Klipper).
 
-    Shorter than zvd, and wider than zv, above f_d more than below it. `mzv_of` makes the others.
+    It is shorter than zvd and wider than zv, more so above f_d than below it. `mzv_of` creates the other variants.
 
     Args:
         f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
@@ -241,8 +242,8 @@ _EI, _EI2, _EI3 = (tuple(ripple(humps, V).tolist()) for humps in (1, 2, 3))
 def ei(f_d: float, zeta: float) -> Impulses:
     """Extra-insensitive shaper with V = 5 % (Singhose, Seering, Singer, J. Mech. Design 116, 1994).
 
-    It leaves V at f_d and is zero at a frequency on either side, so that the band below V is as wide as three
-    impulses allow. |(1-V)/2 + (1+V)/2 cos(π f/f_d)| is what remains without damping.
+    It leaves V at f_d and is zero at one frequency on either side, so that the band within V is as wide as possible
+    with three impulses. Without damping, its residual is |(1-V)/2 + (1+V)/2 cos(π f/f_d)|.
 
     Args:
         f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
@@ -261,8 +262,8 @@ def ei(f_d: float, zeta: float) -> Impulses:
 def ei2(f_d: float, zeta: float) -> Impulses:
     """Two-hump extra-insensitive shaper with V = 5 %.
 
-    Zero at f_d and once on either side, humps of height V between them (Singhose, Porter, Tuttle, Singer,
-    J. Dyn. Sys. Meas. Control 119, 1997).
+    It is zero at f_d and at one frequency on either side, with humps of height V in between (Singhose, Porter,
+    Tuttle, Singer, J. Dyn. Sys. Meas. Control 119, 1997).
 
     Args:
         f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
@@ -281,7 +282,7 @@ def ei2(f_d: float, zeta: float) -> Impulses:
 def ei3(f_d: float, zeta: float) -> Impulses:
     """Three-hump extra-insensitive shaper, V = 5 % (source as for `ei2`).
 
-    V at f_d, zero twice on either side, humps of height V between them.
+    It leaves V at f_d and is zero at two frequencies on either side, with humps of height V in between.
 
     Args:
         f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.
@@ -298,16 +299,16 @@ def ei3(f_d: float, zeta: float) -> Impulses:
 
 
 def product(trains: Sequence[Impulses]) -> Impulses:
-    """Convolution of the impulse trains of several modes: it suppresses each of them.
+    """Convolve the impulse trains of several modes, which suppresses all of them.
 
     Args:
-        trains: One train a mode, at least one.
+        trains: One train for each mode, at least one.
 
     Returns:
         Amplitudes A_i B_j … [-] at the times τ_i + σ_j + … [s], sorted by time, shape (Π N,).
 
     Raises:
-        ImpulseError: There is no train.
+        ImpulseError: There are no trains.
     """
     if not trains:
         raise ImpulseError("a product needs at least one impulse train")

@@ -1,4 +1,4 @@
-"""Shapers with parameters, made to order, and shapers of the user's own impulses."""
+"""Shapers with parameters, and shapers from the user's own impulses."""
 
 import math
 from functools import partial
@@ -16,17 +16,17 @@ from tvist_shaping.shaper import Shaper
 from tvist_shaping.specified import specified
 
 SMALL = 1e-6
-"""Share of V that a residual may be above it, for rounding [-]."""
+"""Share of V by which a residual may exceed it, because of rounding [-]."""
 
 
 def mzv_of(n: int = 3, t: float = 0.75, *, name: str = "", description: str = "") -> Shaper:
-    """Modified zero-vibration shaper MZV(n, t): n impulses at equal distances in t periods.
+    """Create a modified zero-vibration shaper MZV(n, t): n equally spaced impulses in t periods.
 
     Args:
         n: Number of impulses, 3 to 30.
         t: Duration in damped periods [-], less than (n-1)/2, and not so short that an amplitude is negative.
-        name: What to call it; "" for `mzv(n,t)`.
-        description: What to say of it; "" for a sentence.
+        name: Name of the shaper; "" for `mzv(n,t)`.
+        description: Description of the shaper; "" for a generated one.
 
     Raises:
         DesignError: n or t is out of range, or an amplitude would be negative.
@@ -39,18 +39,18 @@ def mzv_of(n: int = 3, t: float = 0.75, *, name: str = "", description: str = ""
 def ei_of(
     humps: int = 1, V: float = V, *, exact: bool = False, name: str = "", description: str = ""
 ) -> Shaper:
-    """Extra-insensitive shaper with humps of another height, or more of them.
+    """Create an extra-insensitive shaper with a given number and height of humps.
 
     Args:
         humps: Number of humps, 1 to 10; the shaper lasts (humps + 1)/2 periods.
-        V: Their height, the residual vibration allowed [-], 1e-4 to 0.5.
-        exact: Whether the humps are to be of that height with damping too, see `tvist_shaping.exact`; its
-            damping is then limited, the more the higher and the more the humps. Otherwise they are lower.
-        name: What to call it; "" for `ei(humps,V)` or `ei_exact(humps,V)`.
-        description: What to say of it; "" for a sentence.
+        V: Height of the humps, which is the permitted residual vibration [-], 1e-4 to 0.5.
+        exact: Whether the humps have that height with damping too, see `tvist_shaping.exact`. The range of damping is
+            then limited, more so with higher and more humps. Otherwise the humps are lower with damping.
+        name: Name of the shaper; "" for `ei(humps,V)` or `ei_exact(humps,V)`.
+        description: Description of the shaper; "" for a generated one.
 
     Raises:
-        DesignError: A number is out of range.
+        DesignError: An argument is out of range.
     """
     if humps < 1:
         raise DesignError("humps", humps, "1 to 10")
@@ -69,21 +69,21 @@ def ei_of(
 def si_of(
     low: float = 0.75, high: float = 1.25, V: float = V, *, name: str = "", description: str = ""
 ) -> Shaper:
-    """Specified-insensitivity shaper: the shortest positive train that leaves at most V from low to high.
+    """Create a specified-insensitivity shaper: the shortest positive train that leaves at most V from low to high.
 
-    Designed without damping (`tvist_shaping.specified`), damping taken in as elsewhere. Then less than V is left in
-    narrow bands at any damping, but a little more in very wide ones at some: it is for the damping ratios from 0 up to
-    where that begins.
+    It is designed without damping (`tvist_shaping.specified`); damping is then applied as for the other shapers. In
+    narrow bands this leaves less than V at any damping, but in very wide bands slightly more at some damping ratios:
+    the shaper's range of damping ends where that begins.
 
     Args:
-        low: Lowest true over assumed frequency [-], above 0, at most 1.
-        high: Highest true over assumed frequency [-], at least 1.
-        V: Residual vibration allowed between them [-], 1e-4 to 0.5.
-        name: What to call it; "" for `si(low,high,V)`.
-        description: What to say of it; "" for a sentence.
+        low: Lowest ratio of true to assumed frequency [-], above 0, at most 1.
+        high: Highest ratio of true to assumed frequency [-], at least 1.
+        V: Residual vibration permitted between them [-], 1e-4 to 0.5.
+        name: Name of the shaper; "" for `si(low,high,V)`.
+        description: Description of the shaper; "" for a generated one.
 
     Raises:
-        DesignError: A number is out of range, or the band too wide for 12 impulses.
+        DesignError: An argument is out of range, or the band is too wide for 12 impulses.
     """
     if not 0.0 < low <= 1.0:
         raise DesignError("low", low, "above 0 and at most 1, the assumed frequency")
@@ -110,22 +110,22 @@ def custom(
     zeta_max: float = 1.0,
     description: str = "",
 ) -> Shaper:
-    """A shaper of your own impulses.
+    """Create a shaper from your own impulses.
 
-    At another frequency than theirs it is played faster or slower; the amplitudes stay as they are at any damping.
+    At other frequencies than theirs, their times are scaled; the amplitudes are the same at any damping.
 
     Args:
-        name: What to call it.
+        name: Name of the shaper.
         A: Amplitudes [-], shape (N,), sum 1; negative ones exceed the reference's limits.
         tau: Times [s], shape (N,), ascending from 0.
-        f_d: Damped frequency of the mode they are made for [Hz]. With 1, tau is in damped periods.
+        f_d: Damped frequency of the mode that they are designed for [Hz]. With 1, tau is in damped periods.
         zeta_max: Damping ratios must stay below this [-], at most 1.
-        description: What to say of it; "" for a sentence.
+        description: Description of the shaper; "" for a generated one.
 
     Raises:
-        ImpulseError: A and tau are no train of impulses; it says why.
+        ImpulseError: A and tau are not an impulse train; the message says why.
         ShaperRangeError: f_d is out of range.
-        DesignError: zeta_max is.
+        DesignError: zeta_max is out of range.
     """
     check_mode(f_d, 0.0)
     if not 0.0 < zeta_max <= 1.0:
@@ -143,7 +143,7 @@ def custom(
 
 
 def _decayed(a: Floats, periods: Floats, zeta_max: float, f_d: float, zeta: float) -> Impulses:
-    """`damped`, of a mode that is checked."""
+    """Apply `damped` to a mode after checking it."""
     check_mode(
         f_d, zeta, zeta_max, "" if zeta_max == 1.0 else "more than V is left: take a higher V or ei_of"
     )

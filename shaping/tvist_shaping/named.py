@@ -1,4 +1,4 @@
-"""Filters by name: every shaper of the catalogue, the designs of constant mean delay, and shapers of one's own."""
+"""Filters by name: all shapers of the catalogue, the designs with constant mean delay, and the user's own shapers."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -18,7 +18,7 @@ from tvist_shaping.shaper import Shaper
 from tvist_shaping.steady import Design, ShortDesign, SteadyFilter
 
 AnyShaper: TypeAlias = Shaper | FirShaper
-"""What a person's own shaper may be."""
+"""Types that a user's own shaper may have."""
 
 
 def _auto() -> Design:
@@ -37,22 +37,23 @@ AIMED = "auto-target"
 DESIGNS: Mapping[str, Callable[[], Design]] = MappingProxyType(
     {"auto": _auto, "short": _short, AIMED: _auto_target}
 )
-"""Designs of constant mean delay against an arm's four lowest modes: one that leaves less, one that is shorter, and one
-that knows where a motion will end."""
+"""Designs with constant mean delay against an arm's four lowest modes: one with a smaller residual, one that is
+shorter, and one that knows where a motion will end.
+"""
 
 PERIOD = 0.002
-"""Tick of every filter that is made by its name [s]."""
+"""Tick of every filter that is created by name [s]."""
 _NAME = re.compile(r"[a-z0-9][a-z0-9_.,()-]{0,63}")
 
 
 class Registry:
-    """Filters by name for references of 500 Hz: those of this package, and shapers of one's own. It never changes.
+    """Filters by name for references at 500 Hz: those of this package, and the user's own shapers. It is immutable.
 
     Args:
-        own: Shapers of one's own, `Shaper` or `FirShaper`.
+        own: The user's own shapers, `Shaper` or `FirShaper`.
 
     Raises:
-        DesignError: A name cannot be one, or is another shaper's; or a `FirShaper` is for another period.
+        DesignError: A name is invalid or belongs to another shaper; or a `FirShaper` has another period.
     """
 
     own: Mapping[str, AnyShaper]
@@ -75,7 +76,7 @@ class Registry:
         return (*SHAPERS, *DESIGNS, *self.own)
 
     def check(self, name: str) -> None:
-        """Check that there is a filter of a name.
+        """Check that there is a filter with this name.
 
         Raises:
             UnknownShaperError: There is no shaper of that name; the error lists all names and the most similar one.
@@ -85,7 +86,7 @@ class Registry:
             raise UnknownShaperError(name, self.names(), near[0] if near else None)
 
     def modes_of(self, name: str, modes: int = 1) -> int:
-        """Return the number of modes that the filter of a name needs.
+        """Return the number of modes that a filter needs.
 
         Args:
             name: Name of the filter.
@@ -101,17 +102,17 @@ class Registry:
         return DESIGNS[name]().modes if name in DESIGNS else modes
 
     def make_filter(self, name: str, estimator: Estimator, *, joints: int) -> Filter:
-        """A filter by its name.
+        """Create a filter by name.
 
         Args:
             name: One of `names()`.
-            estimator: Gives as many modes as `modes_of` says.
-            joints: Entries of a sample.
+            estimator: Estimator with as many modes as `modes_of` returns.
+            joints: Number of joints of the arm.
 
         Raises:
             UnknownShaperError: There is no shaper of that name.
-            FilterError: Filter and estimator do not go together.
-            ShaperFailureError: The function of an own shaper fails at once.
+            FilterError: Filter and estimator do not fit together.
+            ShaperFailureError: The function of a user's own shaper fails for the modes at q = 0.
         """
         self.check(name)
         if name in DESIGNS:
@@ -124,25 +125,25 @@ class Registry:
 
 
 BUILT_IN = Registry()
-"""The filters of this package alone."""
+"""The filters of this package only."""
 
 
 def make_filter(shaper: str | AnyShaper, estimator: Estimator, *, joints: int) -> Filter:
-    """A filter for a sampled reference of 500 Hz.
+    """Create a filter for a sampled reference at 500 Hz.
 
     Args:
         shaper: Name of a shaper of this package, as `BUILT_IN.names()` lists them, or a shaper of your own.
-        estimator: The modes as functions of q: four for `auto`, `short` and `auto-target`, as many as it says for a
-            `FirShaper`, and for others as many as are to be suppressed.
-        joints: Entries of a sample, >= 1.
+        estimator: The modes as functions of q. Four modes are required for `auto`, `short` and `auto-target`, and the
+            declared number for a `FirShaper`; for others, it determines how many modes are suppressed.
+        joints: Number of joints of the arm, >= 1.
 
     Returns:
-        The filter, at rest at q = 0: `reset` puts it where the arm is.
+        The filter, at rest at q = 0; `reset` moves it to the arm's configuration.
 
     Raises:
         UnknownShaperError: There is no shaper of that name.
-        DesignError: The name of the own shaper cannot be one, or is another's; or it is for another period.
-        FilterError: Shaper and estimator do not go together.
+        DesignError: The name of the own shaper is invalid or belongs to another one; or it has another period.
+        FilterError: Shaper and estimator do not fit together.
         ShaperFailureError: The function of the own shaper fails for the modes at q = 0.
     """
     if isinstance(shaper, str):

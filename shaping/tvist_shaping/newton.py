@@ -1,4 +1,4 @@
-"""Newton's method for the handful of equations that define a shaper without a closed form."""
+"""Newton's method for the few equations that define a shaper without a closed form."""
 
 from collections.abc import Callable
 
@@ -8,28 +8,28 @@ from tvist_shaping._types import Floats
 from tvist_shaping.errors import ConvergenceError
 
 STEP = 1e-7
-"""Step of the difference quotients [-]; all unknowns here are of the order of one."""
+"""Step of the difference quotients [-]; all unknowns here are of order one."""
 FARTHEST = 0.2
-"""No unknown changes by more in one step [-]."""
+"""Largest change of an unknown in one step [-]."""
 SOLVED = 1e-12
 """Largest residual of an equation that counts as zero [-]."""
 
 
 def solve(equations: Callable[[Floats], Floats], start: Floats) -> Floats:
-    """Solve as many equations as there are unknowns.
+    """Solve a system with as many equations as unknowns.
 
     Args:
-        equations: (M, m) -> (M, m): what is left of the m equations at each of M points.
-        start: Initial guess, shape (m,); close enough for Newton's method.
+        equations: (M, m) -> (M, m): residuals of the m equations at each of M points.
+        start: Initial guess, shape (m,); it must be close enough for Newton's method.
 
     Returns:
-        A solution, shape (m,), every equation true to 1e-12.
+        A solution, shape (m,), with residuals of at most 1e-12.
 
     Raises:
         ConvergenceError: No solution was found.
     """
     x, m = np.array(start, dtype=float), len(start)
-    with np.errstate(all="ignore"):  # where it diverges, it says so below
+    with np.errstate(all="ignore"):  # divergence is detected below
         for _ in range(60):
             left = equations(np.vstack([x, x + STEP * np.eye(m)]))
             if not np.isfinite(left).all():

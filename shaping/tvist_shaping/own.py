@@ -1,4 +1,4 @@
-"""Shapers of one's own: made of a function, and tried out before anything moves by them."""
+"""The user's own shapers: created from a function, and checked before anything moves."""
 
 from collections.abc import Callable
 
@@ -11,7 +11,7 @@ from tvist_shaping.impulses import Impulses
 from tvist_shaping.shaper import Shaper
 
 TRIED_F_D = (0.1, 200.0)
-"""Damped frequencies for which a shaper is tried out [Hz]: all that a client may tell a robot."""
+"""Range of damped frequencies for which a shaper is checked [Hz]: all that a client may send to a robot."""
 _F_D = np.geomspace(*TRIED_F_D, 23)
 _SHARES = np.array([*np.linspace(0.0, 1.0, 24, endpoint=False), 0.99])
 """Damping ratios to check, as shares of the highest one that a shaper supports [-]."""
@@ -21,7 +21,7 @@ _DECLARED = (
     ("peak", 1.0, 1e6, "a number from 1 to 1e6"),
 )
 _APART = 1.7
-"""Ratio of a mode's frequency to that of the one below it, where a FIR filter is tried out."""
+"""Ratio of a mode's frequency to that of the next lower one, in checks of a FIR filter."""
 
 
 def shaper_of(
@@ -31,20 +31,20 @@ def shaper_of(
     description: str = "",
     zeta_max: float = 1.0,
 ) -> Shaper:
-    """A shaper of your own function, whose duration and peak are found by trying it out.
+    """Create a shaper from your own function, and determine its duration and peak by trials.
 
     Args:
-        function: (f_d [Hz], ζ [-]) -> impulses of one mode. It is asked for every tick and in more than one thread, so
-            it must give the same for the same mode, and soon. Times go with 1/f_d; what has times of its own, whatever
-            the frequency, is a `FirShaper`.
-        name: What to call it; "" for the function's name.
-        description: What to say of it; "" for the first line of the function's docstring.
+        function: (f_d [Hz], ζ [-]) -> impulses of one mode. It is called at every tick and in several threads, so it
+            must be fast, and always return the same result for the same mode. Its times must be proportional to
+            1/f_d; for times that are not, use a `FirShaper`.
+        name: Name of the shaper; "" for the function's name.
+        description: Description of the shaper; "" for the first line of the function's docstring.
         zeta_max: Damping ratios must stay below this [-], above 0 and at most 1.
 
     Raises:
         DesignError: zeta_max is out of range.
-        ShaperFailureError: The function raises, or gives something other than impulses, for a mode of 0.1 to 200 Hz and
-            a damping ratio below zeta_max.
+        ShaperFailureError: The function raises an exception, or does not return impulses, for a mode of 0.1 to 200 Hz
+            and a damping ratio below zeta_max.
     """
     if not 0.0 < zeta_max <= 1.0:
         raise DesignError("zeta_max", zeta_max, "above 0 and at most 1")
@@ -57,11 +57,12 @@ def shaper_of(
 
 
 def check_shaper(shaper: Shaper | FirShaper) -> None:
-    """Try a shaper out: over modes of 0.1 to 200 Hz, and damping ratios up to the highest it is made for.
+    """Try a shaper with modes of 0.1 to 200 Hz, and damping ratios up to its highest one.
 
     Raises:
-        DesignError: What it declares cannot be.
-        ShaperFailureError: Its function raises, gives no weights of sum 1, or gives others than the shaper declares.
+        DesignError: Its declaration is invalid.
+        ShaperFailureError: Its function raises an exception, or returns weights whose sum is not 1 or that violate
+            the declaration.
     """
     if isinstance(shaper, Shaper):
         for field, low, high, limit in _DECLARED:
@@ -81,10 +82,10 @@ def check_shaper(shaper: Shaper | FirShaper) -> None:
 
 
 def _tried(shaper: Shaper) -> tuple[float, float]:
-    """Longest duration in damped periods, and largest sum of magnitudes.
+    """Return the longest duration in damped periods, and the largest sum of magnitudes.
 
     Raises:
-        ShaperFailureError: Its function fails, or either is beyond what it declares.
+        ShaperFailureError: The function fails, or violates the shaper's declaration.
     """
     longest, most = 0.0, 0.0
     for f_d in _F_D.tolist():

@@ -1,4 +1,4 @@
-"""`python -m tvist_shaping.reference`: docs/reference/shaping-library.md, made of this package's docstrings."""
+"""`python -m tvist_shaping.reference`: generates docs/reference/shaping-library.md from this package's docstrings."""
 
 import inspect
 from pathlib import Path
@@ -46,11 +46,11 @@ VALUES = {
     "DESIGNS": "Constructors of the designs that have a name, as shapers do: `auto`, `short`, `auto-target`.",
     "BUILT_IN": "The `Registry` of the shapers and designs that come with the package.",
 }
-"""Exported values, which have no docstring at run time."""
+"""Exported values, with descriptions, since values have no docstrings at run time."""
 
 
 def page() -> str:
-    """The page."""
+    """Return the page."""
     return HEAD + "\n".join(_part(title, names) for title, names in PARTS.items())
 
 
@@ -73,7 +73,7 @@ def _entry(name: str, value: Any) -> str:
 
 
 def _private(member: str, value: type) -> bool:
-    """Whether a method is none that a user calls; a constructor that only says what its class says is not listed."""
+    """Return whether to omit a method: a private one, or a constructor that repeats its class's docstring."""
     return member.startswith("_") and not (member == "__init__" and not issubclass(value, Exception))
 
 
@@ -83,7 +83,7 @@ def _doc(value: Any) -> str:
 
 
 def _signature(value: Any) -> str:
-    """Parameters with their defaults, without types: docstrings say these with shapes and units."""
+    """Format parameters with their defaults but without types, since docstrings give these with shapes and units."""
     if inspect.isclass(value) and issubclass(value, Exception):
         return ""
     parameters = [

@@ -1,4 +1,4 @@
-"""How much vibration a shaper leaves when the mode is not where it was designed for."""
+"""Residual vibration of a shaper when the mode differs from its design."""
 
 import math
 
@@ -11,7 +11,7 @@ from tvist_shaping.impulses import Impulses
 
 
 def residual(f: npt.ArrayLike, zeta: float, impulses: Impulses) -> Floats:
-    """Residual vibration of a mode after the impulses, as a part of what one impulse alone would leave.
+    """Residual vibration of a mode after the impulses, relative to that after a single impulse.
 
         V = exp(-ζ ω_n τ_N) √(C² + S²)
         C = Σ A_j exp(ζ ω_n τ_j) cos(ω_d τ_j),    S = Σ A_j exp(ζ ω_n τ_j) sin(ω_d τ_j)
@@ -19,13 +19,13 @@ def residual(f: npt.ArrayLike, zeta: float, impulses: Impulses) -> Floats:
     with ω_d = 2π f and ω_n = ω_d/√(1-ζ²) (Singer and Seering, 1990). Fig. 4 of the paper is V(f) at ζ = 0.
 
     Args:
-        f: *Damped* frequency of the true mode [Hz], any shape, >= 0. (What the shaper was designed for is in
-            its impulses.)
+        f: *Damped* frequency of the true mode [Hz], any shape, >= 0. (The design frequency is implied by the
+            impulses.)
         zeta: Damping ratio of the true mode [-], 0 <= ζ < 1.
-        impulses: The shaper's.
+        impulses: Impulses of the shaper.
 
     Returns:
-        V [-], of f's shape; 0 is no vibration, 1 as much as without shaping.
+        V [-], in the shape of f; 0 is no vibration, 1 as much as without shaping.
 
     Raises:
         ShaperRangeError: f or ζ is outside the range above.
@@ -37,7 +37,7 @@ def residual(f: npt.ArrayLike, zeta: float, impulses: Impulses) -> Floats:
         raise ShaperRangeError("zeta", zeta, "at least 0 and less than 1")
     omega_d = 2.0 * np.pi * frequency[..., None]
     omega_n = omega_d / math.sqrt(1.0 - zeta * zeta)
-    # The factor outside the sums is taken into them: an exponent that only decays cannot overflow.
+    # The factor outside the sums is moved into them, since an exponent that only decays cannot overflow.
     weights = impulses.A * np.exp(zeta * omega_n * (impulses.tau - impulses.tau[-1]))
     C = (weights * np.cos(omega_d * impulses.tau)).sum(axis=-1)
     S = (weights * np.sin(omega_d * impulses.tau)).sum(axis=-1)
@@ -45,23 +45,24 @@ def residual(f: npt.ArrayLike, zeta: float, impulses: Impulses) -> Floats:
 
 
 def band(impulses: Impulses, f_d: float, zeta: float, V: float) -> tuple[float, float]:
-    """Frequencies around f_d between which the residual vibration stays at or below V.
+    """Return the range of frequencies around f_d in which the residual vibration is at most V.
 
-    Searched on a grid of f_d/1000 up to 10 f_d, the ends then bisected; a hump that touches V is below.
+    It is searched on a grid of f_d/1000 up to 10 f_d, and its ends are refined by bisection; a hump that touches V is
+    inside.
 
     Args:
-        impulses: The shaper's.
-        f_d: Damped frequency to start from, as a rule the design's [Hz], > 0.
+        impulses: Impulses of the shaper.
+        f_d: Damped frequency to start from, usually the design frequency [Hz], > 0.
         zeta: Damping ratio of the true mode [-], 0 <= ζ < 1.
-        V: Residual vibration allowed [-], 0 < V < 1.
+        V: Permitted residual vibration [-], 0 < V < 1.
 
     Returns:
-        Lowest and highest damped frequency of the true mode [Hz]. The highest is infinite where 10 f_d is
-        still inside; both are NaN where f_d itself is not.
+        Lowest and highest damped frequency of the true mode [Hz]. The highest is infinite if 10 f_d is still inside;
+        both are NaN if f_d itself is not.
 
     Raises:
         ShapingError: V or f_d is outside the range above.
-        ShaperRangeError: ζ is.
+        ShaperRangeError: ζ is outside the range above.
     """
     if not 0.0 < V < 1.0:
         raise ShapingError(f"V is {V!r}, but must be between 0 and 1")

@@ -1,4 +1,4 @@
-"""What a shaper is to the filter: impulses as a function of the mode, and what must be known of them beforehand."""
+"""A shaper as a filter uses it: impulses as a function of the mode, and properties that must be known in advance."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,16 +10,16 @@ from tvist_shaping.sensitivity import band
 
 @dataclass(frozen=True, slots=True)
 class Shaper:
-    """A shaper as the filter takes it; one of your own is made the same way.
+    """A shaper as a filter uses it; you can create your own in the same way.
 
     Attributes:
-        name: What it is called on the wire and in tables.
-        description: What it does, in one line.
+        name: Name on the wire and in tables.
+        description: Description in one line.
         function: (f_d [Hz], ζ [-]) -> impulses of one mode.
-        duration_periods: Time of the last impulse in damped periods, the longest over every ζ [-].
+        duration_periods: Largest time of the last impulse over all ζ, in damped periods [-].
         zeta_max: Damping ratios must stay below this [-].
-        peak: Σ|A_j|, the most by which it may exceed its reference's velocity and acceleration where f_d and ζ do
-            not change; 1 for positive impulses [-].
+        peak: Σ|A_j|, the largest factor by which it may exceed its reference's velocity and acceleration while f_d
+            and ζ are constant; 1 for positive impulses [-].
     """
 
     name: str
@@ -30,15 +30,15 @@ class Shaper:
     peak: float = 1.0
 
     def impulses(self, f_d: float, zeta: float) -> Impulses:
-        """What `function` gives, checked to be impulses: the function may be anybody's.
+        """Call `function`, and check that it returns impulses, since it may be the user's.
 
         Args:
             f_d: Damped frequency of the mode [Hz].
             zeta: Damping ratio of the mode [-].
 
         Raises:
-            Exception: Whatever the function raises.
-            ShaperFailureError: It gives something else.
+            Exception: Any exception that the function raises.
+            ShaperFailureError: The function returns something else.
         """
         impulses = self.function(f_d, zeta)
         if not isinstance(impulses, Impulses):
@@ -46,14 +46,14 @@ class Shaper:
         return impulses
 
     def band(self, V: float = 0.05, zeta: float = 0.0) -> tuple[float, float]:
-        """How wrong the frequency may be: the span of true over assumed frequency in which at most V is left.
+        """Return the range of the ratio of true to assumed frequency in which at most V is left.
 
         Args:
-            V: Residual vibration allowed [-], 0 < V < 1.
-            zeta: Damping ratio, assumed and true [-].
+            V: Permitted residual vibration [-], 0 < V < 1.
+            zeta: Damping ratio, both assumed and true [-].
 
         Returns:
-            Lowest and highest ratio [-], as `sensitivity.band` has them: NaN where even 1 is not in it.
+            Lowest and highest ratio [-], as in `sensitivity.band`: NaN if even 1 is not inside.
 
         Raises:
             ShapingError: V or ζ is out of range.

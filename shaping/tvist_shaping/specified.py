@@ -1,17 +1,19 @@
 """Specified insensitivity: the shortest positive train that leaves at most V anywhere in a band of frequencies.
 
-Singhose, Seering and Singer (J. Dyn. Sys. Meas. Control 118, 1996) ask for V at sampled frequencies of the band and
-let an optimisation find the train. Without damping the shortest one is symmetric, its residual is the cosine sum
+Singhose, Seering and Singer (J. Dyn. Sys. Meas. Control 118, 1996) require V at sampled frequencies of the band, and
+find the train by optimisation. Without damping the shortest train is symmetric, and its residual is the cosine sum
 
-    R(f) = Σ a_j cos(2π f x_j),    x_j the times before and after its middle,
+    R(f) = Σ a_j cos(2π f x_j),    x_j the times relative to its middle,
 
-and it touches the bound with alternating sign: +V at the lower end, then humps. So the samples that matter are as many
-as there are unknowns, and Newton's method moves them, and the train, to where they belong (Remez' exchange). N
-impulses have N - 1 unknowns (amplitudes of sum 1, times) and N - 1 extremes, of which
+which touches the bound with alternating sign: +V at the lower end, then the humps. So there are as many relevant
+samples as unknowns, and Newton's method moves both the samples and the train to their final positions (Remez
+exchange). N impulses have N - 1 unknowns (amplitudes of sum 1, times) and N - 1 extremes. There are two cases:
 
-* the last is a hump within the band, where the band is wide for N: then it is the extra-insensitive shaper of
-  `ripple`, played faster, until its own band begins where the one asked for does; what it forgives above is a gift;
-* or the last is the band's upper end, where the residual is still on its way: solved from there downwards.
+* If the band is wide for N, the last extreme is a hump within the band. The train is then the extra-insensitive
+  shaper of `ripple`, scaled in time such that its own band begins at the requested lower end; it tolerates more than
+  requested above the upper end.
+* Otherwise the last extreme is the band's upper end, where the residual is not stationary: this is solved by
+  continuation from the first case downwards.
 """
 
 import math
@@ -25,24 +27,24 @@ from tvist_shaping.errors import DesignError
 from tvist_shaping.newton import solve
 
 MOST = 12
-"""Impulses of the longest train."""
+"""Largest number of impulses."""
 STRIDE = 0.02
-"""Change of the band's upper end that Newton's method follows at once [-]."""
+"""Change of the band's upper end that Newton's method can follow in one step [-]."""
 
 
 def specified(low: float, high: float, V: float) -> tuple[Floats, Floats]:
-    """The shortest train without damping.
+    """Return the shortest train without damping.
 
     Args:
         low: Lower end of the band [any unit of frequency], > 0.
-        high: Upper end of the band [the same], at least low.
-        V: Residual vibration allowed in it [-], 1e-4 to 0.5.
+        high: Upper end of the band [same unit], at least low.
+        V: Residual vibration permitted in the band [-], 1e-4 to 0.5.
 
     Returns:
-        Amplitudes [-], positive, of sum 1, and times [one over the unit], each of shape (N,).
+        Amplitudes [-], positive, with sum 1, and times [inverse of that unit], each of shape (N,).
 
     Raises:
-        DesignError: V is out of range, or the band too wide for 12 impulses.
+        DesignError: V is out of range, or the band is too wide for 12 impulses.
         ConvergenceError: No train was found.
     """
     if not 0.0 < low <= high < math.inf:
@@ -56,7 +58,7 @@ def specified(low: float, high: float, V: float) -> tuple[Floats, Floats]:
     else:
         widest = low * (2.0 - ends) / ends
         raise DesignError("band", high, f"at most {widest:g} at its upper end for {MOST} impulses and this V")
-    # The shaper of equal ripple, in units of the lower end: its band begins at 1.
+    # The equal-ripple shaper, in units of the lower end, so that its band begins at 1.
     x = np.asarray((np.arange(N) - (N - 1) / 2.0) / 2.0 * ends, dtype=float)
     humps = _humps(N, V) / ends
     if N > 2 and ratio < humps[-1]:
@@ -71,13 +73,13 @@ def _humps(N: int, V: float) -> Floats:
 
 
 def _followed(a: Floats, x: Floats, humps: Floats, ratio: float, V: float) -> tuple[Floats, Floats]:
-    """The train whose last extreme is the band's upper end, from where it is a hump down to `ratio`."""
+    """Follow the train whose last extreme is the band's upper end, from where that is a hump down to `ratio`."""
     N, pairs = a.size, a.size // 2
-    free = (N - 1) // 2  # amplitudes: the innermost pair or the middle one makes the sum 1
+    free = (N - 1) // 2  # free amplitudes; the innermost pair or the middle one makes the sum 1
     signs = (-1.0) ** np.arange(1, N - 1)
 
     def parts(points: Floats) -> tuple[Floats, Floats]:
-        """Amplitudes and times of the earlier half, the middle one last, counted twice where it is a pair."""
+        """Amplitudes and times of the earlier half; the middle one is last and counts twice if it is a pair."""
         A, late = points[:, :free], points[:, free : free + pairs]
         rest = 1.0 - 2.0 * A.sum(axis=1, keepdims=True)
         if N % 2:

@@ -1,12 +1,13 @@
-"""A time-varying filter that keeps the limits of what it shapes: its mean delay does not change.
+"""A time-varying filter with constant mean delay, which keeps the limits of its reference.
 
-Where the reference is a parabola for as long as the filter is, a filter of mean delay D and variance S of its delays
-gives y = x(t - D) + ẍ S/2. While D changes, the velocity is ẋ (1 - Ḋ): above the reference's while the delay shrinks,
-and the acceleration has -ẋ D̈ in it. With D the same at every configuration both are gone; what is left is S̈/2, a
-thousandth. It costs the difference between the longest mean delay there is and the present one.
+If the reference is a parabola over the length of the filter, a filter with mean delay D and variance S of its delays
+gives y = x(t - D) + ẍ S/2. While D changes, the velocity is ẋ (1 - Ḋ), which exceeds the reference's while the delay
+shrinks, and the acceleration contains -ẋ D̈. If D is the same at every configuration, both effects vanish; what
+remains is S̈/2, a thousandth. The price is the difference between the longest mean delay anywhere and the present
+one.
 
-Taps are designed every few ticks and averaged, three running means one after the other, so that they move without
-kinks; the mean of tap vectors of one sum and one mean delay has these, too.
+Taps are designed every few ticks and averaged by three consecutive running means, so that they change smoothly; a
+mean of tap vectors with equal sum and mean delay has the same sum and mean delay.
 """
 
 import copy
@@ -27,24 +28,24 @@ from tvist_shaping.taps import average, length, product_taps
 EVERY = 4
 """Ticks between two designs."""
 SMOOTH = 64
-"""Ticks of each running mean: fewer let the spread of the delays change too fast, more let it lag behind the arm."""
+"""Ticks of each running mean: with fewer, the spread of the delays changes too fast; with more, it lags too far."""
 EXCESS = 0.005
-"""Share by which the acceleration may exceed the reference's [-]: the most on random motions at their limits."""
+"""Share by which the acceleration may exceed the reference's [-]: the largest in random motions at their limits."""
 
 
 class Design(ABC):
     """Design that computes taps from modes."""
 
     name: str
-    """What the filter is called."""
+    """Name of the filter."""
     modes: int
-    """Modes it wants to know."""
+    """Number of modes that it needs."""
     taps: int
     """Number of taps."""
     period: float
     """Tick [s]."""
     peak: float = 1.0
-    """Sum of the taps' magnitudes at the most, 1 where none is negative [-]."""
+    """Upper bound of the sum of the taps' magnitudes, 1 if none is negative [-]."""
 
     @abstractmethod
     def fork(self) -> Self:
@@ -52,39 +53,39 @@ class Design(ABC):
 
     @abstractmethod
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
-        """Taps for a reference that has been at rest for ever; as `go_on`."""
+        """Compute the taps for a reference that has always been at rest; arguments and result as in `go_on`."""
 
     @abstractmethod
     def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:
-        """Taps some time after the last.
+        """Compute the taps some time after the last ones.
 
         Args:
             f_d: Damped frequencies [Hz], shape (modes,).
             zeta: Damping ratios [-], shape (modes,).
-            seconds: Since the last ones [s].
-            taps: Result, shape (taps,), sum 1.
+            seconds: Time since the last ones [s].
+            taps: Result, shape (taps,), with sum 1.
 
         Returns:
-            Whether they are what was asked for; False where a delay had to be clipped.
+            Whether the taps are as required; False if a delay was clipped.
         """
 
 
 class ProductDesign(Design):
-    """The modes' zero-vibration shapers, one after the other, held back to a mean delay."""
+    """The modes' zero-vibration shapers in series, delayed to a constant mean delay."""
 
     def __init__(
         self, mean_delay: float, *, modes: int = 3, longest: float = 0.26, period: float = 0.002
     ) -> None:
-        """A design.
+        """Create a design.
 
         Args:
-            mean_delay: The longest that the product has anywhere where the arm goes [s], > 0.
+            mean_delay: Longest mean delay of the product anywhere in the workspace [s], > 0.
             modes: Number of modes, 1 to 6.
-            longest: Longest delay of an impulse that is not clipped [s].
+            longest: Longest delay of an impulse without clipping [s].
             period: Tick [s], > 0.
 
         Raises:
-            FilterError: A number is out of range.
+            FilterError: An argument is out of range.
         """
         if not 1 <= modes <= 6:
             raise FilterError("modes", modes, "1 to 6: the product has 2^modes impulses")
@@ -97,7 +98,7 @@ class ProductDesign(Design):
         return f"ProductDesign(mean_delay={self.mean_delay:g}, modes={self.modes})"
 
     def fork(self) -> Self:
-        """Itself: it remembers nothing."""
+        """Return this design itself, since it has no state."""
         return self
 
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
@@ -105,12 +106,12 @@ class ProductDesign(Design):
         return product_taps(f_d, zeta, self.mean_delay, self.period, taps)
 
     def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:  # noqa: ARG002
-        """Taps for these modes; see `Design.go_on`."""
+        """Compute the taps for these modes; see `Design.go_on`."""
         return product_taps(f_d, zeta, self.mean_delay, self.period, taps)
 
 
 class ShortDesign(Design):
-    """Positive taps from a quadratic programme, as short as what may remain allows: `tvist_shaping.fir`."""
+    """Positive taps from a quadratic programme, as short as the permitted residual allows: `tvist_shaping.fir`."""
 
     def __init__(
         self,
@@ -120,16 +121,17 @@ class ShortDesign(Design):
         period: float = 0.002,
         name: str = "short",
     ) -> None:
-        """A design.
+        """Create a design.
 
         Args:
-            mean_delay: Mean delay of the taps everywhere [s], > 0 and within the shortest length less its edge.
-            wanted: What it is to reach.
+            mean_delay: Mean delay of the taps at every configuration [s], > 0 and within the shortest length minus
+                its edge.
+            wanted: Requirements for the taps.
             period: Tick [s], > 0.
-            name: What it is called.
+            name: Name of the filter.
 
         Raises:
-            FilterError: A number is out of range.
+            FilterError: An argument is out of range.
         """
         wanted = wanted or FirDesign()
         _check_times(mean_delay, wanted.shortest - EDGE, period)
@@ -144,16 +146,16 @@ class ShortDesign(Design):
         return f"ShortDesign(mean_delay={self.mean_delay:g}, wanted={self.wanted!r})"
 
     def fork(self) -> Self:
-        """A copy with the present length and the present solution of the programme."""
+        """Return a copy with the present length and the present solution of the programme."""
         other = copy.copy(self)
         other._part()  # noqa: SLF001  one of its own kind
         return other
 
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
-        """Taps of the shortest length at which no more remains than may; as `go_on`."""
+        """Compute taps of the shortest length with a permitted residual; arguments and result as in `go_on`."""
         shortest, longest = self.wanted.shortest, self.wanted.longest
         self._programme.dual[:] = 0.0
-        for _ in range(11):  # what remains falls with the length: halve the interval
+        for _ in range(11):  # the residual decreases with the length, so bisect
             self._length = 0.5 * (shortest + longest)
             self._solve(f_d, zeta, taps)
             if self._excess() > 0.0:
@@ -167,7 +169,7 @@ class ShortDesign(Design):
         return self._solved and self._excess() <= 0.0
 
     def go_on(self, f_d: Floats, zeta: Floats, seconds: float, taps: Floats) -> bool:
-        """Taps of a length that has followed what remains; see `Design.go_on`."""
+        """Compute taps whose length follows the residual; see `Design.go_on`."""
         self._solve(f_d, zeta, taps)
         change = seconds * min(max(GAIN * self._excess(), -QUICKEST), QUICKEST)
         self._length = min(max(self._length + change, self.wanted.shortest), self.wanted.longest)
@@ -177,40 +179,40 @@ class ShortDesign(Design):
         self._programme = self._programme.fork()
 
     def _solve(self, f_d: Floats, zeta: Floats, taps: Floats) -> None:
-        """New taps; where none are found the old ones stand, whose mean delay is the right one."""
+        """Compute new taps; if none are found, keep the old ones, which have the right mean delay."""
         self._solved = solve(f_d, zeta, self._length, self.mean_delay, self.period, self._programme)
         if self._solved:
             taps[:] = self._programme.taps
 
     def _excess(self) -> float:
-        """What remains against what may: logarithm, so that it is 0 where they are equal."""
+        """Logarithm of the ratio of the residual to the permitted one, 0 if they are equal."""
         return 0.5 * math.log(float(((self._programme.remains / self._residual) ** 2).sum()) + 1e-12)
 
 
 class SteadyFilter(Filter):
     """Time-varying shaping with a constant mean delay.
 
-    An estimator may know modes as low as its `f_d_min`, and be far from them everywhere the arm goes. So a design is
-    not refused because it would be too short for these: where it is too short for the modes there are, `clipped` says
-    so at that tick, and no delay is longer than the line holds.
+    An estimator's `f_d_min` may be far below the modes anywhere in the workspace. A design is therefore not refused
+    for being too short at that frequency. If it is too short for the actual modes, `clipped` reports this at that
+    tick, and no delay exceeds the delay line.
 
     Attributes:
-        design: Makes the taps.
+        design: Computes the taps.
     """
 
     design: Design
 
     def __init__(self, design: Design, estimator: Estimator, *, joints: int, smooth: int = SMOOTH) -> None:
-        """A filter at rest at q = 0; `reset` puts it where the arm is.
+        """Create a filter at rest at q = 0; `reset` moves it to the arm's configuration.
 
         Args:
-            design: Makes the taps; it belongs to this filter alone.
-            estimator: The modes as functions of q, as many as the design wants.
-            joints: Entries of a sample, >= 1.
-            smooth: Ticks of each of the three running means over the taps, >= 1.
+            design: Computes the taps; it must not be shared with another filter.
+            estimator: The modes as functions of q, as many as the design needs.
+            joints: Number of joints of the arm, >= 1.
+            smooth: Ticks of each of the three running means of the taps, >= 1.
 
         Raises:
-            FilterError: A number is out of range, or the estimator has another number of modes.
+            FilterError: An argument is out of range, or the estimator has another number of modes.
             ShaperFailureError: The design fails for the modes at q = 0.
         """
         if smooth < 1:
@@ -236,7 +238,7 @@ class SteadyFilter(Filter):
 
     @property
     def delay(self) -> float:
-        """Time of the last tap [s]: how much later the shaped reference ends."""
+        """Time of the last tap [s], by which the shaped reference ends later."""
         return length(self._taps) * self.period
 
     @property
@@ -271,7 +273,7 @@ class SteadyFilter(Filter):
         self._line.gather(self._taps, self._delays, self._q_star)
 
     def _ask(self, modes: tuple[Floats, Floats], seconds: float | None) -> None:
-        """Have taps designed for these modes, some time after the last; None: from rest."""
+        """Compute taps for these modes, some time after the last ones; None for a start at rest."""
         self.f_d, self.zeta = modes
         try:
             if seconds is None:

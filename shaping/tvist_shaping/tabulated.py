@@ -1,7 +1,8 @@
-"""A shaper whose amplitudes and times have no closed form in ζ: solved once, then read off.
+"""Shapers whose amplitudes and times have no closed form in ζ: solved once, then interpolated.
 
-It is solved at Chebyshev's nodes between no damping and the highest allowed, each from the one before, and what lies
-between is the polynomial through them: as exact as the solutions, smooth in ζ, and a microsecond's work a tick.
+The equations are solved at Chebyshev nodes between zero damping and the highest one, each starting from the previous
+solution. In between, the polynomial through the nodes is evaluated: it is as exact as the solutions, smooth in ζ, and
+takes a microsecond per tick.
 """
 
 import math
@@ -13,7 +14,7 @@ from tvist_shaping._types import Floats
 from tvist_shaping.impulses import Impulses, check_mode
 
 NODES = 32
-"""Degree + 1 of the polynomials in ζ."""
+"""Number of nodes, which is the degree of the polynomials in ζ plus 1."""
 
 
 class Tabulated:
@@ -21,7 +22,7 @@ class Tabulated:
 
     Attributes:
         zeta_max: Damping ratios must stay below this [-].
-        duration_periods: Longest duration over every ζ, to 1e-9 damped periods [-].
+        duration_periods: Longest duration over all ζ, to within 1e-9 damped periods [-].
     """
 
     zeta_max: float
@@ -34,16 +35,16 @@ class Tabulated:
         zeta_max: float,
         instead: str,
     ) -> None:
-        """Solve and fit.
+        """Solve at the nodes, and compute the polynomials.
 
         Args:
-            follow: (ζ, the unknowns at a ζ a little below) -> the unknowns, A [-] and times in damped periods [-].
-            start: The unknowns without damping.
+            follow: (ζ, the unknowns at a slightly lower ζ) -> the unknowns, A [-] and times in damped periods [-].
+            start: Unknowns without damping.
             zeta_max: Highest damping ratio [-].
-            instead: What to take beyond it, in words.
+            instead: What to use beyond it, in words.
 
         Raises:
-            ConvergenceError: There is no solution up to there.
+            ConvergenceError: There is no solution up to zeta_max.
         """
         self.zeta_max, self._instead = zeta_max, instead
         k = np.arange(NODES)
@@ -55,7 +56,7 @@ class Tabulated:
             x, A, periods = follow(zeta, last + step * slope)
             slope, last = (x - last) / step, x
             values.append(np.concatenate([A, periods]))
-        terms = np.cos(np.outer(np.arccos(nodes), k))  # T_k at the nodes, orthogonal
+        terms = np.cos(np.outer(np.arccos(nodes), k))  # T_k at the nodes, which are orthogonal
         self._coefficients = (terms.T @ np.array(values)) * np.where(k == 0, 1.0, 2.0)[:, None] / NODES
         self._k, self._N = k, values[0].size // 2
         ends = [float(follow(end, x)[2][-1]) for end, x in ((0.0, start), (zeta_max, last))]
@@ -63,7 +64,7 @@ class Tabulated:
         self.duration_periods = round(max(*ends, *between), 9)
 
     def __call__(self, f_d: float, zeta: float) -> Impulses:
-        """The impulses.
+        """Evaluate the impulses.
 
         Args:
             f_d: Damped frequency of the mode [Hz], 1e-6 to 1e6.

@@ -1,8 +1,8 @@
-"""Weights of the newest samples instead of impulses: what a filter of constant mean delay is made of.
+"""Weights of the newest samples, used instead of impulses by filters with constant mean delay.
 
-Taps h_n, n = 0 … N-1, at delays of n ticks say the same as impulses between ticks, each spread over four taps by
-Lagrange's cubic. Unlike impulses they can be averaged: a mean of tap vectors has the mean of their sums and of their
-mean delays.
+Taps h_n, n = 0 … N-1, at delays of n ticks are equivalent to impulses between ticks, each distributed over four taps
+by Lagrange's cubic. Unlike impulses they can be averaged: the sum and the mean delay of an averaged tap vector are
+the averages of those of the vectors.
 """
 
 import math
@@ -30,18 +30,18 @@ def mean_delay(f_d: Floats, zeta: Floats) -> float:
 
 @compiled
 def product_taps(f_d: Floats, zeta: Floats, mean: float, period: float, taps: Floats) -> bool:
-    """The product of the modes' zero-vibration shapers, held back so that its mean delay is a given one.
+    """Compute the product of the modes' zero-vibration shapers, delayed to a given mean delay.
 
     Args:
         f_d: Damped frequencies [Hz], shape (modes,).
         zeta: Damping ratios [-], shape (modes,).
-        mean: Mean delay wanted [s].
+        mean: Requested mean delay [s].
         period: Tick [s].
         taps: Result, shape (N,).
 
     Returns:
-        Whether it can be had: False where the product's own mean delay is longer, and stands, or the last impulse
-        is beyond the last tap, and is put on it.
+        False if the product's own mean delay is longer, and is then kept, or if the last impulse is beyond the last
+        tap, and is moved to it; otherwise True.
     """
     modes, N = f_d.shape[0], taps.shape[0]
     own = mean_delay(f_d, zeta)
@@ -71,14 +71,14 @@ def product_taps(f_d: Floats, zeta: Floats, mean: float, period: float, taps: Fl
 
 @compiled
 def average(taps: Floats, past: Floats, sums: Floats, row: int, out: Floats) -> None:
-    """Three running means, one after the other, over the last tap vectors of each.
+    """Update three consecutive running means, over the last tap vectors of each.
 
     Args:
         taps: The newest vector, shape (N,).
-        past: What each mean is of, shape (3, ticks, N); a row of each is replaced.
-        sums: Their sums, shape (3, N); changed.
+        past: Inputs of each mean, shape (3, ticks, N); one row of each is replaced.
+        sums: Sums of these inputs, shape (3, N); changed.
         row: Oldest row of each.
-        out: The third mean, shape (N,), its sum 1.
+        out: The third mean, shape (N,), with sum 1.
     """
     ticks, N = past.shape[1], taps.shape[0]
     out[:] = taps
@@ -87,7 +87,7 @@ def average(taps: Floats, past: Floats, sums: Floats, row: int, out: Floats) -> 
             sums[stage, n] += out[n] - past[stage, row, n]
             past[stage, row, n] = out[n]
             out[n] = sums[stage, n] / ticks
-        if row == 0:  # once in a while anew, lest roundings add up over days
+        if row == 0:  # recompute regularly, so that rounding errors do not add up over days
             for n in range(N):
                 fresh = 0.0
                 for i in range(ticks):
@@ -101,5 +101,5 @@ def average(taps: Floats, past: Floats, sums: Floats, row: int, out: Floats) -> 
 
 
 def length(taps: Floats) -> int:
-    """Number of the last tap that counts."""
+    """Number of taps up to the last one that matters."""
     return int(np.flatnonzero(np.abs(taps) > 1e-12)[-1])

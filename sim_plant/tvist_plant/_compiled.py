@@ -1,4 +1,4 @@
-"""Compile a function with numba; where numba is missing the plain Python function serves."""
+"""Compile functions with numba, or use them as plain Python if numba is not installed."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,7 +8,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def compiled(function: F) -> F:
-    """Compile `function`; its Python source stays reachable as `.py_func`; the cache outlives the process."""
+    """Compile `function`; its Python source remains available as `.py_func`; the cache outlives the process."""
     try:
         from numba import njit
     except ImportError:  # pragma: no cover
@@ -18,7 +18,7 @@ def compiled(function: F) -> F:
 
 
 def is_cached(function: Callable[..., Any]) -> bool:
-    """Whether a compiled function's machine code is already on disk: else its first call takes seconds."""
+    """Return whether a compiled function's machine code is on disk already; otherwise its first call takes seconds."""
     stats = getattr(function, "stats", None)
     if stats is None:  # pragma: no cover  numba is missing: there is nothing to compile
         return True

@@ -1,4 +1,4 @@
-"""What is wrong with a robot file, in words: msgspec finds it, and says it for programmers."""
+"""Messages about errors in a robot file for its author, since msgspec describes them for programmers."""
 
 import re
 from collections.abc import Callable
@@ -14,11 +14,11 @@ _RELATIONS = {">=": "at least", "<=": "at most", ">": "more than", "<": "less th
 
 
 def in_words(error: msgspec.ValidationError, content: Any) -> str:
-    """Key, value and what is allowed.
+    """Return a message with the key, the value and the permitted values.
 
     Args:
-        error: What msgspec said.
-        content: What it looked at.
+        error: Error raised by msgspec.
+        content: Content that was checked.
     """
     said, _, path = str(error).partition(" - at `$")
     key = path.rstrip("`").removeprefix(".")

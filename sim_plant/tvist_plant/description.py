@@ -1,4 +1,4 @@
-"""A robot as its file describes it: numbers with units, checked, nothing computed."""
+"""A robot as described by its file: numbers with units, checked but not processed."""
 
 import math
 import tomllib
@@ -20,36 +20,36 @@ Positive = Annotated[float, Meta(gt=0, le=1e7)]
 NotNegative = Annotated[float, Meta(ge=0, le=1e7)]
 Vector3 = tuple[Number, Number, Number]
 Tensor = tuple[NotNegative, Number, Number, NotNegative, Number, NotNegative]
-"""Symmetric 3x3: xx xy xz yy yz zz."""
+"""Symmetric 3x3 matrix: xx xy xz yy yz zz."""
 
 MAX_JOINTS = 7
 DISTURBANCES = ("friction", "gear", "noise")
-"""What no shaper can know: Coulomb friction, kinematic error of the gears, noise of the accelerometer."""
+"""Disturbances unknown to a shaper: Coulomb friction, kinematic error of the gears, noise of the accelerometer."""
 
 
 QUIET_STEP = 2.0 * math.pi / 2**23
-"""Step of an encoder with 23 bits per turn [rad]; an arm at rest moves less while its drives settle."""
+"""Step of an encoder with 23 bits per turn [rad]; an arm at rest moves by less than this while its drives settle."""
 
 
 class DescriptionError(ValueError):
-    """A robot file is wrong: the message names the file, the key, the value and what is allowed."""
+    """A robot file is invalid; the message names the file, the key, the value and what is allowed."""
 
 
 class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One table of the file; unknown keys are refused."""
+    """One table of the file; unknown keys are rejected."""
 
 
 class RobotNames(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Names."""
+    """Names of the robot and its parts."""
 
     name: str
     model: str
     joints: tuple[str, ...]
-    """Names of the joints, from the base to the flange; their number is the number of joints everywhere."""
+    """Names of the joints, from the base to the flange, which also define the number of joints."""
 
 
 class Kinematics(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Standard Denavit-Hartenberg parameters, one entry a joint."""
+    """Standard Denavit-Hartenberg parameters, one entry per joint."""
 
     a: tuple[Number, ...]
     """Link lengths [m]."""
@@ -60,65 +60,65 @@ class Kinematics(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class Links(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Rigid-body masses, in the Denavit-Hartenberg frame of each link."""
+    """Masses of the rigid links, in the Denavit-Hartenberg frame of each link."""
 
     mass: tuple[Positive, ...]
-    """[kg]."""
+    """Masses [kg]."""
     com: tuple[Vector3, ...]
     """Centres of mass [m]."""
     inertia: tuple[Tensor, ...]
-    """About the centres of mass [kg m^2]."""
+    """Inertias about the centres of mass [kg m^2]."""
 
 
 class ArmLimits(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What the controller allows, one entry a joint where it is a tuple."""
+    """Limits of the controller; tuples have one entry per joint."""
 
     position: tuple[Positive, ...]
-    """Either way from zero [rad]."""
+    """Largest distance from zero in either direction [rad]."""
     velocity: tuple[Positive, ...]
-    """[rad/s]."""
+    """Velocity limits [rad/s]."""
     acceleration: tuple[Positive, ...]
-    """[rad/s^2]."""
+    """Acceleration limits [rad/s^2]."""
     jerk: tuple[Positive, ...]
-    """[rad/s^3]."""
+    """Jerk limits [rad/s^3]."""
     torque: tuple[Positive, ...]
-    """[N m]."""
+    """Torque limits [N m]."""
     payload: NotNegative
-    """Rated [kg]."""
+    """Rated payload [kg]."""
     repeatability: Positive
-    """[m]."""
+    """Repeatability of the tool's position [m]."""
 
 
 class Payload(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A rigid body on the flange."""
 
     mass: NotNegative = 0.0
-    """[kg]."""
+    """Mass [kg]."""
     com: Vector3 = (0.0, 0.0, 0.0)
     """Centre of mass in the flange frame [m]."""
     inertia: Tensor = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    """About the centre of mass, flange axes [kg m^2]."""
+    """Inertia about the centre of mass, flange axes [kg m^2]."""
 
 
 class Drives(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Motors, strain wave gears and the drives' cascaded loops, one entry a joint where it is a tuple."""
+    """Motors, strain wave gears and the drives' cascaded loops; tuples have one entry per joint."""
 
     gear_stiffness: tuple[Positive, ...]
-    """K_g [N m/rad]."""
+    """Gear stiffness K_g [N m/rad]."""
     gear_damping: tuple[NotNegative, ...]
-    """D_g [N m s/rad]."""
+    """Gear damping D_g [N m s/rad]."""
     rotor_inertia: tuple[Positive, ...]
-    """B, reflected to the joint side [kg m^2]."""
+    """Rotor inertia B, reflected to the joint side [kg m^2]."""
     velocity_gain: tuple[NotNegative, ...]
-    """K_d [N m s/rad]."""
+    """Velocity gain K_d [N m s/rad]."""
     position_gain: tuple[NotNegative, ...]
-    """K_p [1/s]."""
+    """Position gain K_p [1/s]."""
     integral_gain: tuple[NotNegative, ...]
-    """K_i [1/s]."""
+    """Integral gain K_i [1/s]."""
     coulomb_friction: tuple[NotNegative, ...]
-    """F_c [N m]."""
+    """Coulomb friction F_c [N m]."""
     friction_width: Positive
-    """w of F_c tanh(velocity/w) [rad/s]."""
+    """Width w in F_c tanh(velocity/w) [rad/s]."""
     friction_feedforward: NotNegative
     """Share of F_c that is fed forward [-]."""
     friction_feedforward_width: Positive
@@ -126,62 +126,62 @@ class Drives(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     windup_feedforward: tuple[NotNegative, ...]
     """c_w, share of the gears' wind-up that is fed forward [-]."""
     gear_error_amplitude: NotNegative
-    """Kinematic error of the gear [rad]."""
+    """Amplitude of the gears' kinematic error [rad]."""
     gear_error_waves: Positive
-    """Waves of that error in a turn of the joint [-]."""
+    """Number of waves of that error per turn of the joint [-]."""
     linear_friction: bool = False
-    """Take F_c/w times velocity, and feed all of it forward: the plant that the linear modes describe."""
+    """Use F_c/w times velocity as friction, and feed all of it forward: the plant that the linear modes describe."""
 
 
 class LinkFlexibility(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Links that bend: two virtual elastic joints, about y and z, in the middle of each."""
+    """Links that bend, with two virtual elastic joints about y and z in the middle of each."""
 
     links: tuple[Annotated[int, Meta(ge=0, lt=MAX_JOINTS)], ...] = ()
-    """Numbers of the links, 0 the first."""
+    """Indices of the links, 0 for the first."""
     stiffness: tuple[Positive, ...] = ()
-    """One a link, for both axes [N m/rad]."""
+    """Stiffness for both axes, one entry per link [N m/rad]."""
     damping_time: NotNegative = 0.0
-    """Damping over stiffness [s]."""
+    """Damping divided by stiffness [s]."""
 
 
 class Sensors(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What the arm feels."""
+    """Properties of the sensors."""
 
     accelerometer_noise: NotNegative = 0.0
     """rms per axis [m/s^2]."""
     encoder_step: NotNegative = 0.0
-    """Joint angles are told anew once they have moved by this much [rad]."""
+    """Change of a joint angle after which its reading is updated [rad]."""
 
 
 class Body(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A capsule that holds a part of the arm."""
+    """A capsule that encloses a part of the arm."""
 
     name: str
     link: Annotated[int, Meta(ge=-1, lt=MAX_JOINTS)]
-    """Number of the link it belongs to, in whose Denavit-Hartenberg frame it stands; -1: the world."""
+    """Index of the link that it belongs to, and in whose Denavit-Hartenberg frame it is given; -1 for the world."""
     start: Vector3
     """One end of its axis [m]."""
     end: Vector3
-    """The other end [m]."""
+    """The other end of its axis [m]."""
     radius: Positive
-    """[m]."""
+    """Radius [m]."""
 
 
 class Collision(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What may not meet: bodies of the arm, and the floor. Neighbours in the list may touch."""
+    """Bodies that must not collide: those of the arm, and the floor. Neighbours in the list may touch."""
 
     floor: Number = 0.0
-    """Height [m]; the first two bodies stand on it and cannot reach it."""
+    """Height of the floor [m]; the first two bodies stand on it and cannot collide with it."""
     payload_radius: Positive = 0.05
     """Radius of the capsule from the flange through the payload's centre to twice its distance [m]."""
     apart: tuple[tuple[str, str], ...] = ()
-    """Further pairs that cannot meet; "payload" is one of the names."""
+    """Further pairs that cannot collide; "payload" is one of the names."""
     bodies: tuple[Body, ...] = ()
     """Bodies of the arm, from the base to the flange."""
 
 
 class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Everything a robot file holds."""
+    """Content of a robot file."""
 
     robot: RobotNames
     kinematics: Kinematics
@@ -247,7 +247,7 @@ def load(robot: str | Path) -> RobotDescription:
         robot: Name of a robot that comes with the package, or path of a TOML file.
 
     Raises:
-        DescriptionError: There is no such robot, or the file is wrong; the message names the key.
+        DescriptionError: There is no such robot, or the file is invalid; the message names the key.
         UserFileError: The file is not text, too large, nested too deeply, or has its limits in degrees.
     """
     shipped = resources.files("tvist_plant") / "robots" / f"{robot}.toml"
@@ -273,14 +273,14 @@ def load(robot: str | Path) -> RobotDescription:
 
 
 def is_real_body(inertia: Tensor) -> bool:
-    """Whether the principal moments are those of a body: none negative, none above the sum of the others."""
+    """Return whether the principal moments are physically possible: none negative, none above the sum of the others."""
     xx, xy, xz, yy, yz, zz = inertia
     least, middle, most = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     return bool(least >= -1e-9 * most and most <= (least + middle) * (1.0 + 1e-6))
 
 
 def _check(description: RobotDescription, source: str | Path) -> None:
-    """Check what a type cannot say: lengths that must agree, links that exist."""
+    """Check what types cannot express, such as lengths that must agree and links that must exist."""
     joints = description.joints
     if not 1 <= joints <= MAX_JOINTS:
         raise DescriptionError(
@@ -337,7 +337,7 @@ def _check_collision(description: RobotDescription, source: str | Path) -> None:
 
 
 def _check_bodies(description: RobotDescription, source: str | Path) -> None:
-    """Check that every inertia is one that a body can have."""
+    """Check that every inertia is physically possible."""
     links = {f"links.inertia[{number}]": inertia for number, inertia in enumerate(description.links.inertia)}
     for key, inertia in {**links, "payload.inertia": description.payload.inertia}.items():
         if not is_real_body(inertia):

@@ -1,4 +1,4 @@
-"""Whether two robot files describe the same arm, as far as its vibration goes."""
+"""Fingerprint of an arm's vibration properties, to tell whether two robot files describe the same arm."""
 
 from hashlib import sha256
 
@@ -20,10 +20,10 @@ _DRIVES = (
 
 
 def fingerprint(description: RobotDescription) -> str:
-    """Name the arm by what makes it vibrate: geometry, masses, springs, dampers and drive gains.
+    """Return a fingerprint of everything that affects vibration: geometry, masses, springs, dampers and drive gains.
 
-    Names, limits, poses, bodies for collisions, sensors and the payload are left out: a calibration says itself which
-    payload it was measured with.
+    Names, limits, poses, collision bodies, sensors and the payload are left out; a calibration itself contains the
+    payload that it was measured with.
 
     Args:
         description: The robot.

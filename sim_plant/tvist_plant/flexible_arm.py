@@ -1,4 +1,4 @@
-"""The simulated arm: joints and links that give way. No clock, no I/O."""
+"""The simulated arm, with elastic joints and links. It has no clock and no I/O."""
 
 import math
 from collections.abc import Sequence
@@ -19,23 +19,24 @@ from tvist_plant.plant import PERIOD, Measurement, PlantError, PlantTruth
 from tvist_plant.sensors import Accelerometer, Encoders, gear_phases
 
 SUBSTEPS = 4
-"""Substeps in a period. From Q1 to Q3 four agree with eight within 0.02 m/s² of tool acceleration, two within 0.09;
-most of that is the ripple of the gears."""
+"""Substeps per period. From Q1 to Q3, four agree with eight to within 0.02 m/s² of tool acceleration, two to within
+0.09; most of that is the ripple of the gears.
+"""
 
 
 def is_compiled() -> bool:
-    """Whether the arm's equations are compiled already; otherwise the first tick does it, for seconds."""
+    """Return whether the arm's equations are compiled; otherwise the first tick compiles them, for seconds."""
     return is_cached(advance) and is_cached(balance)
 
 
 class FlexibleArm:
-    """A flexible arm and its drives: a `Plant` that can be pushed and broken, and knows its modes.
+    """A flexible arm and its drives: a `Plant` that also supports external pushes, a failure, and its modes.
 
     Args:
         description: The robot.
-        payload: What it carries.
-        imperfections: What the arm has that its description does not say. They are explicit in the integrator: with 8
-            substeps they are followed as well as the rest is with 4.
+        payload: Carried payload.
+        imperfections: Properties of the arm that are not in its description. They are integrated explicitly, so they
+            need 8 substeps for the accuracy that the rest has with 4.
         period: Control period [s].
         substeps: Number of the integrator's steps per period.
     """
@@ -63,11 +64,11 @@ class FlexibleArm:
 
     @property
     def payload(self) -> Payload:
-        """What the arm carries."""
+        """Carried payload."""
         return self._payload
 
     def _load(self, payload: Payload) -> None:
-        """Models of the arm with this payload, and room for its state."""
+        """Create the models of the arm with this payload, and memory for its state."""
         self._payload = payload
         flexible, base = flexible_model(self.description, payload), self._imperfections.base
         self._flexible: FlexibleModel = flexible if base is None else on_base(flexible, base)
@@ -89,11 +90,11 @@ class FlexibleArm:
         self._qdd, self._moment = np.zeros(links), np.zeros(n)
 
     def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
-        """Put the arm at rest in static equilibrium under a command, integrators preloaded, noise restarted.
+        """Put the arm at rest in static equilibrium under a command, with preloaded integrators and restarted noise.
 
         Args:
-            command: Position to hold and torque fed forward; its velocity must be zero.
-            payload: What the arm carries from now on; None leaves it.
+            command: Position to hold and feed-forward torque; its velocity must be zero.
+            payload: New carried payload; None to keep the present one.
             seed: Seed of sensor noise and gear errors.
         """
         if payload is not None:
@@ -108,7 +109,7 @@ class FlexibleArm:
         return self._measure()
 
     def _settle(self, command: DriveCommand) -> None:
-        """Static equilibrium by fixed point: deflections are small, so gravity hardly depends on them."""
+        """Find static equilibrium by fixed-point iteration; gravity hardly depends on the small deflections."""
         joints, flexes = self._flexible.joints, self._flexible.flexes
         q = np.zeros_like(self._q)
         q[joints] = command.q
@@ -144,7 +145,7 @@ class FlexibleArm:
         return gears, -gravity[flexes] / self._flexible.flex_stiffness
 
     def step(self, command: DriveCommand) -> Measurement:
-        """Move the arm by one period, its drives going linearly from the last command to this one.
+        """Move the arm by one period, while its drives go linearly from the previous command to this one.
 
         Raises:
             PlantError: The state is no longer finite.
@@ -159,10 +160,10 @@ class FlexibleArm:
         return self._measure()
 
     def push(self, torque: Floats) -> None:
-        """Let something outside push the joints from now on, until it is changed or the arm is reset.
+        """Apply external torques to the joints, until they are changed or the arm is reset.
 
         Args:
-            torque: On the link side, shape (n,); zeros end it [N m].
+            torque: Torques on the link side, shape (n,); zeros end the push [N m].
 
         Raises:
             ValueError: The torque is not n finite numbers.
@@ -176,15 +177,15 @@ class FlexibleArm:
         moment: Sequence[float] = (0.0, 0.0, 0.0),
         point: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> None:
-        """Let a wrench act on a body from now on, until it is changed or the arm is reset.
+        """Apply an external wrench to a body, until it is changed or the arm is reset.
 
-        It acts beside those on other bodies and beside `push`; another one on the same body takes its place, one of
-        zeros ends it. Its axes are the world's: it does not turn with the body.
+        It acts in addition to those on other bodies and to `push`. A new wrench on the same body replaces it, and one
+        of zeros ends it. It is given in world axes, so it does not rotate with the body.
 
         Args:
             body: One of `bodies`.
-            force: [N].
-            moment: About the point [N m].
+            force: Force [N].
+            moment: Moment about the point [N m].
             point: Point of application in the frame of the body, which is that of its joint or of the flange [m].
 
         Raises:
@@ -194,19 +195,19 @@ class FlexibleArm:
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """Names of what `push_body` can push, from the base on.
+        """Names of the bodies for `push_body`, from the base on.
 
-        A link has the name of the joint that moves it, the outer half of a link that bends that of its virtual joint
-        about z, and the last is "flange".
+        A link has the name of the joint that moves it; the outer half of a bending link has that of its virtual joint
+        about z; the last body is "flange".
         """
         return self._outside.bodies
 
     def make_nan(self) -> None:
-        """Make the state not a number, as a fault: the next step finds it."""
+        """Make the state NaN as a fault, which the next step detects."""
         self._speed[:] = math.nan
 
     def _evaluate(self) -> None:
-        """Mass matrix, bias, link accelerations and motor torques at the present state."""
+        """Compute mass matrix, bias, link accelerations and motor torques at the present state."""
         model, data = self._flexible.model, self._data
         self._M[:] = pin.crba(model, data, self._q)
         self._bias[:] = pin.nonLinearEffects(model, data, self._q, self._qd)
@@ -232,7 +233,7 @@ class FlexibleArm:
         )
 
     def _feel(self) -> Floats:
-        """Specific force in the flange frame, shape (3,) [m/s^2]."""
+        """Return the specific force in the flange frame, shape (3,) [m/s^2]."""
         model, data, flange = self._flexible.model, self._data, self._flexible.flange
         pin.forwardKinematics(model, data, self._q, self._qd, self._qdd)
         placement = pin.updateFramePlacement(model, data, flange)
@@ -240,7 +241,7 @@ class FlexibleArm:
         return np.asarray(acceleration - self._gravity.dot(placement.rotation))
 
     def truth(self) -> PlantTruth:
-        """What no robot can know, at the present state."""
+        """Return what a real robot cannot measure, at the present state."""
         placement = self._data.oMf[self._flexible.flange]
         joints = self._flexible.joints
         static_gears, static_links = self._static_deflections()
@@ -257,7 +258,7 @@ class FlexibleArm:
         )
 
     def modes(self, q: Floats | None = None) -> Modes:
-        """Vibration modes of the closed loop, linearised at rest at joint positions q (default: its own)."""
+        """Return the vibration modes of the closed loop, linearised at rest at joint positions q (default: its own)."""
         links = self._q.copy()
         if q is not None:
             links[:] = 0.0
@@ -265,9 +266,9 @@ class FlexibleArm:
         return modes(self._flexible, self._linear, self.description, links)
 
     def energy(self) -> float:
-        """Kinetic, gravitational and elastic energy without the drives' gains and what imperfections store [J].
+        """Kinetic, gravitational and elastic energy [J], without that in the drives' gains and imperfections.
 
-        It checks the integrator.
+        It is used to check the integrator.
         """
         model, data = self._flexible.model, self._data
         kinetic = pin.computeKineticEnergy(model, data, self._q, self._qd)

@@ -1,16 +1,17 @@
-"""What an arm may have that its description does not say.
+"""Optional properties of an arm that are not in its description.
 
-Friction on a motor turning at v falls with speed (Stribeck; Canudas de Wit and others 1995, without the bristles):
+Friction on a motor turning at v decreases with speed (Stribeck; Canudas de Wit and others 1995, without the
+bristles):
 
     F(v) = [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w)
 
-A gear twisted by δ pushes with
+A gear twisted by δ transmits the torque
 
     K δ                                   as described,
     K₁ δ up to |δ| = δ₁, K beyond it      piecewise (makers of strain wave gears give K₁ < K),
     K δ + z                               with hysteresis, ż = r K δ̇ - |δ̇| z r K/z_max  (Dahl 1968).
 
-A base that yields stands on two springs about the world's x and y axes, and below it a ring of some mass.
+A yielding base stands on two springs about the world's x and y axes, and carries a ring with mass under the arm.
 """
 
 import math
@@ -28,20 +29,20 @@ class YieldingBase:
     """A base on springs.
 
     Raises:
-        ValueError: A number is not positive; `damping_time` may be 0.
+        ValueError: A value is not positive; `damping_time` may be 0.
     """
 
     stiffness: float = 1.5e5
-    """About each of the two axes [N m/rad]."""
+    """Stiffness about each of the two axes [N m/rad]."""
     damping_time: float = 1e-3
-    """Damping over stiffness [s]."""
+    """Damping divided by stiffness [s]."""
     mass: float = 20.0
     """Mass of the ring under the arm [kg]."""
     radius: float = 0.25
     """Radius of the ring, for its inertia [m]."""
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check the values."""
         for name in ("stiffness", "mass", "radius"):
             _check(f"base.{name}", getattr(self, name), 0.0, math.inf, above=True)
         _check("base.damping_time", self.damping_time, 0.0, math.inf)
@@ -49,29 +50,29 @@ class YieldingBase:
 
 @dataclass(frozen=True)
 class Imperfections:
-    """What is added to the arm that its description describes; as they stand here they add nothing.
+    """Additions to the arm of the description; the defaults add nothing.
 
     Raises:
-        ValueError: A number is outside the range that it is said to have.
+        ValueError: A value is outside its documented range.
     """
 
     breakaway: float = 1.0
-    """F_s over F_c, at least 1 [-]."""
+    """F_s divided by F_c, at least 1 [-]."""
     stribeck_speed: float = 0.05
     """v_s, above 0 [rad/s]."""
     hysteresis: float = 0.0
-    """r: stiffness that a gear has more when its twist turns back, at least 0 [-]."""
+    """r: additional relative stiffness of a gear when its twist reverses, at least 0 [-]."""
     hysteresis_torque: float = 0.02
-    """z_max over the joint's torque limit, above 0 [-]."""
+    """z_max divided by the joint's torque limit, above 0 [-]."""
     soft: float = 1.0
-    """K₁ over K, above 0 and at most 1 [-]."""
+    """K₁ divided by K, above 0 and at most 1 [-]."""
     soft_torque: float = 0.1
-    """K₁ δ₁ over the joint's torque limit, at least 0 [-]."""
+    """K₁ δ₁ divided by the joint's torque limit, at least 0 [-]."""
     base: YieldingBase | None = None
-    """None: the base is rigid."""
+    """The yielding base; None for a rigid one."""
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check the values."""
         _check("breakaway", self.breakaway, 1.0, math.inf)
         _check("stribeck_speed", self.stribeck_speed, 0.0, math.inf, above=True)
         _check("hysteresis", self.hysteresis, 0.0, math.inf)
@@ -82,7 +83,7 @@ class Imperfections:
 
 @dataclass(frozen=True)
 class GearLaw:
-    """The imperfections of friction and gears in the units of the equations, one entry a joint where it is an array."""
+    """The imperfections of friction and gears in the units of the equations; arrays have one entry per joint."""
 
     breakaway: float
     """F_s/F_c [-]."""
@@ -101,7 +102,7 @@ class GearLaw:
 
     @classmethod
     def of(cls, imperfections: Imperfections, description: RobotDescription) -> "GearLaw":
-        """Scale them by the arm's gears and torque limits."""
+        """Scale the imperfections by the arm's gears and torque limits."""
         limit = np.array(description.limits.torque)
         K = np.array(description.drives.gear_stiffness)
         return cls(
@@ -129,7 +130,7 @@ class GearLaw:
 
 
 def on_base(arm: FlexibleModel, base: YieldingBase) -> FlexibleModel:
-    """Return the same arm on a base that yields about the world's x and y axes; both count as virtual joints."""
+    """Return the same arm on a base that yields about the world's x and y axes, as two more virtual joints."""
     ground = pin.Model()
     inertia = pin.Inertia(base.mass, np.zeros(3), base.mass * base.radius**2 * np.eye(3) / 2.0)
     light = pin.Inertia(0.05 * base.mass, np.zeros(3), 0.05 * base.mass * base.radius**2 * np.eye(3) / 2.0)
@@ -153,7 +154,7 @@ def on_base(arm: FlexibleModel, base: YieldingBase) -> FlexibleModel:
 
 
 def _check(name: str, value: float, least: float, most: float, *, above: bool = False) -> None:
-    """Check that a number is finite and at least (`above`: above) one limit and at most another."""
+    """Check that a number is finite, at least (with `above`: above) the lower limit, and at most the upper limit."""
     if math.isfinite(value) and (least < value if above else least <= value) and value <= most:
         return
     limit = f"{'above' if above else 'at least'} {least:g}" + (

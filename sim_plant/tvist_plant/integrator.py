@@ -1,13 +1,14 @@
 """One control period of arm and drives: the linearly implicit midpoint rule.
 
-M(q) is held for the period at its half-way value and the bias b(q, q̇) runs on, both extrapolated linearly
-from the last two ticks; springs, dampers and the drives' gains are implicit, so one Cholesky factor of
+M(q) is constant during the period at its value in the middle, and the bias b(q, q̇) changes linearly; both are
+extrapolated from the last two ticks. Springs, dampers and the drives' gains are implicit, so a single Cholesky factor
+of
 
     S = M_b + h/2 D + h²/4 (K + h/2 G_i)
 
-serves all substeps of the period (h one substep, M_b = diag(M(q), B), G_i the integral gains). Each substep
-solves for the mean acceleration and moves y by the mean velocity: second order, and stable for the fast poles
-that light lumps between stiff springs have (about -5e4 1/s), where explicit rules need steps below 0.04 ms.
+is used for all substeps of the period (h one substep, M_b = diag(M(q), B), G_i the integral gains). Each substep
+solves for the mean acceleration, and moves y by the mean velocity. The method is of second order, and stable for the
+fast poles of light lumps between stiff springs (about -5e4 1/s), for which explicit methods need steps below 0.04 ms.
 """
 
 import math
@@ -25,7 +26,7 @@ LAST, NOW = 0, 1
 
 @compiled
 def cholesky(S: Floats) -> None:
-    """Replace the lower triangle of a positive definite matrix by its Cholesky factor; the rest is left."""
+    """Replace the lower triangle of a positive definite matrix by its Cholesky factor; the rest is not changed."""
     for j in range(S.shape[0]):
         pivot = S[j, j]
         for k in range(j):
@@ -56,7 +57,7 @@ def solve(L: Floats, x: Floats) -> None:
 
 
 class ArmState(NamedTuple):
-    """What moves, N links and n motors."""
+    """State of the arm with N links and n motors."""
 
     y: Floats
     """Angles, N of the links then n of the motors, shape (N+n,) [rad]."""
@@ -72,13 +73,13 @@ class ArmState(NamedTuple):
 
 @compiled
 def parts(state: Floats, n: int) -> ArmState:
-    """Give the rows of a state, shape (5, N+n), their names; they stay views of it."""
+    """Return the rows of a state, shape (5, N+n), by name, as views."""
     return ArmState(state[0], state[1], state[2], state[3, :n], state[4, :n])
 
 
 @compiled
 def shift(ticks: Floats) -> None:
-    """Copy what is NOW to LAST, in loops: numba takes seconds to compile an assignment of arrays."""
+    """Copy NOW to LAST in loops, since numba takes seconds to compile an assignment of arrays."""
     for i in range(ticks.shape[1]):
         for j in range(ticks.shape[2]):
             ticks[LAST, i, j] = ticks[NOW, i, j]
@@ -104,7 +105,7 @@ def relaxed(z: float, twist: float, stiffness: float, most: float) -> float:
 
 @compiled
 def softened(joint: JointParameters, twist: float) -> float:
-    """What the gear of a joint pushes with beyond K δ where it is softer near zero [N m]."""
+    """Difference of a gear's torque from K δ, because it is softer near zero [N m]."""
     return float(-joint.softness * min(max(twist, -joint.soft_angle), joint.soft_angle))
 
 
@@ -118,7 +119,7 @@ def dragged(joint: JointParameters, z: float, twist: float) -> float:
 
 @compiled
 def factor(S: Floats, dynamics: Floats, springs: Floats, parameters: Floats, h: float) -> None:
-    """Cholesky factor of the matrix that serves all substeps of a period, h [s] each, into S."""
+    """Compute in S the Cholesky factor for all substeps of a period, of h [s] each."""
     stiffness, damping = springs[0], springs[1]
     size, n, links = S.shape[0], parameters.shape[1], dynamics.shape[2]
     M, last_M = dynamics[NOW], dynamics[LAST]
@@ -145,17 +146,17 @@ def advance(  # noqa: C901 - one kernel: its branches are the loops over rows an
     period: float,
     substeps: int,
 ) -> None:
-    """Move the state by one period, in place; what was the present tick's is the last one's then.
+    """Advance the state in place by one period; afterwards the LAST entries contain those of the present tick.
 
     Args:
         state: Rows of `ArmState`, shape (5, N+n).
         commands: Rows q_r, q̇_r, τ_ff of the last command and of this one, shape (2, 3, n); LAST becomes this one.
-        dynamics: Mass matrix, upper triangle [kg m^2], and below it a row of the bias [N m]: Coriolis, centrifugal and
-            gravity torques less what pushes from outside; one period earlier and at the start, shape (2, N+1, N);
-            LAST becomes that of the start.
+        dynamics: Mass matrix, upper triangle [kg m^2], and below it a row with the bias [N m]: Coriolis, centrifugal
+            and gravity torques minus external ones; one period earlier and at the start, shape (2, N+1, N); LAST
+            becomes that of the start.
         springs: Stiffness and damping of `LinearPart`, shape (2, N+n, N+n).
         parameters: Rows of `JointParameters`, shape (16, n).
-        joints: Numbers of the n joints among the N link angles.
+        joints: Indices of the n joints among the N link angles.
         period: Control period [s].
         substeps: Number of substeps.
     """
@@ -180,7 +181,7 @@ def advance(  # noqa: C901 - one kernel: its branches are the loops over rows an
             if joint.breakaway != 1.0:
                 fall = np.exp(-((speed / joint.stribeck_speed) ** 2))
                 rise = 1.0 + (joint.breakaway - 1.0) * fall
-            # Friction's slope at rest is implicit in `damping`; what saturates beyond it is put back here.
+            # Friction's slope at rest is implicit in `damping`; the part that saturates is corrected here.
             steep = speed / joint.friction_width
             slack = joint.friction * (steep - rise * np.tanh(steep))
             swing = np.sin(joint.gear_waves * angle + joint.gear_phase)
@@ -228,7 +229,7 @@ def balance(
 ) -> None:
     """Link accelerations `qdd`, shape (N,) [rad/s^2], and motor torques `moment`, shape (n,) [N m], at a state.
 
-    The other arguments are those of `advance`; of commands and dynamics the present ones count.
+    The other arguments are as in `advance`; only the present commands and dynamics are used.
     """
     n, size, links = parameters.shape[1], state.shape[1], dynamics.shape[2]
     y, v, _, s, z = parts(state, n)

@@ -1,8 +1,8 @@
-"""What the kernel knows of each joint's drive and gear: one array, whose columns get names in the kernel.
+"""Parameters of each joint's drive and gear for the kernel: one array, whose columns get names in the kernel.
 
-A kernel takes few arguments, since numba looks at the type of each at every call: 20 arrays cost twice as much as 8,
-and a NamedTuple more than its arrays one by one. So the parameters travel in one array, and get their names back in
-the kernel, where a NamedTuple of numbers costs nothing.
+A kernel should have few arguments, since numba checks the type of each at every call: 20 arrays take twice as long as
+8, and a NamedTuple takes longer than its arrays separately. So the parameters are passed in one array, and get their
+names back in the kernel, where a NamedTuple of numbers costs nothing.
 """
 
 from typing import NamedTuple
@@ -27,7 +27,7 @@ class JointParameters(NamedTuple):
     integral_gain: float
     """K_d K_p K_i [N m/(rad s)]."""
     friction: float
-    """F_c; zero where friction is taken as linear [N m]."""
+    """F_c; zero if friction is modelled as linear [N m]."""
     friction_width: float
     """w [rad/s]."""
     breakaway: float
@@ -54,7 +54,7 @@ class JointParameters(NamedTuple):
 
 @compiled
 def of_joint(parameters: Floats, j: int) -> JointParameters:
-    """Parameters of joint j, from the array that `packed` made."""
+    """Return the parameters of joint j from the array that `packed` created."""
     return JointParameters(
         parameters[0, j], parameters[1, j], parameters[2, j], parameters[3, j],
         parameters[4, j], parameters[5, j], parameters[6, j], parameters[7, j],
@@ -64,12 +64,12 @@ def of_joint(parameters: Floats, j: int) -> JointParameters:
 
 
 def packed(linear: LinearPart, nonlinear: Nonlinear, law: GearLaw, gear_phase: Floats) -> Floats:
-    """One array of all parameters, a row each in the order of `JointParameters`, shape (16, n).
+    """Return one array of all parameters, one row each in the order of `JointParameters`, shape (16, n).
 
     Args:
         linear: Gains and rotors.
         nonlinear: Friction and gear errors.
-        law: What friction and gears have that the description does not say.
+        law: Imperfections of friction and gears.
         gear_phase: Phase of each gear's error, shape (n,) [rad].
     """
     rows = {

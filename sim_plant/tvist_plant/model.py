@@ -1,13 +1,13 @@
-"""Robot description and payload to multibody models (pinocchio).
+"""Conversion of a robot description and payload to multibody models (pinocchio).
 
-Two models of the same arm:
+There are two models of the same arm:
 
-- the *rigid* one is what a controller knows: n joints, the declared payload;
-- the *flexible* one is what the arm is: the same joints and, in the middle of each link that bends, two
-  virtual revolute joints (about y and z). The mass of such a link sits in two equal lumps at com ± √(Iyy/m)
-  along the link, each with inertia Ixx/2 about every axis. Mass, centre of mass and Ixx stay what they were;
-  Iyy grows by Ixx (UR5e's upper arm: by 0.015 to 0.349 kg m²), Izz becomes the same, products vanish. Lumps
-  without inertia of their own would put the fastest pole at -1.6e6 1/s, beyond any integrator at 500 Hz.
+- The *rigid* model is known to a controller: n joints, and the declared payload.
+- The *flexible* model is the simulated arm: the same joints and, in the middle of each link that bends, two virtual
+  revolute joints (about y and z). The mass of such a link is in two equal lumps at com ± √(Iyy/m) along the link,
+  each with inertia Ixx/2 about every axis. Mass, centre of mass and Ixx are preserved; Iyy grows by Ixx (UR5e's upper
+  arm: by 0.015, to 0.349 kg m²), Izz becomes equal to it, and products vanish. Lumps without inertia of their own
+  would put the fastest pole at -1.6e6 1/s, beyond any integrator at 500 Hz.
 """
 
 from dataclasses import dataclass
@@ -26,24 +26,24 @@ Integers = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class FlexibleModel:
-    """The arm as it is."""
+    """The flexible model of an arm."""
 
     model: pin.Model
-    """N = n + 2 x (links that bend) degrees of freedom, in the order of the chain."""
+    """Model with N = n + 2 x (links that bend) degrees of freedom, in the order of the chain."""
     joints: Integers
     """Indices of the n joints."""
     flexes: Integers
     """Indices of the virtual joints of bending links."""
     flex_stiffness: Floats
-    """One a virtual joint [N m/rad]."""
+    """Stiffness of each virtual joint [N m/rad]."""
     flex_damping: Floats
-    """One a virtual joint [N m s/rad]."""
+    """Damping of each virtual joint [N m s/rad]."""
     flange: int
-    """Frame number of the flange."""
+    """Frame index of the flange."""
 
 
 def rigid_model(description: RobotDescription, payload: Payload) -> pin.Model:
-    """Model of the arm with stiff joints and links, n degrees of freedom and a frame named "flange"."""
+    """Create the model of the arm with rigid joints and links, n degrees of freedom and a frame named "flange"."""
     model = pin.Model()
     parent, placement = 0, pin.SE3.Identity()
     for number, name in enumerate(description.robot.joints):
@@ -55,7 +55,7 @@ def rigid_model(description: RobotDescription, payload: Payload) -> pin.Model:
 
 
 def flexible_model(description: RobotDescription, payload: Payload) -> FlexibleModel:
-    """Model of the arm with links that bend."""
+    """Create the model of the arm with links that bend."""
     flexibility = description.link_flexibility
     stiffness_of = dict(zip(flexibility.links, flexibility.stiffness, strict=True))
     model = pin.Model()
@@ -96,7 +96,7 @@ def _shift(x: float, z: float) -> pin.SE3:
 
 
 def link_frame(description: RobotDescription, number: int) -> pin.SE3:
-    """Denavit-Hartenberg frame of a link in the frame of its joint: Tz(d) Tx(a) Rx(alpha)."""
+    """Return the Denavit-Hartenberg frame of a link in the frame of its joint: Tz(d) Tx(a) Rx(alpha)."""
     kinematics = description.kinematics
     alpha = kinematics.alpha[number]
     rotation = np.array([[1, 0, 0], [0, np.cos(alpha), -np.sin(alpha)], [0, np.sin(alpha), np.cos(alpha)]])
@@ -114,7 +114,7 @@ def _link_inertia(description: RobotDescription, number: int) -> pin.Inertia:
 
 
 def _lumps(description: RobotDescription, number: int) -> tuple[pin.Inertia, pin.Inertia]:
-    """The two halves of a bending link: nearer to its joint, nearer to the next one."""
+    """Return the two halves of a bending link, the one nearer to its joint first."""
     links = description.links
     mass, com, (xx, _, _, yy, _, _) = links.mass[number], np.array(links.com[number]), links.inertia[number]
     offset = np.array([np.sqrt(yy / mass), 0.0, 0.0])
@@ -130,5 +130,5 @@ def _add_flange(model: pin.Model, parent: int, placement: pin.SE3, payload: Payl
 
 
 def payload_inertia(payload: Payload) -> pin.Inertia:
-    """Mass, centre of mass and inertia of a payload in the frame of the flange."""
+    """Return mass, centre of mass and inertia of a payload in the frame of the flange."""
     return pin.Inertia(payload.mass, np.array(payload.com), _matrix(payload.inertia))

@@ -1,6 +1,6 @@
 """Vibration modes of arm and drives together, linearised: damped frequency, damping ratio and participation.
 
-This is the truth that an estimator is judged by; no robot can know it.
+This is the truth for judging estimators; a real robot cannot measure it.
 """
 
 from dataclasses import dataclass
@@ -15,15 +15,16 @@ from tvist_plant.model import FlexibleModel, Floats
 
 @dataclass(frozen=True)
 class Modes:
-    """Oscillatory modes in the order of their frequency, one entry each."""
+    """Oscillatory modes in the order of their frequency; arrays have one entry per mode."""
 
     f_d: Floats
     """Damped frequencies [Hz]."""
     zeta: Floats
     """Damping ratios [-]."""
     participation: Floats
-    """Amplitude of flange acceleration when a joint's reference acceleration changes by 1 rad/s² at once,
-    root of the sum of squares over joints and axes [m/s^2 per rad/s^2]."""
+    """Amplitude of the flange acceleration after a step of 1 rad/s² in a joint's reference acceleration, as the root
+    of the sum of squares over joints and axes [m/s^2 per rad/s^2].
+    """
 
 
 def modes(flexible: FlexibleModel, linear: LinearPart, description: RobotDescription, q: Floats) -> Modes:

@@ -1,8 +1,8 @@
-"""What pushes an arm from outside: torques on its joints, and wrenches on any of its bodies.
+"""External forces on an arm: torques on its joints, and wrenches on any of its bodies.
 
-A wrench w = (f, m) on a body enters the equations of motion as the generalized force Jᵀ w, J being the Jacobian of the
-point that it acts on: its power is w · J q̇ whatever the arm does, so the sum over all wrenches may be added to the
-torques on the joints, and is subtracted from the bias b(q, q̇).
+A wrench w = (f, m) on a body enters the equations of motion as the generalized force Jᵀ w, where J is the Jacobian of
+its point of application. Its power is w · J q̇ for any motion of the arm. So the sum over all wrenches is added to
+the torques on the joints, and subtracted from the bias b(q, q̇).
 """
 
 from collections.abc import Sequence
@@ -17,13 +17,13 @@ from tvist_plant.model import FLANGE, FlexibleModel, Floats
 @dataclass(frozen=True)
 class _Wrench:
     joint: int
-    """Number of the model's joint that the body hangs on."""
+    """Index of the model's joint that the body is attached to."""
     point: Floats
     """Point of application in that joint's frame, shape (3,) [m]."""
     force: Floats
-    """World axes, shape (3,) [N]."""
+    """Force in world axes, shape (3,) [N]."""
     moment: Floats
-    """About the point, world axes, shape (3,) [N m]."""
+    """Moment about the point, world axes, shape (3,) [N m]."""
 
 
 class Outside:
@@ -47,15 +47,15 @@ class Outside:
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """Names of the bodies: of the joint or virtual joint that moves each, and "flange"."""
+        """Names of the bodies: each has that of the joint or virtual joint that moves it, or "flange"."""
         return tuple(self._bodies)
 
     def clear(self) -> None:
-        """Let go of everything."""
+        """End all torques and wrenches."""
         self._torque, self._wrenches = None, {}
 
     def push(self, torque: Floats) -> None:
-        """Push the joints on the link side; see `FlexibleArm.push`."""
+        """Set the torques on the link side of the joints; see `FlexibleArm.push`."""
         given, shape = np.array(torque, dtype=float), self._flexible.joints.shape
         if given.shape != shape or not np.isfinite(given).all():
             raise ValueError(f"torque is {given.tolist()}: must be {shape[0]} finite numbers, one per joint")
@@ -64,7 +64,7 @@ class Outside:
     def push_body(
         self, body: str, force: Sequence[float], moment: Sequence[float], point: Sequence[float]
     ) -> None:
-        """Push a body; see `FlexibleArm.push_body`."""
+        """Set the wrench on a body; see `FlexibleArm.push_body`."""
         if body not in self._bodies:
             raise ValueError(f"body is {body!r}: must be one of {', '.join(self._bodies)}")
         vectors = {
@@ -81,7 +81,7 @@ class Outside:
             self._wrenches[body] = _Wrench(joint, at, vectors["force"], vectors["moment"])
 
     def generalized_force(self, q: Floats) -> Floats | None:
-        """The sum of what acts, as torques on all N links; None where nothing acts.
+        """Return the sum of all torques and wrenches, as torques on all N links; None if there are none.
 
         Args:
             q: Angles of the links, shape (N,) [rad].

@@ -1,7 +1,7 @@
-"""What a controller moves: drive commands in, measurements out, one control period at a time.
+"""Interface between a controller and a plant: drive commands in, measurements out, one control period at a time.
 
-`Plant` is all that a controller asks for. What only some plants can do has an interface of its own, which a plant
-offers by having the method: `Pushable`, `Breakable`, `ModalPlant`.
+A controller requires only `Plant`. Abilities that only some plants have are interfaces of their own, which a plant
+implements by having the method: `Pushable`, `Breakable`, `ModalPlant`.
 """
 
 from dataclasses import dataclass
@@ -17,14 +17,14 @@ PERIOD = 0.002
 
 
 class PlantError(ArithmeticError):
-    """The plant's state is no longer finite: it was driven beyond what its physics is good for."""
+    """The plant's state is no longer finite, because it was driven beyond the validity of its model."""
 
 
 @dataclass(slots=True, eq=False)
 class Measurement:
-    """What a robot can measure of itself.
+    """Measurements of a robot's own sensors.
 
-    Not frozen: one is made every tick, and that would cost five times as much.
+    The class is not frozen, since one is created at every tick, and that would take five times as long.
     """
 
     q: Floats
@@ -39,7 +39,7 @@ class Measurement:
 
 @dataclass(frozen=True)
 class PlantTruth:
-    """What no robot can know of itself, and a simulation can."""
+    """Quantities that a real robot cannot measure, but a simulation knows."""
 
     motor_q: Floats
     """Motor angles on the joint side θ, shape (n,) [rad]."""
@@ -48,7 +48,7 @@ class PlantTruth:
     gear_deflection: Floats
     """q - θ, shape (n,) [rad]."""
     link_deflection: Floats
-    """Angles of the virtual joints by which links bend, one each; empty where links are rigid [rad]."""
+    """Angles of the virtual joints by which links bend; empty if links are rigid [rad]."""
     flange_position: Floats
     """Position of the flange, including deflections, shape (3,) [m]."""
     flange_rotation: Floats
@@ -64,62 +64,62 @@ class PlantTruth:
 class Plant(Protocol):
     """An arm with its drives, simulated or real.
 
-    A controller owns its plant: nobody else steps or resets it, and no two controllers share one. The controller
-    resets it when it starts, lets it take a few steps at rest, and resets it again; from then on it calls `step` once
-    every control period of `PERIOD` seconds.
+    A controller owns its plant: no other code steps or resets it, and controllers do not share plants. The controller
+    resets the plant when it starts, takes a few steps at rest, and resets it again; from then on it calls `step` once
+    in every control period of `PERIOD` seconds.
 
-    An implementer promises:
+    An implementation guarantees:
 
-    - n joints, as many as the robot's description has, in its order and with its signs and zeros;
+    - n joints, as many as in the robot's description, in its order and with its signs and zeros;
     - that equal resets and equal commands give equal measurements to the last bit, if runs are to be replayed;
-    - that what is returned is not changed later: arrays are the receiver's own;
-    - not to keep or change the command's arrays;
-    - to return within the control period, where the clock is real time.
+    - that returned arrays are not changed later, since they belong to the receiver;
+    - that the command's arrays are neither kept nor changed;
+    - that each call returns within the control period, if the clock is real time.
     """
 
     @property
     def payload(self) -> Payload:
-        """What the arm carries, as far as is known; where the brakes close, it decides how far the arm goes."""
+        """Carried payload, as far as it is known; it determines how far the arm moves when the brakes close."""
 
     def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
-        """Put the arm at rest under a command that does not move, as if it had stood there for long.
+        """Put the arm at rest under a command without motion, as if it had stood there for a long time.
 
         Args:
-            command: Position to hold, shape (n,) [rad], torque fed forward [N m], and a velocity of zero.
-            payload: What the arm carries from now on; None leaves it.
-            seed: Seed of everything random, such as sensor noise.
+            command: Position to hold, shape (n,) [rad], feed-forward torque [N m], and a velocity of zero.
+            payload: New carried payload; None to keep the present one.
+            seed: Seed of all random effects, such as sensor noise.
 
         Raises:
-            ValueError: The arm cannot be there, or cannot carry that, and no controller starts with it. A plant whose
-                controller has started does what it is told.
+            ValueError: The arm cannot be there, or cannot carry the payload, so that no controller can start with it.
+                Once its controller has started, a plant must not raise this.
         """
 
     def step(self, command: DriveCommand) -> Measurement:
         """Move the arm by one control period.
 
         Args:
-            command: Set-points for the end of the period; the drives go linearly from the last ones to these.
+            command: Set-points for the end of the period; the drives go linearly from the previous ones to these.
 
         Returns:
-            What is measured at the end of the period.
+            Measurements at the end of the period.
 
         Raises:
             PlantError: The state is no longer finite. The controller makes a protective stop and resets the plant.
         """
 
     def truth(self) -> PlantTruth | None:
-        """What no robot can know, after the last step or reset; None where nobody knows it, as on a real robot."""
+        """Return what a real robot cannot measure, after the last step or reset; None if that is unknown."""
 
 
 @runtime_checkable
 class Pushable(Protocol):
-    """A plant whose joints something outside can push: fault `torque`."""
+    """A plant that supports external torques on its joints, for the fault `torque`."""
 
     def push(self, torque: Floats) -> None:
-        """Push the joints from now on, until this is changed or the arm is reset.
+        """Apply external torques to the joints, until they are changed or the arm is reset.
 
         Args:
-            torque: On the link side, shape (n,); zeros let go [N m].
+            torque: Torques on the link side, shape (n,); zeros end the push [N m].
         """
 
 
@@ -128,7 +128,7 @@ class Breakable(Protocol):
     """A plant whose equations can be made to fail: fault `nan`."""
 
     def make_nan(self) -> None:
-        """Make the state not a number: the next step raises `PlantError`."""
+        """Make the state NaN, so that the next step raises `PlantError`."""
 
 
 @runtime_checkable
@@ -136,23 +136,23 @@ class ModalPlant(Protocol):
     """A plant that knows its vibration modes."""
 
     def modes(self, q: Floats | None = None) -> Modes:
-        """Vibration modes of the closed loop at rest.
+        """Return the vibration modes of the closed loop at rest.
 
         Args:
-            q: Joint positions, shape (n,) [rad]; None: where the arm is.
+            q: Joint positions, shape (n,) [rad]; None for the present ones.
         """
 
 
 def check_measurement(measured: Measurement, joints: int, plant: Plant) -> None:
-    """Check the first measurement of a plant that somebody else may have written.
+    """Check the first measurement of a plant, which may be a user's own.
 
     Args:
-        measured: What it returned.
-        joints: Number of joints that the robot's description has.
-        plant: Named in the error.
+        measured: Measurement that it returned.
+        joints: Number of joints in the robot's description.
+        plant: The plant, named in the error.
 
     Raises:
-        ValueError: An array is missing or has another shape, as if for another number of joints.
+        ValueError: An array is missing or has the wrong shape, for example for another number of joints.
     """
     for name, shape in (("q", (joints,)), ("qd", (joints,)), ("moment", (joints,)), ("accelerometer", (3,))):
         found = getattr(getattr(measured, name, None), "shape", None)

@@ -1,4 +1,4 @@
-"""Limits in radians, told from limits in degrees: an arm that believed the latter would have none."""
+"""Detection of limits given in degrees instead of radians, which would be no limits at all."""
 
 import math
 from collections.abc import Sequence
@@ -7,21 +7,21 @@ from typing import Final
 from tvist_plant.user_file import UserFileError
 
 MAX_POSITION: Final = 20.0 * math.pi
-"""Largest limit of a position that is taken for radians: ten turns either way [rad]."""
+"""Largest position limit that is accepted as radians: ten turns in either direction [rad]."""
 MAX_VELOCITY: Final = 16.0 * math.pi
-"""Largest limit of a velocity that is taken for radians: eight turns a second [rad/s]."""
+"""Largest velocity limit that is accepted as radians: eight turns per second [rad/s]."""
 
 
 def check_limits(position: Sequence[float], velocity: Sequence[float], source: str) -> None:
-    """Refuse limits that only degrees make sense of.
+    """Refuse limits that only make sense in degrees.
 
     Args:
-        position: One a joint, either way from zero [rad].
-        velocity: One a joint [rad/s].
+        position: Position limits in either direction, one per joint [rad].
+        velocity: Velocity limits, one per joint [rad/s].
         source: File that contains them, for the message.
 
     Raises:
-        UserFileError: One exceeds `MAX_POSITION` or `MAX_VELOCITY`; the message gives it in both units.
+        UserFileError: A limit exceeds `MAX_POSITION` or `MAX_VELOCITY`; the message gives it in both units.
     """
     for key, values, most, per in (
         ("position", position, MAX_POSITION, ""),

@@ -1,7 +1,7 @@
-"""Files that a user names, read so that none of them holds the program up or brings it down.
+"""Safe reading of files that a user names, none of which may block or crash the program.
 
-A path on the command line may be anything: a device without end, a pipe nobody writes to, a file of another kind
-with gigabytes in it, or one that was made to be nested too deeply for a parser.
+A path on the command line may be anything: an endless device, a pipe without a writer, gigabytes of another kind of
+file, or a file deliberately nested too deeply for a parser.
 """
 
 import os
@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 LARGEST: Final = 4 << 20
-"""Bytes of a file at most: a hundred times the largest that there is a use for."""
+"""Largest size of a file [bytes]: a hundred times the largest useful one."""
 DEEPEST: Final = 100
-"""Levels of brackets, or parts of a dotted key, that a TOML file may have: it needs five. The parser takes time that
-grows with the square of the parts."""
+"""Largest number of levels of brackets, or of parts of a dotted key, in a TOML file, which needs five. The parser's
+time grows with the square of the parts.
+"""
 
 Content = TypeVar("Content")
 
@@ -34,10 +35,10 @@ def read_bytes(path: str | os.PathLike[str], what: str) -> bytes:
 
     Raises:
         UserFileError: The file is not a regular file, or larger than `LARGEST`.
-        OSError: There is none, or it cannot be read.
+        OSError: The file does not exist or cannot be read.
     """
-    # Looked at before it is opened, since opening alone may do something to a device, and afterwards again, since
-    # it may be another one by now. Without waiting, for that one may be a pipe.
+    # Check before opening, since opening a device may already have an effect, and again afterwards, since the path
+    # may refer to another file by then. Open without blocking, since that may be a pipe.
     _check_kind(path, what, Path(path).stat())
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with open(descriptor, "rb") as stream:  # noqa: PTH123  a descriptor, not a path
@@ -94,12 +95,12 @@ def toml(text: str) -> dict[str, Any]:
 
 
 def parsed(path: str | os.PathLike[str], what: str, parse: Callable[[], Content]) -> Content:
-    """What a parser that minds its own depth makes of a file.
+    """Parse a file with a parser that checks the depth itself.
 
     Args:
         path: Path of the file.
         what: Kind of file, for the message.
-        parse: Parses it.
+        parse: Function that parses it.
 
     Raises:
         UserFileError: The content is nested more deeply than the parser supports.
@@ -111,7 +112,7 @@ def parsed(path: str | os.PathLike[str], what: str, parse: Callable[[], Content]
 
 
 def _is_deeper(text: str, most: int) -> bool:
-    """Whether a TOML text has more levels of brackets, or more dots in one key."""
+    """Return whether a TOML text has more levels of brackets, or more dots in one key."""
     depth = dots = 0
     for token in _TOKENS.finditer(text):
         match token[0]:
@@ -129,7 +130,7 @@ def _is_deeper(text: str, most: int) -> bool:
 
 
 _TOKENS: Final = re.compile(
-    r'"""(?:\\.|[^"\\]|"(?!""))*+(?:""")?'  # strings, which a file that is wrong may not end
+    r'"""(?:\\.|[^"\\]|"(?!""))*+(?:""")?'  # strings, which an invalid file may not terminate
     r"|'''(?:[^']|'(?!''))*+(?:''')?"
     r'|"(?:\\.|[^"\\\n])*+"?'
     r"|'[^'\n]*+'?"
@@ -137,7 +138,7 @@ _TOKENS: Final = re.compile(
     r"|[\[\]{}.,=\n]",
     re.DOTALL,
 )
-"""What depth depends on, and what hides it. Each character is looked at once, whatever the text."""
+"""Tokens that affect the depth, and those that hide them. Each character is examined once, whatever the text."""
 
 
 def _check_kind(path: str | os.PathLike[str], what: str, status: os.stat_result) -> None:

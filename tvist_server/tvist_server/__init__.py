@@ -1,1 +1,1 @@
-"""What is around a controller: clock, gateways, recordings and processes."""
+"""Everything around a controller: clock, gateways, recordings and processes."""

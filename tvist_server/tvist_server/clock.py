@@ -1,6 +1,6 @@
 """Clocks of served robots: the wall clock, or a client's steps.
 
-Either way one thread owns a controller; jobs from elsewhere reach it through a queue.
+In both cases one thread owns a controller, and other threads reach the controller through a queue of jobs.
 """
 
 import contextlib
@@ -20,11 +20,12 @@ from tvist_server.schedule import Schedule
 log = logging.getLogger(__name__)
 
 LONGEST_SLEEP = 0.1
-"""How long the tick thread sleeps at most without a look at whether it should end [s]."""
+"""Longest sleep of the tick thread before it checks whether it should end [s]."""
 HAND_ON_EVERY = 0.0009
-"""Time that passes at least between two calls of whoever hands on what robots say [s]. One call costs two changes
-of threads, as much as a tick: of a single robot each tick is handed on at once, of several those of a
-millisecond together."""
+"""Shortest time between two calls of the function that hands on the robots' messages [s]. A call costs two thread
+switches, about as much as a tick. A single robot hands on every tick at once; several robots hand on together what
+they produced within a millisecond.
+"""
 SET_TIMER_SLACK = 29
 """Option of prctl for the timer slack: the largest delay with which a thread may be woken, in nanoseconds."""
 PRIORITY = 50
@@ -32,7 +33,7 @@ PRIORITY = 50
 
 
 class Mailbox:
-    """A robot as a clock drives it: its host, and what waits to be done between two of its ticks.
+    """A robot as seen by a clock: its host, and the jobs to do between two of its ticks.
 
     Args:
         host: The controller.
@@ -42,20 +43,20 @@ class Mailbox:
         self.host = host
         self.jobs = Jobs()
         self.ending = False
-        """Whether a step that is under way has to end."""
+        """Whether a step in progress has to end."""
         self.lateness = Lateness()
 
     def post(self, do: Do, client: str | None = None) -> None:
-        """Have something done in the controller's thread before its next tick. From any thread; never waits.
+        """Queue a job for the controller's thread, before its next tick. Callable from any thread; does not block.
 
         Args:
-            do: What is to be done.
+            do: Job to do.
             client: Client that sent it, if known.
         """
         self.jobs.post(do, client)
 
     def attend(self, stepper: str | None) -> bool:
-        """Before a tick of a client's step, do what others wait for; whether the step may go on."""
+        """Between the ticks of a client's step, do the jobs of others; return whether the step may continue."""
         self.jobs.do_others(stepper)
         return not self.ending
 
@@ -73,11 +74,11 @@ class Clock(ABC):
         self._thread = threading.Thread(target=self._guarded, name="tvist-tick", daemon=True)
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
         self._thread.start()
 
     def close(self) -> None:
-        """End, after the job that is being done, a step before its next tick; in real time after all that wait."""
+        """End the thread: a step ends before its next tick; in real time, all waiting jobs are done first."""
         self._running = False
         for robot in self._robots:
             robot.ending = True
@@ -87,14 +88,12 @@ class Clock(ABC):
 
     @abstractmethod
     def punctuality(self, robot: Mailbox) -> Punctuality | None:
-        """Lateness of a robot's ticks since the last look; None where time does not pass by itself."""
+        """Lateness of a robot's ticks since the last call; None if time does not pass by itself."""
 
     def _guarded(self) -> None:
         try:
             self._run()
-        except (
-            BaseException
-        ):  # whatever somebody's shaper raises: a thread that ends without a word would be worse
+        except BaseException:  # such as an exception of a user's shaper: the thread must not end silently
             log.exception("the controller's thread ended")
             for robot in self._robots:
                 robot.host.failure = "the controller's thread ended by an error: see the log"
@@ -104,13 +103,13 @@ class Clock(ABC):
 
 
 class Lockstep(Clock):
-    """Time passes when a client steps; the last state is told again once a second for those who come late.
+    """Time passes when a client steps; after a second without a step, the last state is published again.
 
-    A thread for each robot: a step of one may take long, and clients of another do not wait for it.
+    Each robot has a thread of its own, since a step can take long and must not delay the clients of other robots.
 
     Args:
         robot: The robot.
-        repeat: Tells its last state again.
+        repeat: Publishes the robot's last state again.
     """
 
     def __init__(self, robot: Mailbox, repeat: Do) -> None:
@@ -119,7 +118,7 @@ class Lockstep(Clock):
         self._repeat = repeat
 
     def punctuality(self, robot: Mailbox) -> None:
-        """There is none: a client lets time pass."""
+        """Return None, since a client advances time."""
 
     def _run(self) -> None:
         while self._running:
@@ -132,7 +131,7 @@ class Realtime(Clock):
 
     Args:
         robots: Robots to tick.
-        hand_on: Called after ticks, to hand on what the robots said.
+        hand_on: Called after ticks to hand on the robots' messages.
         period: Tick [s].
         speed: Simulation speed relative to real time [-].
         priority: Whether to ask the system for real-time priority.
@@ -153,7 +152,7 @@ class Realtime(Clock):
         self._priority = priority
 
     def punctuality(self, robot: Mailbox) -> Punctuality:
-        """Lateness since the last look."""
+        """Lateness since the last call."""
         return robot.lateness.look()
 
     def _run(self) -> None:
@@ -186,13 +185,13 @@ class Realtime(Clock):
 
 
 def _wake_sharply() -> None:
-    """Have the calling thread woken when it asks to be; by default the system may take 50 µs longer."""
-    with contextlib.suppress(OSError, AttributeError):  # a system without: ticks are that much later
+    """Ask for exact wake-ups of the calling thread; by default the system may delay them by 50 µs."""
+    with contextlib.suppress(OSError, AttributeError):  # elsewhere ticks are that much later
         ctypes.CDLL(None).prctl(SET_TIMER_SLACK, 1, 0, 0, 0)
 
 
 def _ask_for_priority() -> None:
-    """Put the calling thread before all that have no real-time priority; where that may not be, say so and go on."""
+    """Give the calling thread real-time priority; if that is not permitted, log it and continue."""
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     except OSError as error:

@@ -1,18 +1,18 @@
-"""The thread that hands on what waits in publishers."""
+"""Thread that hands on the messages waiting in publishers."""
 
 import threading
 from collections.abc import Callable, Sequence
 from queue import SimpleQueue
 
 CLOSE_WAIT = 0.2
-"""How long the last messages may take at close [s]; a client that has stopped reading holds them up for 5 s."""
+"""Longest time to deliver the last messages at close [s]; a client that has stopped reading blocks them for 5 s."""
 
 
 class Courier:
-    """Has robots hand on what waits whenever it is woken.
+    """Makes robots hand on their waiting messages whenever it is woken.
 
     Args:
-        hand_on: Hands on what waits of one robot; one for each.
+        hand_on: Functions that hand on the waiting messages, one for each robot.
     """
 
     def __init__(self, hand_on: Sequence[Callable[[], None]]) -> None:
@@ -22,16 +22,16 @@ class Courier:
         self._thread = threading.Thread(target=self._run, name="tvist-publisher", daemon=True)
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
         self._thread.start()
 
     def wake(self) -> None:
-        """Hand on what waits. From any thread; never waits."""
-        if self._calls.empty():  # otherwise it is being woken
+        """Have the waiting messages handed on. May be called from any thread; does not block."""
+        if self._calls.empty():  # otherwise a wake-up is pending
             self._calls.put(None)
 
     def close(self) -> None:
-        """Hand on what is waiting, as far as that is quick, and end."""
+        """Hand on the messages still waiting, unless that takes longer than `CLOSE_WAIT`, and end the thread."""
         self._running = False
         self._calls.put(None)
         if self._thread.is_alive():
@@ -39,7 +39,7 @@ class Courier:
 
     @property
     def ended(self) -> bool:
-        """Whether nothing is handed on any more."""
+        """Whether the thread has ended."""
         return not self._thread.is_alive()
 
     def _run(self) -> None:

@@ -1,4 +1,4 @@
-"""What waits to be done by the thread that owns a controller."""
+"""Jobs that wait for the thread that owns a controller."""
 
 from collections import deque
 from collections.abc import Callable
@@ -16,34 +16,35 @@ class _Job(NamedTuple):
 class Jobs:
     """Jobs in the order in which they came.
 
-    One of them may be a client's step, which takes long. What other clients send meanwhile is done within it, between
-    two ticks; what the stepping client sends waits until its step has ended, so that its own commands keep their order.
+    One of them may be a client's step, which takes long. Jobs that other clients send meanwhile are done between two
+    ticks of the step. Jobs of the stepping client itself wait until its step has ended, so that they keep their
+    order.
     """
 
     def __init__(self) -> None:
         self._new: SimpleQueue[_Job] = SimpleQueue()
         self._behind: deque[_Job] = deque()
-        """What waits for the end of a step; it came before all that is new."""
+        """Jobs that wait for the end of a step; they precede all new ones."""
 
     def post(self, do: Do, client: str | None = None) -> None:
-        """Add a job. From any thread; never waits.
+        """Add a job. May be called from any thread; does not block.
 
         Args:
-            do: What is to be done.
-            client: Client that sent it; None if it is unknown or there is none.
+            do: Job to do.
+            client: Client that sent it; None if it is unknown or no client did.
         """
         self._new.put(_Job(do, client))
 
     def do_waiting(self) -> None:
-        """Do what waits now; what comes meanwhile waits for the next time, lest a flood hold up a tick."""
+        """Do the jobs that are waiting now; later ones wait for the next call, so that a flood cannot delay a tick."""
         for _ in range(self._new.qsize()):
             self._new.get().do()
 
     def do_next(self, timeout: float) -> bool:
-        """Do the next job; False where none came in time.
+        """Do the next job; return False if none arrived in time.
 
         Args:
-            timeout: How long to wait for it [s].
+            timeout: Longest wait for a job [s].
         """
         if self._behind:
             self._behind.popleft().do()
@@ -56,10 +57,10 @@ class Jobs:
         return True
 
     def do_others(self, stepper: str | None) -> None:
-        """Within a client's step, do what others wait for, and put aside what that client has sent.
+        """Within a client's step, do the jobs of others and set aside those of the stepping client.
 
         Args:
-            stepper: The client.
+            stepper: The stepping client.
         """
         for _ in range(self._new.qsize()):
             job = self._new.get()

@@ -1,4 +1,4 @@
-"""How late a robot's ticks began."""
+"""Lateness of a robot's ticks."""
 
 import time
 from dataclasses import dataclass
@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 KEPT = 4096
-"""Ticks that are looked back on at most: eight seconds, where a look is due every second."""
+"""Largest number of ticks kept: eight seconds, while they are read every second."""
 
 
 @dataclass(frozen=True)
 class Punctuality:
-    """Lateness of the ticks since the last look."""
+    """Lateness of the ticks since the last call of `look`."""
 
     ticks: int
     seconds: float
@@ -21,7 +21,7 @@ class Punctuality:
 
 
 class Lateness:
-    """Noted by one thread, looked at by another."""
+    """Record of lateness, written by one thread and read by another."""
 
     def __init__(self) -> None:
         self._late = np.zeros(KEPT)
@@ -29,12 +29,12 @@ class Lateness:
         self._looked, self._looked_at = 0, time.monotonic()
 
     def note(self, late: float) -> None:
-        """A tick began so late [s]."""
+        """Add a tick that began late by this much [s]."""
         self._late[self._count % KEPT] = late
         self._count += 1
 
     def look(self) -> Punctuality:
-        """Lateness since the last look."""
+        """Return the lateness since the last call."""
         count, now = self._count, time.monotonic()
         late = self._late[np.arange(max(self._looked, count - KEPT), count) % KEPT] * 1e6
         seconds, ticks = now - self._looked_at, count - self._looked

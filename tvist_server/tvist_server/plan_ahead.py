@@ -1,4 +1,4 @@
-"""The thread that plans beside the controller's."""
+"""Thread that plans motions next to the controller's thread."""
 
 import logging
 import threading
@@ -17,11 +17,11 @@ from tvist_server.gateways.base import Answer
 log = logging.getLogger(__name__)
 
 MAX_WAITING = 16
-"""Commands that may wait to be planned, and behind one that is."""
+"""Commands that may wait to be planned or wait behind one that is being planned."""
 TRIES = 10
-"""Plans that may be overtaken by what changes meanwhile, before one is made in the controller's thread."""
+"""Number of plans that may become out of date before one is made in the controller's thread."""
 CLOSE_WAIT = 1.0
-"""How long the plan that is being made may take at close [s]."""
+"""Longest time to finish the current plan at close [s]."""
 
 
 STOPPING = (Stop, PowerOff, ProgramStop)
@@ -46,17 +46,17 @@ class _Waiting(NamedTuple):
 
 
 class PlanAhead:
-    """Hands commands to the controller in the order in which they came, those that take long with a plan.
+    """Passes commands to the controller in their order; those that take long to plan come with a finished plan.
 
-    A plan is made of what the controller last said of itself. Where something that it depends on has
-    changed until the controller has it, it is made anew. A command that comes while one before it is being planned
-    waits for it. What stops the arm is carried out at once, and again when it is its turn: so it ends what moves now,
-    and also a motion that was sent before it and begins after it.
+    A plan is based on the state that the controller last published. If something that the plan depends on has changed
+    by the time the controller gets it, it is made again. A command waits while an earlier one is being planned. A
+    command that stops the arm is carried out at once, and again in its turn: so it ends the present motion, and also
+    a motion that was sent before it and would begin after it.
 
     Args:
         host: The controller.
-        planner: Makes plans, for this thread alone.
-        post: Has something done in the controller's thread.
+        planner: Makes plans; used by this thread only.
+        post: Queues a job for the controller's thread.
     """
 
     def __init__(self, host: Host, planner: Planner, post: Callable[[Callable[[], None]], None]) -> None:
@@ -68,26 +68,26 @@ class PlanAhead:
         self._thread = threading.Thread(target=self._run, name="tvist-plan", daemon=True)
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
         self._thread.start()
 
     def end(self) -> None:
-        """Refuse what waits, and what comes."""
+        """Refuse the waiting commands and all further ones."""
         self._closing = True
         self._queue.put(None)
 
     def close(self) -> None:
-        """Wait for the end, before the controller's thread ends."""
+        """Wait for the thread to end; to be called before the controller's thread ends."""
         if self._thread.is_alive():
             self._thread.join(CLOSE_WAIT)
 
     @property
     def waiting(self) -> int:
-        """Commands that wait."""
+        """Number of waiting commands."""
         return self._count
 
     def submit(self, admitted: Admitted, answer: Answer) -> None:
-        """Have a command carried out. From any thread; never waits.
+        """Have a command carried out. May be called from any thread; does not block.
 
         Args:
             admitted: The command.
@@ -120,7 +120,7 @@ class PlanAhead:
             taken: SimpleQueue[bool] = SimpleQueue()
             for _ in range(TRIES):
                 self._post(lambda: taken.put(True))
-                taken.get()  # just before a tick: most plans are ready long before the next
+                taken.get()  # just before a tick, as most plans are ready long before the next
                 try:
                     plan = self._planner.plan(command, self._host.standing.basis)
                 except Exception:
@@ -133,7 +133,7 @@ class PlanAhead:
         self._post(lambda: waiting.answer(self._host.carry_out(waiting.admitted)))
 
     def _take(self, waiting: _Waiting, plan: Plan) -> bool:
-        """Carry out a command by its plan, where that holds; in the controller's thread."""
+        """Carry out a command with its plan, if that still applies; runs in the controller's thread."""
         if not plan.holds(self._host.controller.basis):
             self._host.publish()
             return False
@@ -142,4 +142,4 @@ class PlanAhead:
 
 
 def _nobody(reply: Reply) -> None:
-    """The sender has its answer."""
+    """Ignore the reply, since the sender has already got one."""

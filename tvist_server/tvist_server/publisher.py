@@ -1,7 +1,7 @@
-"""The way out of one robot: states, events and replies wait here, in their order, for the thread that hands them on.
+"""Output queue of one robot: states, events and replies wait here, in order, for the thread that hands them on.
 
-The controller's thread only puts into a queue. Where the network is slow the queue grows to its bound; then states
-are dropped and counted in real time, and the controller waits in lockstep, where every state counts.
+The controller's thread only appends to the queue. If the network is slow, the queue grows to its limit. Then states
+are dropped and counted in real time; in lockstep, where no state may be lost, the controller waits.
 """
 
 import logging
@@ -18,12 +18,13 @@ from tvist_server.gateways.base import Gateway, Message
 log = logging.getLogger(__name__)
 
 MAX_WAITING = 2048
-"""Messages that may wait, four seconds of states."""
+"""Number of messages that may wait: four seconds of states."""
 LEAD = 50
-"""Messages that may wait in lockstep, a tenth of a second of states: the further a step runs ahead of what is told, the
-later a client's answer to a state comes."""
+"""Number of messages that may wait in lockstep: a tenth of a second of states. The further a step runs ahead of the
+published states, the later a client's reaction to a state arrives.
+"""
 PAUSE = 0.02
-"""How long the controller waits at most, where it does, before it looks for room again [s]."""
+"""Longest wait of the controller between two checks for room [s]."""
 
 TOPICS: Mapping[type[Message], Topic] = {
     State: "state",
@@ -35,10 +36,10 @@ TOPICS: Mapping[type[Message], Topic] = {
 
 
 class Publisher(Sink):
-    """A sink that others empty.
+    """A sink that another thread empties.
 
     Args:
-        lossless: Whether the controller waits rather than drop a state.
+        lossless: Whether the controller waits instead of dropping a state.
     """
 
     def __init__(self, *, lossless: bool) -> None:
@@ -48,25 +49,25 @@ class Publisher(Sink):
         self._queue: deque[Message | Callable[[], None]] = deque()
         self._room = threading.Event()
         self.dropped = 0
-        """Messages of a tick that found no room."""
+        """Number of messages of a tick that were dropped for lack of room."""
 
     def open(self, gateways: Sequence[Gateway], wake: Callable[[], None] | None = None) -> None:
-        """Say where messages go to.
+        """Set the gateways that messages go to.
 
         Args:
-            gateways: They get everything.
-            wake: Called with every message, where nobody looks by himself.
+            gateways: Gateways; each gets every message.
+            wake: Called for every message, if no thread checks the queue regularly.
         """
         self._gateways = gateways
         self._wake = wake or _nobody
 
     def hurry(self) -> None:
-        """Wait for nobody from now on: the robot is about to end, and a client may have stopped reading."""
+        """Stop waiting for room: the robot is about to end, and a client may have stopped reading."""
         self._lossless = False
-        self._room.set()  # whoever waits for room
+        self._room.set()  # releases a thread that waits for room
 
     def hand_on(self) -> None:
-        """Hand on what waits now; what comes meanwhile is the next round's, lest other robots wait for ever."""
+        """Hand on the messages waiting now; later ones wait for the next call, so that other robots get their turn."""
         queue = self._queue
         for _ in range(len(queue)):
             item = queue.popleft()
@@ -86,7 +87,7 @@ class Publisher(Sink):
         self._put(event)
 
     def truth(self, truth: Truth) -> None:
-        """Queue what no robot can know."""
+        """Queue values that a real robot cannot measure."""
         self._offer(truth)
 
     def io(self, io: Io) -> None:
@@ -94,21 +95,21 @@ class Publisher(Sink):
         self._offer(io)
 
     def telemetry(self, telemetry: Telemetry, io: Io) -> None:
-        """Queue the server's own figures, and tell the present inputs, outputs and registers again."""
+        """Queue the server's own figures, and publish the present inputs, outputs and registers again."""
         self._put(io)
         self._put(telemetry)
 
     def answer(self, call: Callable[[], None]) -> None:
-        """Queue a call that answers a client, behind the states that came before it."""
+        """Queue a call that answers a client, behind the states that precede it."""
         self._put(call)
 
     def repeat(self, state: State, io: Io) -> None:
-        """Tell the present state, inputs, outputs and registers again, for those who come late."""
+        """Publish the present state, inputs, outputs and registers again, for new clients."""
         self._put(io)
         self._put(state)
 
     def _offer(self, message: State | Truth | Io) -> None:
-        """Queue a message of every tick, where there is room."""
+        """Queue a message of a tick, if there is room."""
         if self._lossless and len(self._queue) >= LEAD:
             self._wait_for_room()
         if len(self._queue) < MAX_WAITING:
@@ -117,7 +118,7 @@ class Publisher(Sink):
             self.dropped += 1
 
     def _wait_for_room(self) -> None:
-        """Wait until half of the room is free: to be woken for each message would cost more than the message."""
+        """Wait until half of the room is free: waking up for each message would cost more than the message."""
         while self._lossless and len(self._queue) > LEAD // 2:
             self._room.clear()
             self._room.wait(PAUSE)

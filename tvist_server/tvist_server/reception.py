@@ -1,4 +1,4 @@
-"""Reception of a robot's messages, in threads of the network."""
+"""Reception of a robot's messages, in the network's threads."""
 
 import threading
 from collections.abc import Callable
@@ -14,24 +14,24 @@ from tvist_server.gateways.base import Answer, Desk
 
 
 class Post(Protocol):
-    """Has something done in the controller's thread, before its next tick. From any thread; never waits."""
+    """Queues a job for the controller's thread, before its next tick. Callable from any thread; does not block."""
 
     def __call__(self, do: Callable[[], None], client: str | None = None, /) -> None:
-        """Take what is to be done, and who sent it, where that is known."""
+        """Take a job, and the client that sent it, if known."""
 
 
 CarryOut = Callable[[Admitted, Answer], None]
-"""Has a command carried out in the controller's thread, and answered there. From any thread; never waits."""
+"""Has a command carried out and answered in the controller's thread. Callable from any thread; does not block."""
 
 
 class Reception(Desk):
-    """The desk of one robot: admits what arrives, and turns away the rest at once, which costs the controller nothing.
+    """The desk of one robot: admits valid messages, and rejects others at once without involving the controller.
 
     Args:
-        host: The controller; of what it does in its thread nothing is called here.
-        post: Into the controller's thread.
-        carry_out: Takes commands that were admitted.
-        hand_on: Takes calls that answer clients, in the controller's thread.
+        host: The controller; only its thread-safe methods are called here.
+        post: Queues a job for the controller's thread.
+        carry_out: Carries out commands that were admitted.
+        hand_on: Queues calls that answer clients, in the controller's thread.
     """
 
     def __init__(
@@ -41,12 +41,12 @@ class Reception(Desk):
         self._lock = threading.Lock()
         self._presence = Presence()
         self.commands_refused = 0
-        """Commands that were turned away."""
+        """Number of rejected commands."""
         self.setpoints_refused = 0
-        """Set-points that were."""
+        """Number of rejected set-points."""
 
     def request(self, data: bytes, answer: Answer) -> None:
-        """Take an encoded command; the reply comes from another thread, or at once where it is turned away."""
+        """Take an encoded command; the reply comes from another thread, or at once if the command is rejected."""
         standing = self._host.standing
         self._hand_in(admit(data, standing.lease, standing.clock), answer)
 
@@ -56,7 +56,7 @@ class Reception(Desk):
         self._hand_in(admit_command(command, standing.lease, standing.clock), answer)
 
     def info(self, answer: Callable[[bytes], None]) -> None:
-        """Say what the robot is."""
+        """Answer with a description of the robot."""
 
         def tell() -> None:
             data = self._host.info()
@@ -65,7 +65,7 @@ class Reception(Desk):
         self._post(tell)
 
     def holder(self) -> str | None:
-        """Client that has control; None: nobody."""
+        """Client that has control; None if no client has it."""
         lease = self._host.standing.lease
         return None if lease is None else lease.client
 
@@ -80,19 +80,19 @@ class Reception(Desk):
             self._post(lambda: self._host.receive_setpoint(setpoint), lease.client)
 
     def client_seen(self, client: str, session: str = "") -> None:
-        """A client's liveliness token is there."""
+        """Note that a client's liveliness token has appeared."""
         with self._lock:
             self._presence.seen(client, session)
 
     def client_gone(self, client: str, session: str = "") -> None:
-        """A client's liveliness token is gone, or its session."""
+        """Note that a client's liveliness token, or its session, has disappeared."""
         with self._lock:
             self._presence.gone(client, session)
-        if self._host.standing.sessions_of(client):  # what is being given to it now: see _unless_gone
+        if self._host.standing.sessions_of(client):  # control that is being given to it now: see _unless_gone
             self._post(lambda: self._host.client_gone(client, session))
 
     def session_gone(self, session: str) -> None:
-        """A session has ended, whoever else holds its clients' liveliness tokens."""
+        """Note that a session has ended, even if other sessions hold liveliness tokens of the same clients."""
         with self._lock:
             clients = self._presence.clients_of(session)
         for client in clients:
@@ -123,7 +123,7 @@ class Reception(Desk):
             return error.reply
 
     def _unless_gone(self, client: str, answer: Answer) -> Answer:
-        """Answer a command that gives a client control or the clock, and take it back where the client has gone."""
+        """Answer a command that gives a client control or the clock, and revoke it if the client has disconnected."""
 
         def answered(reply: Reply) -> None:
             for session in self._host.standing.sessions_of(client):

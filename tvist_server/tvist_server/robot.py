@@ -1,4 +1,4 @@
-"""One robot of a server: its controller, and what stands between that and clock, network and file."""
+"""One robot of a server: its controller, and everything that connects it to clock, network and file."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,22 +21,22 @@ from tvist_server.recording.recorder import Recorder
 
 
 class ServedRobot:
-    """A robot with everything that is its own: robots share a process, the tick thread and the network alone.
+    """A robot with everything of its own; robots share only the process, the tick thread and the network.
 
     Args:
-        setup: How it starts.
+        setup: Initial setup.
         record: File to record into.
         dump: Folder for the last second before a failure.
 
     Raises:
-        ValueError: The setup is wrong.
+        ValueError: The setup is invalid.
         RecordingError: The recording cannot be written.
     """
 
     def __init__(self, setup: Setup, record: Path | None, dump: Path) -> None:
         self.setup = setup
         self.controller = Controller(setup)
-        info_of(self.controller)  # what takes longest in it is found once, before the first tick
+        info_of(self.controller)  # computes the slowest part of the description once, before the first tick
         lockstep = setup.clock != "realtime"
         self.recorder = None
         if record is not None:
@@ -53,30 +53,30 @@ class ServedRobot:
         recorded = () if self.recorder is None else (self.recorder,)
         self._host = Host(self.controller, *recorded, black_box, self._publisher)
         self.driven = Mailbox(self._host)
-        """For the clock."""
-        # Where a client lets time pass nothing is late, and plans are made where they are used.
+        """The robot as seen by the clock."""
+        # When a client advances time, nothing is late, and plans are made when they are needed.
         self._plan_ahead = None if lockstep else PlanAhead(self._host, Planner(setup), self.driven.post)
         carry_out = self._carry_out if self._plan_ahead is None else self._plan_ahead.submit
         self.reception = Reception(self._host, self.driven.post, carry_out, self._publisher.answer)
-        """Reception that gateways pass messages to."""
+        """Desk that gateways pass messages to."""
         self._gateways: Sequence[Gateway] = ()
 
     def open(self, gateways: Sequence[Gateway], wake: Callable[[], None] | None = None) -> None:
-        """Say which gateways are this robot's: they get what it puts out, and it sees to their life.
+        """Set this robot's gateways, which get its messages and are closed with it.
 
         Args:
-            gateways: Its own.
-            wake: Called with every message, where nobody hands them on by himself.
+            gateways: Gateways of this robot only.
+            wake: Called for every message, if no thread hands them on regularly.
         """
         self._gateways = gateways
         self._publisher.open(gateways, wake)
 
     def hand_on(self) -> None:
-        """Hand on what waits for the gateways."""
+        """Hand on the messages that wait for the gateways."""
         self._publisher.hand_on()
 
     def repeat(self) -> None:
-        """Tell how the robot stands, while no time passes, for those who come late; in the controller's thread."""
+        """Publish the state again for new clients while no time passes; called in the controller's thread."""
         self._publisher.repeat(self.controller.latest, self.controller.io())
 
     def _carry_out(self, admitted: Admitted, answer: Answer) -> None:
@@ -87,31 +87,31 @@ class ServedRobot:
 
         self.driven.post(lambda: answer(self._host.carry_out(admitted, attend=attend)), client)
 
-    # ------------------------------------------------------------------ how it is doing, and its end
+    # ------------------------------------------------------------------ figures and shutdown
 
     def start(self) -> None:
-        """Begin to plan; before its clock starts."""
+        """Start to plan; to be called before the clock starts."""
         if self._plan_ahead is not None:
             self._plan_ahead.start()
 
     async def let_in(self) -> None:
-        """Let clients in; it ticks."""
+        """Let clients in; the robot ticks already."""
         for gateway in self._gateways:
             await gateway.open()
 
     async def let_out(self) -> None:
-        """Let nobody in any more, and everybody out who would stay."""
+        """Let no more clients in, and disconnect those that would stay."""
         for gateway in self._gateways:
             await gateway.shut()
 
     def hurry(self) -> None:
-        """Plan nothing more and wait for no client: it is about to end."""
+        """Stop planning and waiting for clients, since the robot is about to end."""
         self._publisher.hurry()
         if self._plan_ahead is not None:
             self._plan_ahead.end()
 
     def stop_planning(self) -> None:
-        """Wait for the plan that is being made; before its clock ends."""
+        """Wait for the current plan to finish; to be called before the clock ends."""
         if self._plan_ahead is not None:
             self._plan_ahead.close()
 
@@ -122,15 +122,16 @@ class ServedRobot:
 
     @property
     def failure(self) -> str | None:
-        """Why the robot ticks no more, where it does not."""
+        """Why the robot has stopped ticking; None if it ticks."""
         return self._host.failure
 
     def tell_telemetry(self, clock: Clock) -> None:
-        """Put the server's own figures on this robot, from the controller's thread."""
+        """Publish the server's own figures on this robot; called in the controller's thread."""
         punctuality = clock.punctuality(self.driven)
 
         def tell() -> None:
-            # As io is now, and not as it was told last: a program may have been played since, before the next tick.
+            # Use the current io, not the last published one: a program may have been played since, before the next
+            # tick.
             self._publisher.telemetry(self._telemetry(punctuality), self.controller.io())
 
         self.driven.post(tell)
@@ -160,16 +161,16 @@ class ServedRobot:
         )
 
     def close_recording(self) -> None:
-        """Write what waits, and the index."""
+        """Write the waiting messages and the index."""
         if self.recorder is not None:
             self.recorder.close()
 
     def discard_recording(self) -> None:
-        """Remove a recording that never began: it is ours and empty, and would stand in the way of the next attempt."""
+        """Remove a recording that never began: the empty file would only block the next attempt."""
         if self.recorder is not None:
             self.recorder.close()
             self.recorder.path.unlink(missing_ok=True)
 
     def _warn(self, why: str) -> None:
-        """Tell clients, and with them the console."""
+        """Publish a warning to clients and the console."""
         self.driven.post(lambda: self._host.warn(why))

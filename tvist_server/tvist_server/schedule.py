@@ -1,46 +1,48 @@
-"""When the ticks of robots are due: each has deadlines of its own, and one thread keeps them all."""
+"""When robots' ticks are due: each robot has deadlines of its own, and one thread serves all of them."""
 
 from heapq import heapreplace
 
 CATCH_UP = 50
-"""Periods that are made up for after a delay; what is more is left out, so that no burst lasts longer than that."""
+"""Number of periods made up for after a delay; further ones are skipped, which limits the length of the burst."""
 MOMENTS = 4
-"""Number of moments of a period at which robots are due. Waking up costs half as much as a tick, since caches are cold
-then: more moments would mean fewer robots."""
+"""Number of moments within a period at which robots are due. Waking up with cold caches costs half as much as a tick,
+so more moments would allow fewer robots.
+"""
 
 
 class Schedule:
-    """Absolute deadlines, a period apart for each robot, staggered so that robots do not wait for each other.
+    """Absolute deadlines, a period apart for each robot, and staggered so that robots do not wait for each other.
 
-    Of up to `MOMENTS` robots one is due every N-th part of a period, so that what one does delays the next only
-    where it takes longer than that; of more, those of a moment tick one after another. A tick that begins a
-    period late or more is counted as missed and made up for at once, and the deadlines stay where they were:
-    after a week they are still on time.
+    Up to `MOMENTS` robots are spread evenly over the period, so that a slow tick of one robot delays the next robot
+    only if it takes longer than that distance. With more robots, those with the same moment tick one after another. A
+    tick that begins a period late or more is counted as missed and made up for at once, and the deadlines stay where
+    they were, so there is no drift even after a week.
 
     Args:
         robots: Number of robots.
         period: Period of each robot's ticks [s].
-        start: Now; the first tick is due a period later [s].
+        start: Present time; the first tick is due a period later [s].
     """
 
     def __init__(self, robots: int, period: float, start: float) -> None:
         self._period = period
         moments = min(robots, MOMENTS)
-        # Sorted, hence a heap.
+        # A sorted list is a valid heap.
         self._due = sorted(
             (start + period * (1.0 + robot % moments / moments), robot) for robot in range(robots)
         )
 
     @property
     def due(self) -> float:
-        """When the next tick is due [s]."""
+        """Time at which the next tick is due [s]."""
         return self._due[0][0]
 
     def begin(self, now: float) -> tuple[int, float, int]:
         """Take the next tick, which begins now.
 
         Returns:
-            Number of the robot whose tick it is, how late it begins [s], and how many ticks of its were missed.
+            Index of the robot whose tick it is, how late it begins [s], and how many of the robot's ticks were
+            missed.
         """
         deadline, robot = self._due[0]
         period = self._period

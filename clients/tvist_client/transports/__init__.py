@@ -1,4 +1,4 @@
-"""How bytes reach a robot: over Zenoh, or in process."""
+"""Transports to a robot: over Zenoh, or in process."""
 
 from tvist_client.transports.base import Topic, Transport
 from tvist_client.transports.loopback import InProcessRobot, LoopbackTransport

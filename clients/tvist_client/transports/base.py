@@ -1,4 +1,4 @@
-"""What a client needs of a network: bytes to one robot, and bytes from it."""
+"""Interface between a client and the network: it carries bytes to and from one robot."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -7,18 +7,18 @@ from typing import Literal
 from tvist_client.errors import NotConnectedError
 
 Topic = Literal["state", "event", "truth", "telemetry", "io"]
-"""What a robot puts without being asked."""
+"""Topic that a robot publishes without a request."""
 
 
 class Transport(ABC):
-    """A way to one robot. Used from one event loop, on which it also calls back."""
+    """A connection to one robot. It is used from one event loop, on which its callbacks run too."""
 
     @abstractmethod
     async def request(self, data: bytes, timeout_s: float) -> bytes:
         """Send an encoded command and wait for its encoded reply.
 
         Args:
-            data: The command.
+            data: Encoded command.
             timeout_s: How long the robot may take [s].
 
         Raises:
@@ -28,7 +28,7 @@ class Transport(ABC):
 
     @abstractmethod
     def put_setpoint(self, data: bytes) -> None:
-        """Send an encoded set-point, which nobody answers.
+        """Send an encoded set-point, which is not answered.
 
         Raises:
             NotConnectedError: The transport is closed.
@@ -36,24 +36,24 @@ class Transport(ABC):
 
     @abstractmethod
     async def info(self) -> bytes:
-        """Ask for the encoded `info`; raises as `request` does."""
+        """Request the encoded `info`; raises the same errors as `request`."""
 
     @abstractmethod
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
-        """Have every message of a topic handed to a callback on the event loop, in order, until `close`."""
+        """Call a function with every message of a topic, on the event loop and in order, until `close`."""
 
     @abstractmethod
     def on_lost(self, callback: Callable[[NotConnectedError], None]) -> None:
-        """Have a callback called on the event loop each time the robot goes away."""
+        """Call a function on the event loop each time the robot disconnects."""
 
     @abstractmethod
     async def announce(self, client: str) -> None:
-        """Say that a client of that name is there, until it was withdrawn as often or this transport ends."""
+        """Announce a client's presence, until `withdraw` was called as often or this transport is closed."""
 
     @abstractmethod
     async def withdraw(self, client: str) -> None:
-        """Take back what one `announce` said."""
+        """Undo one call of `announce`."""
 
     @abstractmethod
     async def close(self) -> None:
-        """End; a second call does nothing."""
+        """Close the transport; a second call does nothing."""

@@ -1,4 +1,4 @@
-"""How a client shows who it is: a folder with its certificate, as `tvist keys` makes one for each client.
+"""Authentication of a client by a folder with its certificate, as `tvist keys` makes one for each client.
 
 authority.pem    certificate of the authority that signed the robot's
 client.pem       the client's certificate, and
@@ -17,10 +17,11 @@ from tvist_client.errors import NotConnectedError
 
 AUTHORITY, CERTIFICATE, KEY = "authority.pem", "client.pem", "client.key"
 OPEN_MS = 15_000
-"""How long opening a session may take [ms]. A server accepts nobody for 100 ms after each handshake that fails, so
-a hundred connections given up at once make the next client wait for 10 s."""
+"""Longest time to open a session [ms]. A server accepts no client for 100 ms after each failed handshake, so a
+hundred connections that are given up at once make the next client wait for 10 s.
+"""
 PROBE_S = 2.0
-"""How long finding out why there is no connection may take [s]."""
+"""Longest time to find out why there is no connection [s]."""
 
 Folder = str | os.PathLike[str]
 
@@ -30,7 +31,7 @@ def settings(endpoint: str, security: Folder | None) -> dict[str, Any]:
 
     Args:
         endpoint: Endpoint of the server.
-        security: The client's folder; none for a server without security.
+        security: The client's folder; None for a server without certificates.
 
     Raises:
         NotConnectedError: A file is missing, or folder and endpoint do not match.
@@ -61,12 +62,12 @@ def settings(endpoint: str, security: Folder | None) -> dict[str, Any]:
 
 
 def why_refused(endpoint: str, security: Folder) -> str | None:
-    """Why no session could be opened, as far as a handshake of our own tells: Zenoh says nothing of it.
+    """Return why no session could be opened, judged by a handshake of our own, since Zenoh does not report it.
 
-    Blocks for at most twice `PROBE_S`.
+    This blocks for at most twice `PROBE_S`.
 
     Returns:
-        A reason, None where the handshake goes well or nobody listens.
+        A reason; None if the handshake succeeds or no server listens.
     """
     folder = Path(security)
     where = urlsplit("//" + endpoint.partition("/")[2].partition("#")[0].partition("?")[0])
@@ -81,7 +82,7 @@ def why_refused(endpoint: str, security: Folder) -> str | None:
             context.wrap_socket(plain, server_hostname=where.hostname) as encrypted,
             contextlib.suppress(TimeoutError),
         ):
-            # In TLS 1.3 a server judges the client's certificate after the handshake: its verdict is read.
+            # In TLS 1.3 a server judges the client's certificate after the handshake, so its verdict has to be read.
             encrypted.recv(1)
     except ssl.SSLCertVerificationError as error:
         return f"the robot's certificate is not trusted: {error.verify_message.rstrip('.')}"

@@ -1,4 +1,4 @@
-"""A robot in this process: no network, no thread; a command is carried out while it is sent."""
+"""A robot in this process, without network or thread; a command is carried out while it is sent."""
 
 import asyncio
 from collections.abc import Callable
@@ -9,23 +9,23 @@ from tvist_client.transports.base import Topic, Transport
 
 
 class InProcessRobot(Protocol):
-    """What a robot in process offers. A `simulation.step` ticks it, and callbacks run, before it returns."""
+    """Interface of a robot in this process. A `simulation.step` ticks it and runs the callbacks before it returns."""
 
     def request(self, client: str, data: bytes) -> bytes:
-        """Carry out an encoded command; its encoded reply."""
+        """Carry out an encoded command and return its encoded reply."""
 
     def put_setpoint(self, client: str, data: bytes) -> None:
         """Take an encoded set-point."""
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> Callable[[], None]:
-        """Have every message of a topic, first of all the present `state` or `io`; the function returned ends that."""
+        """Call a function for each message of a topic, first the present `state` or `io`; return how to end this."""
 
     def info(self) -> bytes:
-        """Encoded `info`."""
+        """Return the encoded `info`."""
 
 
 class LoopbackTransport(Transport):
-    """A way to a robot in process.
+    """A connection to a robot in this process.
 
     Args:
         host: The robot.
@@ -42,30 +42,30 @@ class LoopbackTransport(Transport):
         """Carry out a command."""
         self._check_open()
         reply = self._host.request(self._client, data)
-        # Whoever iterates over the states gets a turn between two commands.
+        # lets tasks that iterate over the states run between two commands
         await asyncio.sleep(0)
         return reply
 
     def put_setpoint(self, data: bytes) -> None:
-        """Hand over a set-point."""
+        """Pass on a set-point."""
         self._check_open()
         self._host.put_setpoint(self._client, data)
 
     async def info(self) -> bytes:
-        """Ask what the robot is."""
+        """Return the encoded `info`."""
         self._check_open()
         return self._host.info()
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
-        """Have every message of a topic, while the command runs that causes it."""
+        """Call a function with every message of a topic, during the command that causes it."""
         self._check_open()
         self._unsubscribe.append(self._host.subscribe(topic, callback))
 
     def on_lost(self, callback: Callable[[NotConnectedError], None]) -> None:
-        """Do nothing: a robot in this process does not go away."""
+        """Do nothing: a robot in this process does not disconnect."""
 
     async def announce(self, client: str) -> None:
-        """Do nothing: a client in this process does not go away either."""
+        """Do nothing: a client in this process does not disconnect either."""
 
     async def withdraw(self, client: str) -> None:
         """Do nothing."""

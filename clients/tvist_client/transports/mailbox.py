@@ -10,14 +10,14 @@ log = logging.getLogger(__name__)
 Callback = Callable[[bytes], None]
 
 MAX_WAITING = 10_000
-"""Messages that may wait while the loop does something else: 20 s of states, about 10 MB."""
+"""Messages that may wait while the loop is busy: 20 s of states, about 10 MB."""
 
 
 class Mailbox:
-    """Hands messages to callbacks on the loop, in the order in which they came.
+    """Passes messages to callbacks on the loop, in the order of their arrival.
 
-    One mailbox for all topics, since their order counts: events of a tick come before its state. The loop is
-    woken once for all that has come, not once a message.
+    There is one mailbox for all topics, since their order matters: events of a tick come before its state. The loop
+    is woken once for all waiting messages, not once per message.
 
     Args:
         loop: The event loop.
@@ -25,18 +25,18 @@ class Mailbox:
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.dropped = 0
-        """Messages that found no room."""
+        """Number of messages dropped for lack of room."""
         self._loop = loop
         self._waiting: deque[tuple[Callback, bytes]] = deque()
         self._woken = False
 
     def put(self, callback: Callback, data: bytes, *, droppable: bool) -> None:
-        """Take a message. From any thread; never waits.
+        """Add a message. May be called from any thread; does not block.
 
         Args:
             callback: Called with the message on the loop.
             data: The message.
-            droppable: Whether it may be dropped where there is no room: a state may, an event may not.
+            droppable: Whether it may be dropped if there is no room; this holds for states, but not for events.
         """
         if droppable and len(self._waiting) >= MAX_WAITING:
             if not self.dropped:
@@ -44,8 +44,8 @@ class Mailbox:
             self.dropped += 1
             return
         self._waiting.append((callback, data))
-        # Two threads may both wake the loop, which does no harm; that neither does is impossible, since the
-        # flag is taken down before the queue is emptied.
+        # It does no harm if two threads both wake the loop. At least one always does, since the flag is cleared
+        # before the queue is emptied.
         if not self._woken:
             self._woken = True
             wake(self._loop, self._deliver)
@@ -58,7 +58,7 @@ class Mailbox:
 
 
 def wake(loop: asyncio.AbstractEventLoop, callback: Callable[[], None]) -> None:
-    """Run a callback on the loop, from any thread; nowhere once the loop is closed."""
+    """Run a callback on the loop, from any thread; do nothing if the loop is closed."""
     try:
         loop.call_soon_threadsafe(callback)
     except RuntimeError:

@@ -1,4 +1,4 @@
-"""Zenoh sessions of a client: how they are opened, and that none outlives the process."""
+"""Zenoh sessions of a client; all are closed before the process ends."""
 
 import contextlib
 import json
@@ -15,10 +15,10 @@ from tvist_protocol.errors import quoted
 
 _PORT = "[1-9]\\d{0,3}|[1-5]\\d{4}|6[0-4]\\d{3}|65[0-4]\\d{2}|655[0-2]\\d|6553[0-5]"
 _ENDPOINT = re.compile(rf"(?!(tcp|tls|udp|quic|ws)/)[a-z]+[/-].*|[a-z]+/\S+:({_PORT})([?#].*)?")
-"""Those with a port have one that there is; others are Zenoh's to judge."""
+"""Matches endpoints with a valid port, and those whose protocol has none, which Zenoh checks itself."""
 CONFIG: Mapping[str, Any] = {
     "mode": "client",
-    # The endpoint is named: nobody has to be looked for.
+    # The endpoint is given, so there is nothing to search for.
     "scouting/multicast/enabled": False,
     "transport/shared_memory/enabled": False,
 }
@@ -30,7 +30,7 @@ def open_session(endpoint: str, security: Folder | None = None) -> zenoh.Session
 
     Args:
         endpoint: Endpoint of the server.
-        security: Folder with the client's certificate, where the server asks for one.
+        security: Folder with the client's certificate, if the server requires one.
 
     Raises:
         NotConnectedError: No server listens there, or the certificate is rejected.
@@ -76,6 +76,6 @@ def _close_all() -> None:
         close_session(session)
 
 
-# A session left open can hang the process at its end; `atexit` comes too late, after threads were joined.
+# A session that is left open can hang the process at its end. `atexit` runs too late: after threads were joined.
 _register: Callable[[Callable[[], None]], None] = threading._register_atexit  # type: ignore[attr-defined]  # noqa: SLF001
 _register(_close_all)

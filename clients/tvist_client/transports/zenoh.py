@@ -1,7 +1,7 @@
 """A robot on the network, over Zenoh.
 
-Callbacks run in Zenoh's own threads, directly (`indirect=False`): messages keep their order across topics,
-and no thread of Python's has to be joined at the end. They make bytes of payloads; the loop does the rest.
+Callbacks run directly in Zenoh's own threads (`indirect=False`), so messages keep their order across topics, and no
+Python thread has to be joined at the end. The callbacks only convert payloads to bytes; the event loop does the rest.
 """
 
 import asyncio
@@ -29,17 +29,17 @@ KEYS: Mapping[Topic, Callable[[str], str]] = {
     "io": keys.io,
 }
 FIND_S = 1.0
-"""After how long it is asked which robots there are, once there is a link [s]; one shows itself in milliseconds."""
+"""Time after which the available robots are queried, once there is a link [s]; a robot appears within milliseconds."""
 INFO_S = 10.0
-"""How long `info` may take [s]."""
+"""Longest wait for `info` [s]."""
 
 
 class ZenohTransport(Transport):
-    """A way to one robot over Zenoh. `open` makes one.
+    """A connection to one robot over Zenoh, created by `open`.
 
     Args:
         session: An open session, which `close` closes.
-        endpoint: Endpoint that it is connected to, for messages.
+        endpoint: Endpoint that it is connected to, for error messages.
         robot: Name of the robot.
     """
 
@@ -68,12 +68,12 @@ class ZenohTransport(Transport):
 
         Args:
             endpoint: Endpoint of the server, `tcp/127.0.0.1:7447`.
-            robot: The robot's name.
+            robot: Name of the robot.
             security: Folder with this client's certificate, for `tls/<host>:<port>`.
 
         Raises:
             NotConnectedError: No server listens there, or there is no visible robot of that name.
-            ProtocolError: `robot` cannot be a robot's name.
+            ProtocolError: `robot` is not a valid robot name.
         """
         keys.check_robot_name(robot)
         transport = cls(await asyncio.to_thread(open_session, endpoint, security), endpoint, robot)
@@ -94,13 +94,13 @@ class ZenohTransport(Transport):
         return await self._get(keys.command(self._robot), data, timeout_s)
 
     def put_setpoint(self, data: bytes) -> None:
-        """Put a set-point: 20 µs, and dropped where the link is congested."""
+        """Put a set-point; this takes 20 µs, and the set-point is dropped if the link is congested."""
         if self._closed:
             raise self._gone()
         self._setpoints.put(data)
 
     async def info(self) -> bytes:
-        """Ask what the robot is."""
+        """Request the encoded `info`."""
         return await self._get(keys.info(self._robot), None, INFO_S)
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
@@ -111,14 +111,14 @@ class ZenohTransport(Transport):
         droppable = topic in {"state", "truth"}
 
         def on_sample(sample: zenoh.Sample) -> None:
-            # Anyone may put on a key with a wildcard, which arrives here too.
+            # Other clients may put on a key with a wildcard, which arrives here too.
             if str(sample.key_expr) == key:
                 self._mailbox.put(callback, sample.payload.to_bytes(), droppable=droppable)
 
         self._session.declare_subscriber(key, Callback(on_sample, indirect=False))
 
     def on_lost(self, callback: Callable[[NotConnectedError], None]) -> None:
-        """Have a callback called when the robot's liveliness token goes."""
+        """Call a function when the robot's liveliness token disappears."""
         self._lost_callbacks.append(callback)
 
     async def announce(self, client: str) -> None:
@@ -131,7 +131,7 @@ class ZenohTransport(Transport):
             self._tokens[client] = self._session.liveliness().declare_token(key)
 
     async def withdraw(self, client: str) -> None:
-        """Undeclare the client's liveliness token, once whoever announced it needs it no more."""
+        """Undeclare the client's liveliness token, once it was withdrawn as often as announced."""
         self._announced[client] -= 1
         if self._announced[client] > 0:
             return
@@ -141,7 +141,7 @@ class ZenohTransport(Transport):
             token.undeclare()  # type: ignore[no-untyped-call]
 
     async def close(self) -> None:
-        """Close the session; what is waited for fails."""
+        """Close the session; pending requests fail."""
         if self._closed:
             return
         self._closed = True
@@ -149,10 +149,10 @@ class ZenohTransport(Transport):
         await asyncio.to_thread(close_session, self._session)
 
     async def _get(self, key: str, data: bytes | None, timeout_s: float) -> bytes:
-        """Query one key, and have the first answer.
+        """Query one key and return the first answer.
 
-        Zenoh ends a query that nobody hears at once and without a word, one that is heard and not answered at
-        its timeout with an error, and one whose link breaks at once and again without a word.
+        If a query reaches no one, or its link breaks, Zenoh ends it at once and silently. If it is received but not
+        answered, Zenoh ends it at its timeout with an error.
         """
         if self._closed:
             raise self._gone()
@@ -170,7 +170,8 @@ class ZenohTransport(Transport):
             wake(self._loop, partial(_settle, answer, nobody))
 
         try:
-            # The default quality of service: its queue is not the states', which so cannot hold up an answer.
+            # With the default quality of service, answers have a queue other than the states', which cannot delay
+            # them.
             self._session.get(
                 key,
                 Callback(on_reply, on_end, indirect=False),
@@ -216,7 +217,7 @@ class ZenohTransport(Transport):
         )
 
     def _if_secured(self, check: str) -> str:
-        """What to check besides: access control denies without a word."""
+        """Return what else to check with certificates, since access control denies silently."""
         return f", and {check}" if self._endpoint.startswith("tls/") else ""
 
     def _fail_pending(self, error: ClientError) -> None:
@@ -224,13 +225,13 @@ class ZenohTransport(Transport):
             _settle(answer, error)
 
     async def _find(self) -> None:
-        """Wait until the robot shows itself."""
+        """Wait until the robot's liveliness token appears."""
         try:
             async with asyncio.timeout(FIND_S):
                 await self._alive.wait()
         except TimeoutError:
             robots = await _robots(self._session)
-            if self._robot in robots:  # the machine is slow
+            if self._robot in robots:  # it has appeared late: the machine is slow
                 return
             there = f"the robots there are {', '.join(robots)}" if robots else "there are no robots"
             check = "check name and endpoint" + self._if_secured(
@@ -241,7 +242,7 @@ class ZenohTransport(Transport):
 
 
 async def robots_at(endpoint: str, security: Folder | None = None) -> list[str]:
-    """Names of the robots at an endpoint, sorted.
+    """Return the names of the robots at an endpoint, sorted.
 
     Args:
         endpoint: Endpoint of the server, `tcp/127.0.0.1:7447`.
@@ -258,11 +259,11 @@ async def robots_at(endpoint: str, security: Folder | None = None) -> list[str]:
 
 
 async def only_robot(endpoint: str, wanted: str, security: Folder | None = None) -> str:
-    """Choose a robot if no name is given: the preferred one, or if it is not there the only one.
+    """Choose a robot if no name is given: the preferred one, or if that is absent, the only one.
 
     Args:
         endpoint: Endpoint of the server, `tcp/127.0.0.1:7447`.
-        wanted: Name of the one that is taken where it is there.
+        wanted: Name of the preferred robot.
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
 
     Raises:
@@ -278,7 +279,7 @@ async def only_robot(endpoint: str, wanted: str, security: Folder | None = None)
 
 
 async def _robots(session: zenoh.Session) -> list[str]:
-    """Names of the robots that can be reached, sorted: ur5e-2 before ur5e-10."""
+    """Names of the robots that can be reached, in natural order: ur5e-2 before ur5e-10."""
     loop = asyncio.get_running_loop()
     names: list[str] = []
     ended = asyncio.Event()
@@ -299,7 +300,7 @@ def _by_number(name: str) -> list[int | str]:
 
 
 def _settle(answer: asyncio.Future[bytes], outcome: bytes | ClientError) -> None:
-    """Give an answer to whoever waits for it; the first one counts."""
+    """Set the result of a request, unless it has one already."""
     if answer.done():
         return
     if isinstance(outcome, bytes):

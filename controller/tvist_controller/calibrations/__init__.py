@@ -1,4 +1,4 @@
-"""Calibrations that come with the package, and estimators made of calibrations."""
+"""Calibrations that come with the package, and estimators built from calibrations."""
 
 from importlib import resources
 from pathlib import Path
@@ -15,7 +15,7 @@ DEFAULT = "ur5e_5kg"
 
 
 def available() -> tuple[str, ...]:
-    """Names of the calibrations that come with the package."""
+    """Return the names of the calibrations that come with the package."""
     files = resources.files(__name__).iterdir()
     return tuple(sorted(file.name.removesuffix(".json") for file in files if file.name.endswith(".json")))
 
@@ -24,11 +24,11 @@ def load(calibration: str | Path) -> Calibration:
     """Read and check a calibration.
 
     Args:
-        calibration: Name of one that comes with the package, or path of a file.
+        calibration: Name of a calibration that comes with the package, or path of a file.
 
     Raises:
-        CalibrationError: There is none, or it is wrong; the message names file and key.
-        UserFileError: It is no file with a text of that size, or is nested too deeply.
+        CalibrationError: The calibration does not exist or is invalid; the message names the file and the key.
+        UserFileError: The file is not text, too large or nested too deeply.
     """
     try:
         if isinstance(calibration, str) and calibration in available():
@@ -46,10 +46,10 @@ def load(calibration: str | Path) -> Calibration:
 
 
 def estimator_of(calibration: Calibration) -> Polynomial:
-    """The paper's estimator with a calibration's polynomials.
+    """Return the paper's estimator with a calibration's polynomials.
 
     Raises:
-        EstimatorError: There are none, or the polynomials' parts do not go together.
+        EstimatorError: The calibration has no polynomials, or their parts do not fit together.
     """
     if calibration.polynomial is None:
         raise EstimatorError("polynomial", None, "there; this calibration is for the estimator modal alone")
@@ -57,10 +57,10 @@ def estimator_of(calibration: Calibration) -> Polynomial:
 
 
 def fits(calibration: Calibration, payload: Payload, estimator: str = "polynomial") -> bool:
-    """Whether a calibration holds for this payload.
+    """Return whether a calibration is valid for a payload.
 
-    Its modal model holds for any. Polynomials hold for the one they were made with: within 2 % of mass and
-    10 mm of its centre.
+    A modal model is valid for any payload. Polynomials are valid for the payload they were made with, to within 2 %
+    of its mass and 10 mm of its centre.
     """
     if estimator == "modal" or calibration.polynomial is None:
         return True

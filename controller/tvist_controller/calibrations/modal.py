@@ -1,4 +1,4 @@
-"""Modes of an arm from its masses, the payload declared and what a calibration knows of springs and drives."""
+"""Modes of an arm, computed from its masses, the declared payload and a calibration's springs and drives."""
 
 from collections.abc import Callable, Sequence
 
@@ -17,25 +17,25 @@ from tvist_shaping.estimators.modal import Modal
 
 Floats = npt.NDArray[np.float64]
 MODES = 4
-"""Modes that are estimated where nothing else is asked."""
+"""Default number of estimated modes."""
 
 
 def modal_estimator(
     calibration: Calibration, description: RobotDescription, payload: Payload, modes: int = MODES
 ) -> Modal:
-    """The arm's modes with a payload: of the robot's file masses and geometry alone, never its springs or drives.
+    """Return an estimator of the arm's modes; of the robot file it uses masses and geometry, never springs or drives.
 
-    It takes under a millisecond, so that a payload can be declared between two ticks.
+    This takes less than a millisecond, so a payload can be declared between two ticks.
 
     Args:
         calibration: Calibration of this arm, with a modal model.
         description: The robot.
-        payload: What the arm is believed to carry.
+        payload: Payload that the arm is assumed to carry.
         modes: Number of modes, the lowest first.
 
     Raises:
-        EstimatorError: The calibration has no modal model, is of another arm, or does not say each parameter of each
-            joint once.
+        EstimatorError: The calibration has no modal model, belongs to another arm, or does not contain each parameter
+            of each joint exactly once.
     """
     if calibration.modal is None:
         wanted = "a model with tvist identify --model modal; this calibration has polynomials alone"
@@ -53,7 +53,7 @@ def modal_estimator(
 
 
 def mass_matrix(flexible: FlexibleModel) -> Callable[[Floats], Floats]:
-    """M(q) of the arm with straight links, in the coordinates of its joints and its bending, shape (L, L)."""
+    """M(q) of the arm with unbent links, in the coordinates of its joints and its bending, shape (L, L)."""
     data, coordinates = flexible.model.createData(), np.zeros(flexible.model.nv)
 
     def at(q: Floats) -> Floats:
@@ -66,16 +66,16 @@ def mass_matrix(flexible: FlexibleModel) -> Callable[[Floats], Floats]:
 def drivetrain(
     parameters: Sequence[ModalParameter], description: RobotDescription, flexible: FlexibleModel
 ) -> Drivetrain:
-    """Springs and drives in the order of the mass matrix.
+    """Return springs and drives in the order of the mass matrix.
 
     Raises:
-        EstimatorError: A parameter is missing, said twice, or of a joint or link that is not there.
+        EstimatorError: A parameter is missing, given twice, or belongs to a joint or link that does not exist.
     """
     size = flexible.model.nv
     links = description.link_flexibility.links
     stiffness = np.zeros(size)
     stiffness[flexible.joints] = _values(parameters, "gear_stiffness", range(description.joints))
-    # Two coordinates a link, about its y and z axes.
+    # Each link has two coordinates, about its y and z axes.
     stiffness[flexible.flexes] = np.repeat(_values(parameters, "bending_stiffness", links), 2)
     rotor_inertia, velocity_gain, position_gain = np.zeros((3, size))
     joints = range(description.joints)
@@ -93,7 +93,7 @@ def drivetrain(
 def _values(
     parameters: Sequence[ModalParameter], quantity: Quantity, places: range | tuple[int, ...]
 ) -> list[float]:
-    """A quantity of each joint or link."""
+    """Return a quantity of each joint or link."""
     said = [
         (place, parameter.value)
         for parameter in parameters

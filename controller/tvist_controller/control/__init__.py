@@ -1,1 +1,1 @@
-"""From shaped references to drive commands."""
+"""Conversion of shaped references into drive commands."""

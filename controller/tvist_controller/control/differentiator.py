@@ -11,7 +11,7 @@ Floats = npt.NDArray[np.float64]
 
 
 class Target(Struct, frozen=True, eq=False, gc=False):
-    """Shaped reference with its derivatives, all of one tick."""
+    """Shaped reference with its derivatives, all at the same tick."""
 
     q: Floats
     """q*, shape (n,) [rad]."""
@@ -22,14 +22,14 @@ class Target(Struct, frozen=True, eq=False, gc=False):
 
 
 def central_differences(references: Floats, period: float) -> tuple[Floats, Floats, Floats]:
-    """Positions, velocities and accelerations of references that are known, as `Differentiator` would make them.
+    """Positions, velocities and accelerations of known references, equal to the results of `Differentiator`.
 
     Args:
-        references: One a tick, shape (k + 2, n) [rad].
+        references: References, one for each tick, shape (k + 2, n) [rad].
         period: Tick [s].
 
     Returns:
-        All but the first and the last, and their derivatives, each of shape (k, n).
+        References except the first and the last, and their derivatives, each of shape (k, n).
     """
     qd: Floats = (references[2:] - references[:-2]) / (2.0 * period)
     qdd: Floats = np.diff(references, 2, axis=0) / period**2
@@ -39,7 +39,7 @@ def central_differences(references: Floats, period: float) -> tuple[Floats, Floa
 class Differentiator:
     """Central differences: q̇ᵢ = (qᵢ₊₁ - qᵢ₋₁)/2h and q̈ᵢ = (qᵢ₊₁ - 2qᵢ + qᵢ₋₁)/h².
 
-    All three refer to the same tick without a phase shift between them, which costs one tick of delay.
+    All three refer to the same tick, without a phase shift between them; this costs one tick of delay.
 
     Args:
         q: Position at rest to start from, shape (n,) [rad].
@@ -51,27 +51,27 @@ class Differentiator:
         self.reset(q)
 
     def reset(self, q: Floats) -> None:
-        """Start anew at rest."""
+        """Restart at rest."""
         self._before = self._middle = self._last = np.array(q, dtype=float)
 
     def fork(self) -> Self:
-        """An independent copy that goes on from here."""
+        """Return an independent copy of the present state."""
         return copy.copy(self)
 
     def update(self, q: Floats) -> Target:
-        """Take the reference of this tick; target of the tick before."""
+        """Take the reference of this tick and return the target of the previous tick."""
         before, middle = self._middle, self._last
         self._before, self._middle, self._last = before, middle, q
         return self._central(before, middle, q)
 
     @property
     def published(self) -> Target:
-        """State of motion a tick before the newest reference, where central differences are exact to h²."""
+        """State of motion one tick before the newest reference, where central differences are accurate to order h²."""
         return self._central(self._before, self._middle, self._last)
 
     def _central(self, before: Floats, middle: Floats, last: Floats) -> Target:
         h = self._period
-        # Differences of neighbours first: their rounding does not grow with the position.
+        # Take differences of neighbours first, so that rounding does not grow with the position.
         rise, fall = last - middle, middle - before
         return Target(q=middle, qd=(rise + fall) / (2.0 * h), qdd=(rise - fall) / (h * h))
 
@@ -82,14 +82,14 @@ class Differentiator:
 
     @property
     def newest(self) -> Target:
-        """State of motion at the newest reference, from it and the two before.
+        """State of motion at the newest reference, computed from the last three references.
 
         A motion continued from these derivatives has the second difference q̈ at its first tick.
         """
         return self._state(self._before, self._middle, self._last)
 
     def after(self, q: Floats) -> Target:
-        """What `newest` will be if this is the next reference."""
+        """Return what `newest` will be after this next reference."""
         return self._state(self._middle, self._last, q)
 
     def _state(self, before: Floats, middle: Floats, last: Floats) -> Target:

@@ -1,4 +1,4 @@
-"""Torques that the rigid arm needs for a motion."""
+"""Torques that a motion of the rigid arm needs."""
 
 import numpy as np
 import pinocchio as pin
@@ -8,19 +8,19 @@ from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, payload_inertia, rigid_model
 
 SLEW = 250
-"""Ticks in which another payload comes into force."""
+"""Ticks over which a new payload is phased in."""
 
 
 class InverseDynamics:
-    """Recursive Newton-Euler on the rigid model with the payload that was declared.
+    """Recursive Newton-Euler algorithm on the rigid model with the declared payload.
 
     Torque is linear in the ten inertial parameters of a body (mass, mass times centre of mass, inertia about the
-    joint), so another payload comes into force by a ramp between two sets of them: torque makes no step, and
-    everything in between is a body that could exist (Wensing, Kim and Slotine, 2018: such bodies are a convex set).
+    joint), so a new payload is phased in by a ramp between two sets of them. The torque then has no step, and every
+    set in between is a physically possible body (Wensing, Kim and Slotine, 2018: such bodies are a convex set).
 
     Args:
         description: The robot.
-        payload: What the controller believes the arm carries.
+        payload: Declared payload.
     """
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
@@ -35,7 +35,7 @@ class InverseDynamics:
         self.settle()
 
     def declare(self, payload: Payload) -> None:
-        """Change the payload; `advance` brings it into force."""
+        """Declare another payload, which `advance` phases in."""
         self.payload = payload
         self._before, self._after = self._present, self._bare
         if payload.mass > 0.0:
@@ -44,7 +44,7 @@ class InverseDynamics:
         self._ticks_left = SLEW
 
     def advance(self) -> None:
-        """One tick on the way to the payload declared last."""
+        """Advance the change to the latest declared payload by one tick."""
         if self._ticks_left == 0:
             return
         self._ticks_left -= 1
@@ -54,25 +54,25 @@ class InverseDynamics:
 
     @property
     def changing(self) -> bool:
-        """Whether one payload is giving way to another."""
+        """Whether a new payload is being phased in."""
         return self._ticks_left > 0
 
     @property
     def bodies(self) -> tuple[Floats, ...]:
-        """Inertial parameters of the last link that may be in force: two sets while one payload gives way to another.
+        """Possible inertial parameters of the last link: two sets while a new payload is being phased in, else one.
 
-        Each has shape (10,), as pinocchio orders them [kg, kg m, kg m^2].
+        Each has shape (10,), in pinocchio's order [kg, kg m, kg m^2].
         """
         return (self._before, self._after) if self.changing else (self._after,)
 
     def believe(self, bodies: tuple[Floats, ...]) -> None:
-        """Put other inertial parameters into force, as `bodies` gives them."""
+        """Use other inertial parameters at once, as `bodies` returns them."""
         self._before, self._after = bodies[0], bodies[-1]
         self._ticks_left = len(bodies) - 1
         self._load(self._after)
 
     def settle(self) -> None:
-        """Put the payload declared last into force at once."""
+        """Use the latest declared payload at once."""
         self._ticks_left = 0
         self._load(self._after)
 
@@ -103,7 +103,7 @@ class InverseDynamics:
         return np.array(pin.crba(self._model, self._data, q, pin.Convention.WORLD))
 
     def effort(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
-        """Largest |τ| whichever payload is right, shape (n,) [N m]: while one gives way to another, either may be."""
+        """Largest |τ| over all of `bodies`, shape (n,) [N m]: while a payload is phased in, either one may be right."""
         if self._ticks_left == 0:
             return np.abs(self.torque(q, qd, qdd))
         present, largest = self._present, np.zeros_like(q)
@@ -114,6 +114,6 @@ class InverseDynamics:
         return largest
 
     def _load(self, parameters: Floats) -> None:
-        """Give the last link with what it carries these inertial parameters, in place: a model takes long to build."""
+        """Set the inertial parameters of the last link with its payload in place, since building a model takes long."""
         self._present = parameters
         self._model.inertias[self._last] = pin.Inertia.FromDynamicParameters(parameters)

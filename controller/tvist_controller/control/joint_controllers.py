@@ -1,4 +1,4 @@
-"""What the drives are told: set-points with their feed-forward."""
+"""Commands to the drives: set-points with their feed-forward."""
 
 import numpy as np
 
@@ -8,12 +8,12 @@ from tvist_plant.drives import DriveCommand
 
 
 class JointControllers:
-    """Feed-forward of the drives; their feedback runs in the drives themselves.
+    """Feed-forward for the drives; their feedback control runs in the drives themselves.
 
-    - Torque: τ_ff = τ* + B q̈* + friction, the rotors' inertia and a share of Coulomb friction on top of the
-      rigid arm.
-    - Wind-up: a gear that transmits τ - g twists by (τ - g)/K_g. The motor is led by a share c_w of that, so
-      that the link is nearer to its reference; gravity's own twist is left, as the paper's robot reports
+    - Torque: τ_ff = τ* + B q̈* + friction; the rotors' inertia and a share of Coulomb friction are added to the
+      torque of the rigid arm.
+    - Wind-up: a gear that transmits τ - g twists by (τ - g)/K_g. The motor leads by a share c_w of that, so that the
+      link is closer to its reference. The twist by gravity itself is not compensated, since the paper's robot reports
       joint angles.
 
     Args:
@@ -34,7 +34,7 @@ class JointControllers:
         self._windup = np.zeros(description.joints)
 
     def reset(self) -> None:
-        """Start anew at rest."""
+        """Restart at rest."""
         self._windup = np.zeros_like(self._windup)
 
     def command(self, target: Target, torque: Floats, gravity: Floats) -> DriveCommand:
@@ -43,7 +43,7 @@ class JointControllers:
         Args:
             target: Shaped reference and its derivatives.
             torque: τ* of the rigid arm, shape (n,) [N m].
-            gravity: Its part that holds the arm, shape (n,) [N m].
+            gravity: The part of the torque that balances gravity, shape (n,) [N m].
         """
         windup = self._compliance * (torque - gravity)
         windup_speed = (windup - self._windup) / self._period

@@ -11,7 +11,7 @@ from tvist_plant.model import FLANGE, rigid_model
 
 
 class ForwardKinematics:
-    """Pose and speed of the rigid arm's tool centre point, which is its flange until `set_tool` says otherwise.
+    """Pose and speed of the rigid arm's tool centre point, which is the flange until `set_tool` changes it.
 
     Args:
         description: The robot.
@@ -24,13 +24,13 @@ class ForwardKinematics:
         self._tool: pin.SE3 | None = None
 
     def set_tool(self, offset: Sequence[float]) -> None:
-        """Say where the tool centre point is in the flange frame: x y z [m] and rotation vector [rad]."""
+        """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
         self._tool = None
         if any(offset):
             self._tool = pin.SE3(pin.exp3(np.array(offset[3:])), np.array(offset[:3]))
 
     def tool(self, q: Floats, qd: Floats) -> tuple[list[float], list[float]]:
-        """Pose and speed in the base frame.
+        """Return pose and speed in the base frame.
 
         Args:
             q: Joint positions, shape (n,) [rad].
@@ -51,5 +51,5 @@ class ForwardKinematics:
 
 
 def rotation_vector(rotation: Floats) -> list[float]:
-    """Rotation matrix, shape (3, 3), as rotation vector [rad]."""
+    """Convert a rotation matrix, shape (3, 3), to a rotation vector [rad]."""
     return list(np.asarray(pin.log3(rotation)).tolist())

@@ -1,4 +1,4 @@
-"""The shaped reference: what the filter gave, the joint positions that it stands for, and how both move."""
+"""The shaped reference: the filter's samples, the joint positions that they stand for, and their derivatives."""
 
 import copy
 from typing import Self
@@ -8,9 +8,9 @@ from tvist_shaping.base import Posture
 
 
 class ShapedReference:
-    """From samples of the filter to targets.
+    """Converts samples of the filter into targets.
 
-    Samples are joint positions, or the parameter of a path on which they are to stay.
+    Samples are joint positions, or the parameter of a path on which the joints have to stay.
 
     Args:
         q: Joint positions at rest to start from, shape (n,) [rad].
@@ -24,35 +24,35 @@ class ShapedReference:
         self.reset(q)
 
     def reset(self, q: Floats) -> None:
-        """Start anew at rest; samples are joint positions."""
+        """Restart at rest; from now on samples are joint positions."""
         self.joints.reset(q)
         self.enter(None, q)
 
     def enter(self, posture_of: Posture | None, sample: Floats) -> None:
-        """Take samples of another kind from now on; the joints go on where they are.
+        """Accept samples of another kind from now on; the joints continue from their present position.
 
         Args:
-            posture_of: From samples to joint positions; None: they are joint positions.
-            sample: Value at which the path's parameter rests, shape (m,) [rad].
+            posture_of: Converts samples to joint positions; None if they are joint positions.
+            sample: Initial value of the samples, at rest, shape (m,) [rad].
         """
         self.posture_of = posture_of
-        """From samples to joint positions; None: they are joint positions."""
+        """Converts samples to joint positions; None if they are joint positions."""
         self.along = self.joints if posture_of is None else Differentiator(sample, self._period)
-        """State of motion of the samples: without a path the joints' own."""
+        """State of motion of the samples; without a path it is that of the joints."""
 
     def posture(self, sample: Floats) -> Floats:
-        """Joint positions that a sample stands for, shape (n,) [rad]."""
+        """Return the joint positions that a sample stands for, shape (n,) [rad]."""
         return sample if self.posture_of is None else self.posture_of(sample)
 
     def update(self, sample: Floats) -> Target:
-        """Take the sample of this tick; target of the tick before."""
+        """Take the sample of this tick and return the target of the previous tick."""
         if self.posture_of is None:
             return self.joints.update(sample)
         self.along.update(sample)
         return self.joints.update(self.posture_of(sample))
 
     def fork(self) -> Self:
-        """An independent copy that goes on from here."""
+        """Return an independent copy of the present state."""
         other = copy.copy(self)
         other.joints = self.joints.fork()
         other.along = other.joints if self.posture_of is None else self.along.fork()

@@ -1,1 +1,1 @@
-"""What UR's interfaces tell of a robot beyond its state: computed from it, believable, without clock or I/O."""
+"""Values that UR's interfaces report beyond the robot's state, computed plausibly from it, without clock or I/O."""

@@ -1,4 +1,4 @@
-"""What the joints report: one entry each."""
+"""Values with one entry for each joint."""
 
 from functools import cached_property
 
@@ -6,7 +6,7 @@ from tvist_controller.instruments.ratings import BUS_VOLTAGE
 from tvist_controller.instruments.reading import Reading
 
 DEVIATION = 0.05
-"""Difference of measured and wanted angle that counts as 1 [rad]."""
+"""Difference between measured and target angle that counts as 1 [rad]."""
 
 
 class JointValues(Reading):

@@ -1,4 +1,4 @@
-"""What adds up over time: temperatures and energies."""
+"""Values that accumulate over time: temperatures and energies."""
 
 from math import exp
 
@@ -7,10 +7,10 @@ from tvist_plant.plant import PERIOD
 
 
 class Meters:
-    """Temperature of each joint, energy of all.
+    """Temperature of each joint, and energy of all joints.
 
     A joint is one body: τ dT/dt = T_ambient + R_th (P_standby + R i²) - T, solved exactly over each step with
-    its current held. Ticks that were not looked at count as one step with the current at its end.
+    constant current. Ticks that were skipped count as one step with the current at its end.
 
     Args:
         ratings: Ratings of each joint.
@@ -23,23 +23,23 @@ class Meters:
         self.temperatures = [AMBIENT] * len(ratings)
         """Temperatures of the joints [°C]."""
         self.power = 0.0
-        """Taken from the supply now [W]."""
+        """Power taken from the supply now [W]."""
         self.consumed = 0.0
         """Energy taken from the supply since the first tick [J]."""
         self.dissipated = 0.0
-        """Energy that braking gave back, and a resistor turned to heat [J]."""
+        """Energy returned by braking and dissipated in a resistor [J]."""
 
     def _over(self, seconds: float) -> list[float]:
-        """Share of its way that each temperature goes in that time."""
+        """Share of the way to its steady value that each temperature covers in this time."""
         return [1.0 - exp(-seconds / rating.thermal_time) for rating in self._ratings]
 
     def update(self, tick: int, current: list[float], mechanical: float, *, powered: bool) -> None:
-        """Count up to a tick.
+        """Advance to a tick.
 
         Args:
-            tick: Number of the control period; an earlier one, or the last one again, adds nothing.
+            tick: Number of the control period; one that is not later than the last adds nothing.
             current: Current of each joint's motor [A].
-            mechanical: Power the motors give to the arm, negative where they brake [W].
+            mechanical: Power that the motors deliver to the arm, negative while they brake [W].
             powered: Whether the arm has power.
         """
         standby = STANDBY if powered else 0.0

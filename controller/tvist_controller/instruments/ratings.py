@@ -1,12 +1,12 @@
-"""Electrical and thermal figures of the joints' drives: guesses of the right size, no measurements.
+"""Electrical and thermal ratings of the joints' drives: plausible guesses, not measurements.
 
-A robot's file says nothing of motors. There are two sizes of joint, told apart by the torque they may give, as
-in a UR5e, whose base, shoulder and elbow are of one size and whose wrist joints are of another.
+A robot file does not describe motors. There are two sizes of joint, distinguished by their largest torque, as in a
+UR5e, whose base, shoulder and elbow are of one size and whose wrist joints are of the other.
 
-Torque constants: currents that UR's own simulator shows at its start posture (2.14, 1.49, 0.23 A at shoulder, elbow
-and first wrist) over the gravity of this model of a UR5e there (21.1, 15.0, 1.8 N m): 9.9, 10.0 and 7.9 N m/A.
-Everything else is chosen: so that a joint that carries its rated load for long stays below 80 °C, within some
-twenty minutes.
+Torque constants: the currents that UR's own simulator shows in its start posture (2.14, 1.49 and 0.23 A at shoulder,
+elbow and first wrist), divided into this model's gravity torques of a UR5e in that posture (21.1, 15.0 and 1.8 N m),
+give 9.9, 10.0 and 7.9 N m/A. All other values are chosen so that a joint under its rated load stays below 80 °C, and
+settles within some twenty minutes.
 """
 
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ from dataclasses import dataclass
 from tvist_plant.description import RobotDescription
 
 BIG = 60.0
-"""A joint that may give more torque is a big one [N m]."""
+"""A joint with a larger torque limit is a big one [N m]."""
 AMBIENT = 25.0
-"""Temperature around the arm [°C]."""
+"""Ambient temperature [°C]."""
 BUS_VOLTAGE = 48.0
 """Voltage of the supply [V]."""
 STANDBY = 5.0
-"""What the electronics of a joint take as long as it has power [W]."""
+"""Power of a joint's electronics while it is on [W]."""
 
 
 @dataclass(frozen=True)
@@ -30,17 +30,17 @@ class JointRating:
     torque_constant: float
     """Torque on the joint's side over motor current [N m/A]."""
     resistance: float
-    """Heat of the motor over the square of its current [Ω]."""
+    """Heat of the motor divided by the square of its current [Ω]."""
     thermal_resistance: float
-    """Steady rise of temperature over heat [K/W]."""
+    """Steady rise of temperature divided by heat [K/W]."""
     thermal_time: float
-    """Time in which temperature comes to 63 % of its way [s]."""
+    """Time after which the temperature has covered 63 % of its way [s]."""
     torque: float
     """Largest torque [N m]."""
 
     @property
     def window(self) -> float:
-        """Current of a tenth of the largest torque [A]."""
+        """Current at a tenth of the largest torque [A]."""
         return 0.1 * self.torque / self.torque_constant
 
 

@@ -1,4 +1,4 @@
-"""What every value of a tick is read from."""
+"""Base of all values of a tick."""
 
 from typing import Any
 
@@ -17,14 +17,14 @@ POWERED = frozenset(range(RobotMode.POWER_ON, RobotMode.RUNNING + 1))
 class Reading:
     """One tick of one robot.
 
-    The docstring of each value below begins with where it is from: State and Io carry it, Computed says from
-    what, Constant says what stands in for something that is not simulated.
+    The docstring of each value in the derived classes begins with its source. State and Io: the message contains it.
+    Computed: what it is computed from. Constant: what stands for something that is not simulated.
 
     Args:
-        state: The tick.
+        state: State of the tick.
         io: Terminals and registers in force.
         rigid: The arm's mechanics, shared by all ticks.
-        wrench: What pushes its tool, shared likewise.
+        wrench: Computes the external force at the tool, shared by all ticks.
         ratings: Ratings of the joints.
         current: Currents of the motors [A].
         meters: Temperatures and energies at this tick.
@@ -43,13 +43,13 @@ class Reading:
         kept: dict[str, Any],
     ) -> None:
         self.state = state
-        """The tick as it was told."""
+        """State of the tick, as published."""
         self.io = io
-        """Terminals and registers as they were told."""
+        """Terminals and registers, as published."""
         self.shared: dict[str, Any] = {}
-        """What interfaces made of this tick, so that all their clients share it."""
+        """Data that interfaces derive from this tick and share among all clients."""
         self.kept = kept
-        """What interfaces keep from tick to tick."""
+        """Data that interfaces keep from tick to tick."""
         self._current = current
         self._temperatures = meters.temperatures
         self._power, self._consumed, self._dissipated = meters.power, meters.consumed, meters.dissipated
@@ -58,10 +58,10 @@ class Reading:
 
     @property
     def powered(self) -> bool:
-        """Whether the robot's mode is one with power."""
+        """Whether the arm has power in the present robot mode."""
         return self.state.robot_mode in POWERED
 
     @property
     def driven(self) -> bool:
-        """Whether the drives hold the arm, and no brake does."""
+        """Whether the drives hold the arm, with the brakes released."""
         return self.state.robot_mode == RUNNING

@@ -1,4 +1,4 @@
-"""Mechanics of the rigid arm with the payload that was declared, as the instruments need it."""
+"""Mechanics of the rigid arm with the declared payload, as the instruments need them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,33 +13,33 @@ from tvist_plant.model import FLANGE, Floats, payload_inertia, rigid_model
 from tvist_protocol.values import Payload
 
 ELBOW = 2
-"""The joint whose axis is the elbow."""
+"""Index of the joint whose axis is the elbow."""
 
 
 @dataclass(frozen=True)
 class Tool:
-    """How the tool centre point moves, in the base frame."""
+    """Motion of the tool centre point in the base frame."""
 
     pose: list[float]
     """x y z [m] and rotation vector [rad]."""
     speed: list[float]
-    """Linear [m/s] and angular [rad/s]."""
+    """Linear [m/s] and angular [rad/s] velocity."""
     acceleration: list[float]
-    """Linear [m/s²] and angular [rad/s²]."""
+    """Linear [m/s²] and angular [rad/s²] acceleration."""
 
 
 def add(a: list[float], b: list[float]) -> list[float]:
-    """Sum of two vectors: as lists, for numpy takes ten times as long for three numbers."""
+    """Sum of two vectors as lists; for three numbers, numpy takes ten times as long."""
     return [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 
 
 def cross(a: Sequence[float], b: Sequence[float]) -> list[float]:
-    """Product a × b, as lists too."""
+    """Cross product a × b, also as lists."""
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def carried(omega: list[float], alpha: list[float], arm: list[float]) -> list[float]:
-    """Acceleration of a body's point relative to another one, α × r + ω × (ω × r) [m/s²].
+    """Acceleration of one point of a body relative to another, α × r + ω × (ω × r) [m/s²].
 
     Args:
         omega: Angular velocity [rad/s].
@@ -50,7 +50,7 @@ def carried(omega: list[float], alpha: list[float], arm: list[float]) -> list[fl
 
 
 class RigidBody:
-    """The arm as a controller knows it.
+    """The arm as the controller models it.
 
     Args:
         description: The robot.
@@ -67,7 +67,7 @@ class RigidBody:
         self._elbow = ELBOW + 1 if description.joints > ELBOW else 0
 
     def tool(self, q: list[float], qd: list[float], qdd: list[float], offset: list[float]) -> Tool:
-        """Motion of the tool centre point.
+        """Compute the motion of the tool centre point.
 
         Args:
             q: Joint positions [rad].
@@ -95,12 +95,12 @@ class RigidBody:
         )
 
     def flange_rotation(self, q: list[float]) -> Floats:
-        """From flange to base, shape (3, 3)."""
+        """Rotation from the flange to the base frame, shape (3, 3)."""
         pin.framesForwardKinematics(self._model, self._data, np.array(q))
         return np.array(self._data.oMf[self._flange].rotation)
 
     def elbow(self, q: list[float], qd: list[float]) -> tuple[list[float], list[float]]:
-        """Position [m] and velocity [m/s] of the elbow's axis; of the flange where an arm has no elbow."""
+        """Position [m] and velocity [m/s] of the elbow's axis, or of the flange if the arm has no elbow."""
         model, data = self._model, self._data
         pin.forwardKinematics(model, data, np.array(q), np.array(qd))
         if self._elbow:
@@ -111,20 +111,20 @@ class RigidBody:
         return placement.translation.tolist(), velocity.linear.tolist()
 
     def momentum(self, q: list[float], qd: list[float], payload: Payload) -> float:
-        """|Σ m v| of the links and the payload [kg m/s]."""
+        """Magnitude of the momentum of the links and the payload, |Σ m v| [kg m/s]."""
         self._load(payload)
         momentum = pin.computeCentroidalMomentum(self._model, self._data, np.array(q), np.array(qd))
         return hypot(*momentum.linear.tolist())
 
     def base_wrench(self, q: list[float], qd: list[float], qdd: list[float], payload: Payload) -> list[float]:
-        """Force [N] and torque [N m] of the arm on its foot, base frame; without the foot's own weight."""
+        """Force [N] and torque [N m] of the arm on its base, base frame; without the base's own weight."""
         self._load(payload)
         pin.rnea(self._model, self._data, np.array(q), np.array(qd), np.array(qdd))
         wrench = -self._data.oMi[1].act(self._data.f[1]).vector
         return [float(value) for value in wrench]
 
     def _load(self, payload: Payload) -> None:
-        """Let the last link carry this payload."""
+        """Attach a payload to the last link."""
         if payload is self._payload or payload == self._payload:
             return
         self._payload, inertia = payload, self._bare

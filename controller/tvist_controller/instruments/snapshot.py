@@ -1,4 +1,4 @@
-"""One tick of a robot as UR's interfaces tell it, under RTDE's names."""
+"""One tick of a robot as UR's interfaces report it, under RTDE's names."""
 
 from typing import Any
 
@@ -17,11 +17,11 @@ from tvist_protocol.stream import State
 
 
 class Snapshot(StatusValues, JointValues, ToolValues, TerminalValues):
-    """Every output variable of RTDE is an attribute; what costs something is computed when first asked for."""
+    """Every output variable of RTDE is an attribute; expensive ones are computed on first access."""
 
 
 class Instruments:
-    """Reads a robot's values tick by tick; whoever reads less often gets coarser temperatures and energies.
+    """Reads a robot's values tick by tick; if ticks are skipped, temperatures and energies are less accurate.
 
     Args:
         description: The robot.
@@ -36,11 +36,11 @@ class Instruments:
         self._kept: dict[str, Any] = {}
 
     def snapshot(self, state: State, io: Io) -> Snapshot:
-        """Values of a tick.
+        """Return the values of a tick.
 
         Args:
-            state: The tick.
-            io: Terminals and registers in force at it.
+            state: State of the tick.
+            io: Terminals and registers at that tick.
         """
         mode, current, mechanical = state.robot_mode, self._idle, 0.0
         if mode == RUNNING:

@@ -7,13 +7,13 @@ from tvist_controller.instruments.reading import Reading
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 
 START: Final = 40.0
-"""Time of tick 0 at UR's interfaces: clients take a robot with a smaller one for one that boots [s]."""
+"""Time of tick 0 on UR's interfaces [s]; a smaller time makes clients believe that the robot is still booting."""
 JOINT_MODES: Final[dict[int, int]] = {
     RobotMode.RUNNING: 253,
     RobotMode.POWER_OFF: 239,
     RobotMode.BACKDRIVE: 238,
 }
-"""RTDE's numbers of a joint's mode; otherwise it idles."""
+"""RTDE's joint mode for each robot mode; in all others the joints idle."""
 JOINT_IDLE: Final = 255
 
 _STOPPED_BY_SAFETY = 1 << 10
@@ -38,7 +38,7 @@ _RUNNING: set[int] = {
 
 
 class StatusValues(Reading):
-    """How the controller and its arm are doing."""
+    """State of the controller and its arm."""
 
     @property
     def timestamp(self) -> float:

@@ -7,14 +7,14 @@ from tvist_controller.instruments.status import JOINT_IDLE, JOINT_MODES
 from tvist_protocol.io import BITS, NUMBERS
 
 CONFIGURABLE = 0xFF00
-"""Bits 8–15."""
+"""Bits 8–15, the configurable terminals."""
 
 _WORDS = re.compile(r"(input|output)_bit_registers(0_to_31|32_to_63)")
 _REGISTER = re.compile(r"(input|output)_(bit|int|double)_register_(0|[1-9]\d{0,2})")
 
 
 class TerminalValues(Reading):
-    """What stands on terminals and in registers.
+    """Values of terminals and registers.
 
     Registers are attributes too: `input_int_register_7`, `output_bit_register_64`, `output_bit_registers0_to_31`.
     """
@@ -150,7 +150,7 @@ class TerminalValues(Reading):
         return 0
 
     def __getattr__(self, name: str) -> bool | int | float:
-        """A register by RTDE's name."""
+        """Return a register by RTDE's name."""
         found = _WORDS.fullmatch(name)
         if found is not None:
             words: list[int] = getattr(self.io, f"{found[1]}_bit_register")

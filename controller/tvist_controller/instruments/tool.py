@@ -1,4 +1,4 @@
-"""What tool and payload do: poses, forces, momentum."""
+"""Values of tool and payload: poses, forces, momentum."""
 
 from functools import cached_property
 from math import sqrt
@@ -10,11 +10,11 @@ from tvist_controller.instruments.rigid_body import Tool, add, carried, cross
 from tvist_plant.model import Floats
 
 GRAVITY = 9.81
-"""Down the base's z axis [m/s²]."""
+"""Gravitational acceleration, along the base's negative z axis [m/s²]."""
 
 
 class ToolValues(Reading):
-    """Motion and forces in space. Base frame, unless said otherwise."""
+    """Motion and forces in Cartesian space, in the base frame unless stated otherwise."""
 
     @property
     def tcp_offset(self) -> list[float]:
@@ -175,7 +175,7 @@ class ToolValues(Reading):
 
     @cached_property
     def _felt(self) -> Floats:
-        """Torque of the surroundings on the joints: expected less measured, shape (n,) [N m]."""
+        """External torque on the joints: expected minus measured, shape (n,) [N m]."""
         return self._wrench.felt(self.state)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""The wrench at the tool: what pushes it, as the drives feel it."""
+"""The wrench at the tool: the external force and torque, estimated from the drives' torques."""
 
 from collections.abc import Sequence
 from math import sqrt
@@ -12,15 +12,15 @@ from tvist_protocol.modes import RobotMode
 from tvist_protocol.stream import State
 
 NEAR_SINGULAR = 0.01
-"""Manipulability √det(J Jᵀ) below which forces are damped; a UR5e has up to 0.11 [m³ with six joints]."""
+"""Manipulability √det(J Jᵀ) below which forces are damped; a UR5e reaches 0.11 [m³ with six joints]."""
 DAMPING = 0.08
-"""λ where the posture is singular [m, or -]."""
+"""λ₀, the damping factor at a singular posture [m, or -]."""
 RUNNING = int(RobotMode.RUNNING)
-"""The robot mode in which the drives hold the arm: a plain number, since it is asked often."""
+"""Robot mode in which the drives hold the arm, as a plain integer, since it is compared often."""
 
 
 class ToolWrench:
-    """Finds the force at the tool centre point that explains the measured torques.
+    """Estimates the force at the tool centre point that explains the measured torques.
 
     Args:
         description: The robot.
@@ -36,10 +36,10 @@ class ToolWrench:
         self._width, self._linear = drives.friction_width, drives.linear_friction
 
     def felt(self, state: State) -> Floats:
-        """Torque of the surroundings on the joints, shape (n,) [N m].
+        """Return the external torque on the joints, shape (n,) [N m].
 
-        The torque that drives give which follow their target, that of the rigid arm with the declared payload, of
-        rotors and of friction, less the measured one.
+        It is the torque of drives that follow their target (rigid arm with the declared payload, rotors and
+        friction), minus the measured torque.
         """
         if state.robot_mode != RUNNING:
             return np.zeros(len(state.actual_q))
@@ -49,19 +49,19 @@ class ToolWrench:
         return np.array(expected - np.array(state.actual_moment))
 
     def at_tool(self, q: Sequence[float], torque: Floats, offset: Sequence[float]) -> Floats:
-        """Force at the tool centre point that pushes the joints with such torques, shape (6,) [N, N m], base frame.
+        """Return the force at the tool centre point that causes these joint torques, shape (6,) [N, N m], base frame.
 
-        F with Jᵀ F = τ by damped least squares, F = J (Jᵀ J + λ² 1)⁻¹ τ, with λ = λ₀ (1 - w/w₀) where the
-        manipulability w is below w₀ (Nakamura and Hanafusa, 1986). What no joint feels is zero.
+        F with Jᵀ F = τ by damped least squares, F = J (Jᵀ J + λ² 1)⁻¹ τ, with λ = λ₀ (1 - w/w₀) if the manipulability
+        w is below w₀ (Nakamura and Hanafusa, 1986). Components that affect no joint are zero.
 
         Args:
             q: Joint positions [rad].
-            torque: Torque of the surroundings on the joints, shape (n,) [N m].
+            torque: External torque on the joints, shape (n,) [N m].
             offset: Tool centre point in the flange frame [m, rad].
         """
         jacobian = pin.computeFrameJacobian(
             self._model, self._data, np.array(q), self._flange, pin.LOCAL_WORLD_ALIGNED
-        ).reshape(6, -1)  # of an arm with one joint pinocchio makes a plain vector
+        ).reshape(6, -1)  # for an arm with one joint, pinocchio returns a one-dimensional array
         rotation = self._data.oMf[self._flange].rotation
         if any(offset[:3]):
             jacobian[:3] -= pin.skew(rotation @ np.array(offset[:3])) @ jacobian[3:]
@@ -76,10 +76,10 @@ class ToolWrench:
         return np.array(np.linalg.solve(square, jacobian @ torque))
 
     def of(self, state: State, offset: Sequence[float]) -> list[float]:
-        """Force and torque at the tool centre point in a tick, base frame [N, N m]; zero while the arm is braked.
+        """Return force and torque at the tool centre point in a tick, base frame [N, N m]; zero with the brakes on.
 
         Args:
-            state: The tick.
+            state: State of the tick.
             offset: Tool centre point in the flange frame: x y z [m] and rotation vector [rad].
         """
         if state.robot_mode != RUNNING:

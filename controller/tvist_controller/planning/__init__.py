@@ -1,1 +1,1 @@
-"""Moves and filters made of what they depend on and of nothing else, so that they can be made beside the tick."""
+"""Plans of moves and filters. They depend only on an explicit basis, so they can be made outside the tick."""

@@ -1,4 +1,4 @@
-"""What plans depend on, as it is between two ticks."""
+"""The state between two ticks that plans depend on."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from tvist_protocol.values import Payload
 
 
 class FilterBasis(NamedTuple):
-    """What another filter depends on."""
+    """The state that a new filter depends on."""
 
     name: str
     """Name of the present filter."""
@@ -21,28 +21,28 @@ class FilterBasis(NamedTuple):
     source: ModeSource
     """Source of the modes."""
     declared: Payload
-    """What the controller believes that the arm carries."""
+    """Declared payload."""
 
 
 class MotionBasis(Struct, frozen=True, eq=False, gc=False):
-    """What a point-to-point motion depends on; there is one only while such a motion may begin."""
+    """The state that a point-to-point motion depends on; it exists only while such a motion may begin."""
 
     q: Floats
-    """Joint angles at which the reference rests, shape (n,) [rad]."""
+    """Joint angles at which the reference is at rest, shape (n,) [rad]."""
     speed: float
-    """Share of the programmed speed that was set [-]."""
+    """Programmed speed fraction [-]."""
     slowest: float | None
-    """Velocity that reduced speed leaves [rad/s]; None where it is not reduced."""
+    """Velocity limit of reduced speed [rad/s]; None if the speed is not reduced."""
     excess: float
-    """By what share the filter may exceed the reference's acceleration, see `Filter.excess` [-]."""
+    """Share by which the filter may exceed the reference's acceleration, see `Filter.excess` [-]."""
     carried: Body
-    """What the collision model counts on."""
+    """Payload in the collision model."""
     bodies: tuple[Floats, ...]
-    """Inertial parameters of the last link that may be in force, see `InverseDynamics.bodies`."""
+    """Possible inertial parameters of the last link, see `InverseDynamics.bodies`."""
     filter: FilterBasis
 
     def agrees(self, other: "MotionBasis") -> bool:
-        """Whether what was planned on one holds on the other."""
+        """Return whether a plan made on one basis holds on the other."""
         return (
             np.array_equal(self.q, other.q)
             and (self.speed, self.slowest, self.excess) == (other.speed, other.slowest, other.excess)
@@ -54,8 +54,8 @@ class MotionBasis(Struct, frozen=True, eq=False, gc=False):
 
 
 class PlanBasis(NamedTuple):
-    """What any plan depends on."""
+    """The state that any plan depends on."""
 
     filter: FilterBasis
     motion: MotionBasis | None
-    """None while no point-to-point motion may begin."""
+    """Basis of a point-to-point motion; None while none may begin."""

@@ -1,4 +1,4 @@
-"""Filters by the names that clients give them."""
+"""Filters by the names that clients use."""
 
 import numpy as np
 
@@ -17,10 +17,10 @@ PlannedFilter = tuple[ModeSource, Filter]
 
 
 class FilterPlanner:
-    """Makes the filters of one robot.
+    """Creates the filters of one robot.
 
     Args:
-        setup: How the robot starts.
+        setup: Initial setup.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -28,7 +28,7 @@ class FilterPlanner:
         self._modal = modal_source(setup.description, setup.calibration)
 
     def first(self) -> PlannedFilter:
-        """The filter that the robot starts with. What is compiled when it is first used is compiled now.
+        """Return the robot's initial filter. Code that its first use would compile is compiled now.
 
         Raises:
             ValueError: There is no such shaper for this robot.
@@ -46,19 +46,19 @@ class FilterPlanner:
     def choose(
         self, name: str, modes: int, source: ModeSource, declared: Payload, where: str = "shaper"
     ) -> PlannedFilter:
-        """A filter by its name.
+        """Return a filter by name.
 
-        It has the estimator that was chosen, or the arm's own modal one where it takes that.
+        It uses the chosen estimator, or the arm's own modal estimator if the filter supports that.
 
         Args:
             name: Name of the filter.
             modes: Number of modes to suppress.
-            source: The estimator that was chosen.
-            declared: What the controller believes that the arm carries.
+            source: The chosen source of modes.
+            declared: Declared payload.
             where: Field that the name comes from.
 
         Raises:
-            RefusalError: There is none for this robot.
+            RefusalError: There is no such filter for this robot.
         """
         wanted = wanted_modes(name, modes, where, self._known)
         if wanted > source.most and self._modal is not None:
@@ -67,21 +67,21 @@ class FilterPlanner:
         return source, self._make(name, estimator, where)
 
     def estimate(self, command: SetEstimator, basis: FilterBasis) -> PlannedFilter:
-        """The present filter with modes from elsewhere.
+        """Return the present filter with modes from another source.
 
         Raises:
-            RefusalError: That is not possible.
+            RefusalError: The source does not work with this filter.
         """
         source = choose_source(command, self._setup)
         where = "f_d" if source.calibration is None else "calibration"
         return source, self._again(basis, source, basis.declared, where)
 
     def with_payload(self, payload: Payload, basis: FilterBasis) -> Filter | None:
-        """The present filter with the modes of the arm with another payload; None where they are not known."""
+        """Return the present filter with the modes for another payload; None if these are not known."""
         return self._again(basis, basis.source, payload, "mass") if basis.source.knows_payload else None
 
     def present(self, basis: FilterBasis) -> Filter:
-        """A filter like the present one, at rest at q = 0."""
+        """Return a filter like the present one, at rest at q = 0."""
         return self._again(basis, basis.source, basis.declared, "shaper")
 
     def _again(self, basis: FilterBasis, source: ModeSource, declared: Payload, where: str) -> Filter:

@@ -1,4 +1,4 @@
-"""Point-to-point motions, whether they are clear, and what torque they will take."""
+"""Planning of point-to-point motions, with checks for collisions and torque."""
 
 from dataclasses import dataclass, replace
 
@@ -20,9 +20,9 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
 
 LOOKS = 64
-"""Moments of a motion at which its torque is looked at before it is run ahead."""
+"""Number of moments of a motion at which the torque is checked before the motion is simulated."""
 BLUNTED = 1.05
-"""By how much the shaped motion's torque may be beyond that of the unshaped one, which it lags behind [-]."""
+"""Largest ratio of the shaped motion's torque to that of the unshaped motion, behind which it lags [-]."""
 
 
 @dataclass(frozen=True)
@@ -30,19 +30,19 @@ class PlannedMove:
     """A motion that may begin."""
 
     trajectory: PlannedMotion
-    """Its reference."""
+    """Trajectory of its reference."""
     velocity: float
-    """Limit that was asked for [rad/s]."""
+    """Requested velocity limit [rad/s]."""
     excess_of_torque: str | None
-    """By how much it will pass a limit of torque, in words; None where it will not."""
+    """By how much the motion will exceed a torque limit, in words; None if it will not."""
 
 
 class MovePlanner:
     """Plans the motions of one robot.
 
     Args:
-        setup: How the robot starts.
-        filters: Makes its filters.
+        setup: Initial setup.
+        filters: Creates its filters.
     """
 
     def __init__(self, setup: Setup, filters: FilterPlanner) -> None:
@@ -53,10 +53,10 @@ class MovePlanner:
         self._torque = np.array(setup.description.limits.torque)
 
     def move(self, command: MoveJ, basis: MotionBasis) -> PlannedMove:
-        """Plan a motion from rest, whose content was checked.
+        """Plan a motion from rest; the command's content has been checked.
 
         Raises:
-            RefusalError: There is no such motion, or something would meet on its way.
+            RefusalError: There is no such motion, or it would lead to a collision.
         """
         limits = MotionLimits(command.velocity, command.acceleration, command.jerk)
         return self.along(JointLine(basis.q, np.array(command.q, dtype=float)), limits, basis)
@@ -65,12 +65,12 @@ class MovePlanner:
         """Plan a motion along a path, from rest to rest.
 
         Args:
-            path: Path of the move; it begins where the reference is at rest.
-            limits: That every joint is to keep.
-            basis: What it depends on.
+            path: Path of the motion; it begins where the reference is at rest.
+            limits: Limits for every joint.
+            basis: State that the motion depends on.
 
         Raises:
-            RefusalError: There is no such motion, or something would meet on its way.
+            RefusalError: There is no such motion, or it would lead to a collision.
         """
         spared = replace(limits, acceleration=limits.acceleration * (1.0 - basis.excess))
         rate = rate_of(basis.speed, limits.velocity, basis.slowest)
@@ -110,12 +110,12 @@ class MovePlanner:
         )
 
     def _before_shaping(self, motion: PlannedMotion) -> Floats:
-        """Largest torques that the motion would take without a filter, shape (n,) [N m]."""
+        """Largest torques that the motion would need without a filter, shape (n,) [N m]."""
         most: Floats = np.max([self._dynamics.effort(*state) for state in motion.states(LOOKS)], axis=0)
         return most
 
     def _shaped(self, motion: PlannedMotion, basis: MotionBasis) -> Floats | None:
-        """References of the shaped motion, shape (k, n) [rad]; None where it lasts for too long to know."""
+        """References of the shaped motion, shape (k, n) [rad]; None if it lasts too long to simulate."""
         tvist = self._filters.present(basis.filter)
         path, shaped = motion.path, ShapedReference(basis.q, PERIOD)
         shaped.enter(path.posture_of, path.start)

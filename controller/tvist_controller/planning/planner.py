@@ -1,4 +1,4 @@
-"""Plans for the commands that take longer than a tick may wait."""
+"""Plans for commands that take longer than a tick can wait."""
 
 from dataclasses import dataclass
 
@@ -17,15 +17,15 @@ PLANNED = (c.MoveJ, c.SetShaper, c.SetEstimator, c.SetPayload, SimulationReset)
 
 @dataclass(frozen=True)
 class Plan:
-    """What a command will do, as long as what it was planned on holds."""
+    """The outcome of a command, valid while the state that it was planned on holds."""
 
     basis: FilterBasis | MotionBasis | None
-    """None: that no point-to-point motion may begin."""
+    """State that it was planned on; None if no point-to-point motion may begin."""
     found: PlannedMove | PlannedFilter | Filter | RefusalError | None
-    """What was planned, or why it cannot be; None where there is nothing to change."""
+    """What was planned, or why the command is refused; None if nothing has to change."""
 
     def holds(self, now: PlanBasis) -> bool:
-        """Whether what it was planned on is so now."""
+        """Return whether the plan is valid for the present state."""
         match self.basis:
             case None:
                 return now.motion is None
@@ -36,10 +36,10 @@ class Plan:
 
 
 class Planner:
-    """Plans for one robot. Equal commands on equal bases get equal plans: nothing is remembered.
+    """Plans for one robot. It keeps no state: equal commands on equal bases get equal plans.
 
     Args:
-        setup: How the robot starts.
+        setup: Initial setup.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -48,7 +48,7 @@ class Planner:
         self._moves = MovePlanner(setup, self.filters)
 
     def plan(self, command: c.Command, basis: PlanBasis) -> Plan:
-        """Plan a command; that it is refused is a plan, too."""
+        """Plan a command; a refusal is a plan, too."""
         on = basis.motion if isinstance(command, c.MoveJ) else basis.filter
         try:
             return Plan(on, self._find(command, basis))

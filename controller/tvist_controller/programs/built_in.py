@@ -1,4 +1,4 @@
-"""Programs that a person can load before there are any others: made of the robot's named poses."""
+"""Programs that can be loaded without any files, built from the robot's named poses."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -6,9 +6,9 @@ from typing import Final
 from tvist_plant.description import RobotDescription
 
 WAIT: Final = "wait_program.urp"
-"""It plays until somebody stops it: what a client needs that tries out play, pause and stop."""
+"""Plays until it is stopped, so that clients can try out play, pause and stop."""
 PAPER: Final = "paper.urp"
-"""Through the poses in order, and back."""
+"""Visits the poses in order, and returns the same way."""
 
 
 @dataclass(frozen=True)
@@ -16,13 +16,13 @@ class ProgramLine:
     """One line of a program."""
 
     pose: str
-    """Its name."""
+    """Name of the pose."""
     q: tuple[float, ...]
-    """[rad]."""
+    """Joint angles [rad]."""
 
 
 def built_in(description: RobotDescription) -> dict[str, tuple[ProgramLine, ...]]:
-    """Programs by the names of their files; one without moves waits until it is stopped."""
+    """Return the programs by file name; one without moves waits until it is stopped."""
     moves = [ProgramLine(name, tuple(q)) for name, q in description.poses.items()]
     programs: dict[str, tuple[ProgramLine, ...]] = {WAIT: ()}
     if moves:

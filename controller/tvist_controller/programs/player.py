@@ -1,4 +1,4 @@
-"""The program that is loaded, and how far it is."""
+"""The loaded program and its progress."""
 
 from collections.abc import Callable
 
@@ -15,22 +15,22 @@ from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
 
 _OWN_TOKEN = "program"  # noqa: S105  the lease was checked when the program was played
-"""Stands in the commands that a program makes, which are sent to nobody."""
+"""Token in the commands that a program generates, which are not sent to clients."""
 
 
 class ProgramPlayer:
-    """Carries out one program at a time, a line after the other, with the authority of whoever played it.
+    """Carries out one program at a time, line by line, with the rights of the client that played it.
 
-    Its motions are motions like any other: they have numbers and events, a client may pause them, and a stop of one
-    ends the program. A protective stop pauses the program: once it is unlocked, playing goes on with the line that
-    was stopped.
+    Its motions are ordinary motions: they have numbers and events, and a client may pause them; stopping one ends the
+    program. A protective stop pauses the program: after the stop is unlocked, playing resumes with the line that was
+    stopped.
 
     Args:
         description: The robot.
-        motion: What the robot is doing.
-        safety: What its safety system does.
-        move: Plans and starts a motion, and gives its number; raises `RefusalError`.
-        emit: Takes what happens.
+        motion: The robot's motion.
+        safety: The safety system's stops.
+        move: Plans and starts a motion, and returns its number; raises `RefusalError`.
+        emit: Emits events.
     """
 
     def __init__(
@@ -43,14 +43,14 @@ class ProgramPlayer:
     ) -> None:
         self._motion, self._safety, self._move, self._emit = motion, safety, move, emit
         self.known = built_in(description)
-        """What can be loaded, by name."""
+        """Programs that can be loaded, by name."""
         self.name: str | None = None
-        """The loaded program; None: none."""
+        """Name of the loaded program; None if there is none."""
         self.state: ProgramState = "STOPPED"
         self._next = 0
-        """Number of the line that is carried out, or comes next, from 0."""
+        """Index of the present line, or of the next one between two lines."""
         self._moving: int | None = None
-        """Number of the motion of that line."""
+        """Number of the present line's motion."""
         self.rows = (
             Row(ProgramLoad, self._load, lease="if named", changes_io=True),
             Row(ProgramPlay, self._play, changes_io=True),
@@ -60,17 +60,17 @@ class ProgramPlayer:
 
     @property
     def line(self) -> int:
-        """The line that is carried out, or comes next when it is played on, counted from 1; 0: none."""
+        """Present line, or the one with which playing would resume, counted from 1; 0 if there is none."""
         return 0 if self.state == "STOPPED" or self._next >= len(self._lines) else self._next + 1
 
     @property
     def progress(self) -> tuple[str | None, ProgramState, int]:
-        """What `io` tells of the program: its name, what it does, and its line."""
+        """Fields of the program in `io`: its name, its state and its line."""
         return self.name, self.state, self.line
 
     def advance(self) -> None:
-        """Begin the line that comes next, where it is its turn: first thing in every tick."""
-        # Between two lines a safeguard stop finds no motion to pause: the next line waits.
+        """Begin the next line if it is due; called first in every tick."""
+        # If a safeguard stop comes between two lines, there is no motion to pause, so the next line waits.
         if self.state != "PLAYING" or self._motion.safety.safeguard:
             return
         lines = self._lines
@@ -88,7 +88,7 @@ class ProgramPlayer:
             self.end()
 
     def hear(self, event: Event) -> None:
-        """Take note of what has happened to the robot."""
+        """Handle an event of the robot."""
         if event.kind == "protective_stop" and self.state != "STOPPED":
             self.state, self._moving = "PAUSED", None
         elif event.kind == "safety_stop" and event.category != 2:
@@ -98,16 +98,16 @@ class ProgramPlayer:
         elif event.kind == "motion_done":
             self._moving = None
             self._next += 1
-        # A protective stop follows a failure of the plant.
+        # A failure of the plant is followed by a protective stop, which pauses the program.
         elif event.kind == "motion_stopped" and event.code != "plant_failure":
             self.end()
 
     def end(self) -> None:
-        """End the program; what moves is left to others."""
+        """End the program without stopping its motion."""
         self.state, self._next, self._moving = "STOPPED", 0, None
 
     def stop_moving(self) -> None:
-        """End a program that moves the arm, also where its next motion has not begun: none begins after a stop."""
+        """End a program that moves the arm, even between two motions, so that none begins after a stop."""
         if self.state == "PLAYING" and self._lines:
             self.end()
 
@@ -140,7 +140,7 @@ class ProgramPlayer:
     def _pause(self, _: Call[ProgramPause]) -> None:
         if self.state != "PLAYING":
             raise RefusalError("wrong_mode", "", "no program is playing: there is nothing to pause")
-        # Between two lines nothing of the program moves: the next line then waits.
+        # Between two lines there is no motion to pause, so the next line waits.
         if self._moving is not None:
             self._motion.pause()
             self._safety.stay_paused()

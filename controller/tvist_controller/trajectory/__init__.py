@@ -1,4 +1,4 @@
-"""Where references come from: planned motions along paths, streams of set-points, stops."""
+"""Sources of references: planned motions along paths, streams of set-points, stops."""
 
 from tvist_controller.trajectory.base import Forecast, Rest, Trajectory
 from tvist_controller.trajectory.curve import Bends, Curve

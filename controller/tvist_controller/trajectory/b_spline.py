@@ -1,4 +1,4 @@
-"""Uniform B-splines: curves that keep the limits of the points they are made of."""
+"""Uniform B-splines, whose curves keep the limits that their control points keep."""
 
 from collections.abc import Sequence
 
@@ -6,14 +6,14 @@ from tvist_controller.trajectory.limits import Floats
 
 
 def linear(points: Sequence[Floats], u: float) -> tuple[Floats, Floats]:
-    """The straight line between the last two points; the slope is that of the parabola through the last three.
+    """Interpolate linearly between the last two points; the slope is that of the parabola through the last three.
 
     Args:
-        points: The last four, each of shape (n,).
-        u: Place between the last two, 0 < u ≤ 1; at 1 it is the last one to the bit [-].
+        points: The last four points, each of shape (n,).
+        u: Position between the last two points, 0 < u ≤ 1; at 1 the value is exactly the last point [-].
 
     Returns:
-        Value, and derivative by u.
+        Value, and derivative with respect to u.
     """
     before, last = points[2] - points[1], points[3] - points[2]
     value = points[3] if u == 1.0 else points[2] + u * last
@@ -21,22 +21,22 @@ def linear(points: Sequence[Floats], u: float) -> tuple[Floats, Floats]:
 
 
 def cubic(points: Sequence[Floats], u: float) -> tuple[Floats, Floats]:
-    """The uniform cubic B-spline between the middle two of four points.
+    """Evaluate the uniform cubic B-spline between the middle two of four points.
 
-    Its second derivative goes linearly from one second difference of the points to the next, and its third is
-    their third difference: a motion within limits of velocity, acceleration and jerk stays within. It passes the
-    points at the distance q''/6 towards the inside of the curve (de Boor 1978, ch. IX to XI).
+    Its second derivative varies linearly from one second difference of the points to the next, and its third
+    derivative is their third difference, so it keeps the points' limits of velocity, acceleration and jerk. The curve
+    passes the points at a distance of q''/6, on the inside of the bend (de Boor 1978, ch. IX to XI).
 
     Args:
-        points: Four, each of shape (n,).
-        u: Place between the second and the third, 0 < u ≤ 1 [-].
+        points: Four points, each of shape (n,).
+        u: Position between the second and the third point, 0 < u ≤ 1 [-].
 
     Returns:
-        Value, and derivative by u.
+        Value, and derivative with respect to u.
     """
     first, middle, last = points[1] - points[0], points[2] - points[1], points[3] - points[2]
     v = 1.0 - u
-    # By differences, so that equal points give their own value to the bit.
+    # Use differences, so that equal points give exactly their own value.
     inner = (1.0 + u * (3.0 + u * (3.0 - 2.0 * u))) / 6.0
     value = points[1] - (v**3 / 6.0) * first + inner * middle + (u**3 / 6.0) * last
     return value, 0.5 * v * v * first + (0.5 + u * v) * middle + 0.5 * u * u * last

@@ -1,4 +1,4 @@
-"""What every source of references is."""
+"""Base of all sources of references."""
 
 import copy
 from abc import ABC, abstractmethod
@@ -11,58 +11,58 @@ from tvist_controller.trajectory.path import Path
 
 @dataclass(frozen=True)
 class Forecast:
-    """What is known of a trajectory along a path without running it: how soon and how hard it will brake.
+    """How soon and how hard a trajectory along a path will brake, as far as is known without simulating it.
 
-    All of it is said of the path's parameter, which for a straight joint line is the posture.
+    All values refer to the path's parameter, which for a straight line in joint space is the posture.
     """
 
     path: Path
-    """The path that it goes along."""
+    """Path of the trajectory."""
     end: Floats
-    """Parameter where it ends if it is let go on, shape (m,) [rad]."""
+    """Parameter at its end if it is not interrupted, shape (m,) [rad]."""
     braking: float
-    """Largest deceleration to come, of the entry that goes farthest [rad/s^2]."""
+    """Largest future deceleration of the leading entry [rad/s^2]."""
     jerk: float
-    """Largest jerk to come, of that entry [rad/s^3]."""
+    """Largest future jerk of the leading entry [rad/s^3]."""
     steady: float
-    """Time for which it does not slow down yet [s]; 0 where that is not known."""
+    """Time before it begins to slow down [s]; 0 if that is not known."""
     turns: bool = False
-    """Whether it may turn back on its way."""
+    """Whether it may turn back on its path."""
 
 
 class Trajectory(ABC):
-    """A reference, one sample a tick: the parameter of its path, or where it has none the joint positions."""
+    """A reference with one sample for each tick: the parameter of its path, or joint positions if it has no path."""
 
     path: Path | None = None
-    """The path that it goes along; None where every joint goes by itself: in streams, and stops of every joint."""
+    """Path of the trajectory; None if all joints move independently, as in streams and in stops of each joint."""
     limits: MotionLimits | None = None
-    """What its samples keep; None: it bypasses the filter, or rests."""
+    """Limits that its samples keep; None if it bypasses the filter or is at rest."""
     acceleration: float = 0.0
     """Limit that every joint keeps in a stop [rad/s^2]; 0 for other trajectories."""
     foreseeable: bool = True
-    """Whether it can be run ahead; False: somebody leads it from outside."""
+    """Whether it can be simulated ahead; False if it depends on external input."""
 
     @abstractmethod
     def next(self) -> Floats:
-        """Sample of the next tick, shape (m,) or (n,) [rad]. Not to be written to."""
+        """Return the sample of the next tick, shape (m,) or (n,) [rad]. It must not be modified."""
 
     @property
     @abstractmethod
     def finished(self) -> bool:
-        """Whether the last sample was the final one: from now on it stays where it is."""
+        """Whether the last sample was the final one, after which all samples are equal."""
 
     @property
     def standing(self) -> bool:
-        """Whether it stays where it is until it is told otherwise: finished, or paused."""
+        """Whether its samples stay equal until a command comes: it is finished, or paused."""
         return self.finished
 
     @property
     def forecast(self) -> Forecast | None:
-        """What is known of its way; None where it has no path."""
+        """Forecast of its motion; None if it has no path."""
         return None
 
     def fork(self) -> Self:
-        """An independent copy that goes on from here, to see what this one is going to do."""
+        """Return an independent copy of the present state, to simulate this trajectory ahead."""
         return copy.copy(self)
 
 
@@ -77,10 +77,10 @@ class Rest(Trajectory):
         self._q = q
 
     def next(self) -> Floats:
-        """Return the position at which the arm stays."""
+        """Return the constant position."""
         return self._q
 
     @property
     def finished(self) -> bool:
-        """Always."""
+        """Always True."""
         return True

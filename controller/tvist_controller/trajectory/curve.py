@@ -1,4 +1,4 @@
-"""Paths that curve in joint space: what tool lines, arcs and blends are."""
+"""Paths that are curved in joint space, such as lines, arcs and blends of the tool."""
 
 from abc import abstractmethod
 from dataclasses import dataclass
@@ -9,40 +9,41 @@ from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.path import Path, Way
 
 CURVED_SHARE = 0.5
-"""Largest share of the joints' acceleration, and of their jerk, that the curve itself may take from a motion [-]."""
+"""Largest share of the joints' acceleration and jerk that the curve itself may use up during a motion [-]."""
 ROUNDING = 1e-9
-"""Share by which a slope of one may be exceeded [-]."""
+"""Largest error of a slope of 1 by rounding [-]."""
 
 
 @dataclass(frozen=True)
 class Bends:
-    """Upper bounds of a curve's derivatives by its parameter s [rad], all along it."""
+    """Upper bounds of a curve's derivatives with respect to its parameter s [rad], for the whole curve."""
 
     slope: Floats
     """|dq/ds| of each joint, shape (n,) [-]; none above 1."""
     second: float
-    """|d²q/ds²|, of any joint [1/rad]."""
+    """|d²q/ds²| of any joint [1/rad]."""
     third: float
-    """|d³q/ds³|, of any joint [1/rad^2]."""
+    """|d³q/ds³| of any joint [1/rad^2]."""
 
 
 class Curve(Path):
     """A path with one parameter s, from 0 to its length.
 
-    Interpolation may pass either end by a thousandth of a tick's way, so the curve has to go on smoothly beyond them.
+    Interpolation may pass either end by a thousandth of a tick's step, so the curve has to continue smoothly beyond
+    them.
 
     With ṡ, s̈ and s⃛ the joints have
 
         q̇ = q' ṡ,    q̈ = q' s̈ + q'' ṡ²,    q⃛ = q' s⃛ + 3 q'' ṡ s̈ + q''' ṡ³,
 
-    so bounds of the derivatives, and |q'| ≤ 1, turn limits of the joints into limits of s.
+    so bounds of the derivatives, and |q'| ≤ 1, convert limits of the joints into limits of s.
 
     Args:
         length: Value of s at the end [rad], above 0.
         bends: Bounds of the derivatives.
 
     Raises:
-        ValueError: A number is out of range.
+        ValueError: An argument is out of range.
     """
 
     def __init__(self, length: float, bends: Bends) -> None:
@@ -61,10 +62,10 @@ class Curve(Path):
 
     @abstractmethod
     def derivatives(self, s: Floats) -> tuple[Floats, Floats, Floats]:
-        """The curve at k places.
+        """Evaluate the curve at k points.
 
         Args:
-            s: Shape (k,) [rad].
+            s: Parameters, shape (k,) [rad].
 
         Returns:
             q [rad], dq/ds [-] and d²q/ds² [1/rad], each of shape (k, n).
@@ -75,14 +76,14 @@ class Curve(Path):
         return q
 
     def states(self, x: Floats, xd: Floats, xdd: Floats) -> tuple[Floats, Floats, Floats]:
-        """By the chain rule."""
+        """Return the joints' state of motion, by the chain rule."""
         q, slope, second = self.derivatives(x.reshape(-1))
         xd, xdd = xd.reshape(-1, 1), xdd.reshape(-1, 1)
         qd, qdd = slope * xd, slope * xdd + second * xd**2
         return (q[0], qd[0], qdd[0]) if x.ndim == 1 else (q, qd, qdd)
 
     def planned(self, limits: MotionLimits) -> MotionLimits:
-        """One velocity for the whole curve, at which its tightest bend takes no more than a share of the limits."""
+        """Return limits with one velocity for the whole curve; its tightest bend then uses a share of the limits."""
         second, third = max(self.bends.second, 1e-12), max(self.bends.third, 1e-12)
         velocity = min(
             limits.velocity,
@@ -95,7 +96,7 @@ class Curve(Path):
         return kept
 
     def keeping(self, limits: MotionLimits, velocity: float) -> MotionLimits | None:
-        """What the curve leaves at this velocity; no more acceleration than leaves a share of the jerk."""
+        """Return the limits that the curve leaves at this velocity; the acceleration leaves a share of the jerk."""
         second, third = self.bends.second, self.bends.third
         acceleration = limits.acceleration - second * velocity**2
         bent = CURVED_SHARE * limits.jerk - third * velocity**3
@@ -107,6 +108,6 @@ class Curve(Path):
         return MotionLimits(velocity, acceleration, jerk)
 
     def way(self, start: Floats, end: Floats) -> Way:
-        """The part of the curve between two of its places."""
+        """Return the part of the curve between two parameters."""
         along = end - start
         return Way(lambda share: self.posture(start + share * along), abs(float(along[0])) * self.bends.slope)

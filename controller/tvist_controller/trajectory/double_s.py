@@ -1,4 +1,4 @@
-"""The double-S time law: how the parameter of a path goes from rest to rest as soon as its limits let it."""
+"""The double-S time law, which moves a path's parameter from rest to rest as quickly as its limits permit."""
 
 import numpy as np
 import ruckig
@@ -7,15 +7,15 @@ from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 
 class DoubleS:
-    """Time-optimal from rest to rest within limits of velocity, acceleration and jerk, all entries in phase.
+    """Time-optimal motion from rest to rest within velocity, acceleration and jerk limits, all entries in phase.
 
-    The entry with the longest way sets the pace (Biagiotti and Melchiorri 2008, ch. 3.4). With the paper's limits of
-    1.5 rad/s, 2.0 rad/s² and 100 rad/s³ the acceleration ramps last 20 ms.
+    The entry with the longest way determines the duration (Biagiotti and Melchiorri 2008, ch. 3.4). With the paper's
+    limits of 1.5 rad/s, 2.0 rad/s² and 100 rad/s³, the acceleration ramps last 20 ms.
 
     Args:
-        start: Parameter where it begins, shape (m,) [rad].
-        end: Parameter where it ends, shape (m,) [rad].
-        limits: Limits of every entry.
+        start: Parameter at the start, shape (m,) [rad].
+        end: Parameter at the end, shape (m,) [rad].
+        limits: Limits for every entry.
 
     Raises:
         ValueError: There is no such motion within these limits, or it would last for hours.
@@ -32,7 +32,7 @@ class DoubleS:
         self._trajectory = ruckig.Trajectory(m)
         try:
             ruckig.Ruckig(m).calculate(request, self._trajectory)
-        except (ruckig.RuckigError, ValueError) as error:  # beyond 7600 s its result is one it cannot name
+        except (ruckig.RuckigError, ValueError) as error:  # ruckig's way to fail above 7600 s
             raise ValueError(
                 f"no motion goes from {start.tolist()} to {end.tolist()} in less than two hours within "
                 f"velocity {limits.velocity:g}, acceleration {limits.acceleration:g}, jerk {limits.jerk:g}"
@@ -40,13 +40,13 @@ class DoubleS:
         self.limits = limits
         """Limits that it keeps."""
         self.duration = float(self._trajectory.duration)
-        """From rest to rest [s]."""
-        # From rest to rest it is the same forwards and backwards: it brakes for as long as it accelerates.
+        """Duration from rest to rest [s]."""
+        # The motion from rest to rest is symmetric in time: it brakes for as long as it accelerates.
         leading = self._trajectory.profiles[0][int(np.argmax(np.abs(end - start)))]
         self.brakes_at = self.duration - sum(leading.t[:3])
-        """Until then it does not slow down [s]."""
+        """Time at which it begins to slow down [s]."""
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
-        """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], m numbers each."""
+        """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], with m numbers each."""
         position, velocity, acceleration = self._trajectory.at_time(time)[:3]
         return position, velocity, acceleration

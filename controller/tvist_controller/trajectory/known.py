@@ -1,4 +1,4 @@
-"""A reference whose positions are known beforehand."""
+"""A reference whose positions are known in advance."""
 
 from collections.abc import Sequence
 
@@ -7,10 +7,10 @@ from tvist_controller.trajectory.limits import Floats
 
 
 class Known(Trajectory):
-    """Positions, one a tick.
+    """A sequence of positions, one for each tick.
 
     Args:
-        positions: At least one, each of shape (n,) [rad]; the last is where it stays.
+        positions: At least one position, each of shape (n,) [rad]; the last one is kept.
         period: Tick [s].
     """
 
@@ -20,7 +20,7 @@ class Known(Trajectory):
 
     @property
     def duration(self) -> float:
-        """Until the last position [s]."""
+        """Time until the last position [s]."""
         return len(self._positions) * self._period
 
     @property
@@ -29,11 +29,11 @@ class Known(Trajectory):
         return self._positions[-1]
 
     def next(self) -> Floats:
-        """Position one tick further."""
+        """Return the next position."""
         self._ticks = min(self._ticks + 1, len(self._positions) - 1)
         return self._positions[self._ticks]
 
     @property
     def finished(self) -> bool:
-        """Whether it is at the last position."""
+        """Whether it has reached the last position."""
         return self._ticks == len(self._positions) - 1

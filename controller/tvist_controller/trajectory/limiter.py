@@ -1,4 +1,4 @@
-"""Keep a stream inside limits of velocity, acceleration, jerk and torque; leave it untouched where it already is."""
+"""Limiter of a stream's velocity, acceleration, jerk and torque; a stream within the limits passes unchanged."""
 
 import math
 from typing import Protocol
@@ -13,46 +13,47 @@ Bools = npt.NDArray[np.bool_]
 
 
 class TorqueRoom(Protocol):
-    """What the joints' torques leave to a motion."""
+    """The motion that the joints' torques permit."""
 
     def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
-        """Whether a state of motion needs no more torque than there is."""
+        """Return whether a state of motion keeps within the permitted torques."""
 
     def acceleration(self, q: Floats, qd: Floats) -> float:
-        """Largest acceleration that every joint may have at once, in any direction [rad/s^2]."""
+        """Largest acceleration that all joints may have at once, in any direction [rad/s^2]."""
 
 
 class Limiter:
-    """Follows a position signal exactly while that is within the limits; catches up time-optimally otherwise.
+    """Follows a position signal exactly while that is within the limits; otherwise catches up time-optimally.
 
-    Limits hold for the reference's first, second and third differences. A signal within them passes to the bit:
-    differences of a sampled motion are means of its derivatives, so what keeps the limits in continuous time keeps
-    them here. What would be fast enough to pass the velocity limit while its acceleration is taken back at the jerk
-    limit counts as too fast already; and one that could not come to rest inside the joint's range as too far.
+    The limits apply to the reference's first, second and third differences. A signal within the limits passes
+    unchanged to the last bit: differences of a sampled motion are means of its derivatives, so a motion that keeps
+    the limits in continuous time keeps them here. A signal counts as too fast if its velocity would exceed the limit
+    before the jerk limit lets its acceleration return to zero, and as too far if it could not come to rest inside the
+    joint's range.
 
-    Each joint by itself. A joint that is behind moves relative to the signal: to where that is, at the velocity
-    and acceleration it has there, so that a signal in motion is caught up with, too.
+    Each joint is limited independently. A joint that lags behind is controlled relative to the signal's position,
+    velocity and acceleration, so that it also catches up with a moving signal.
 
     Args:
         q: Position at rest to start from, shape (n,) [rad].
-        limits: For every joint.
+        limits: Limits for every joint.
         period: Tick [s].
-        reach: Joints' range either way, shape (n,) [rad]; None for no end.
-        torque: What torque leaves; None for enough.
+        reach: Largest position of each joint in either direction, shape (n,) [rad]; None for no limit.
+        torque: Motion that the torque permits; None for no limit.
     """
 
     TOLERANCE = 1e-6
-    """Share of a limit that rounding may exceed [-]."""
+    """Share by which rounding may exceed a limit [-]."""
     ROUNDING = 2e-15
-    """Error of a position's differences by the rounding of positions [rad]."""
+    """Error of differences by the rounding of positions [rad]."""
     ADVANTAGE = 0.001
-    """Share of the velocity limit by which one that is behind may always be faster than what it follows [-]."""
+    """Share of the velocity limit by which a joint that lags behind may always be faster than its signal [-]."""
     NEAR = 1e-4
-    """Way by which a signal that brakes may be overshot in any case [rad]."""
+    """Permitted overshoot of a signal that brakes [rad]."""
     HOPELESS = 0.95
-    """Share of a limit above which a signal is as good as at it [-]."""
+    """Share of a limit above which a signal counts as being at the limit [-]."""
     AUTHORITY = 0.001
-    """Share of the acceleration limit that is always left for catching up [-]."""
+    """Share of the acceleration limit that is reserved for catching up [-]."""
 
     def __init__(
         self,
@@ -69,13 +70,14 @@ class Limiter:
         self._torque = torque
         self.q = np.array(q, dtype=float)
         """Position of the reference, shape (n,) [rad]."""
-        # Velocity of the signal; differences of the reference, first, second, and second of the tick before.
+        # Velocity of the signal; first and second differences of the reference, and the second difference a tick
+        # earlier.
         self._signal_qd, self._step, self._bend, self._bend_before = np.zeros((4, n))
-        self._state: Floats | None = None  # derivatives, where they are not those of the differences
+        self._state: Floats | None = None  # derivatives, if they differ from those of the differences
         self._behind = np.zeros(n, dtype=bool)
         self.behind = 0.0
-        """Time by which joints are behind a signal that itself leaves nothing to catch up with [s]."""
-        # Inside this no state within the limits needs a look at the range.
+        """Time by which joints lag behind a signal that is at its limits, so that they cannot catch up [s]."""
+        # Within this position, no state within the limits needs a check of the range.
         ramp, swing = limits.acceleration / limits.jerk, limits.velocity / limits.acceleration
         lasting = max(swing + ramp, 2.0 * math.sqrt(limits.velocity / limits.jerk))
         self._inner = float(self._reach.min()) - 2.0 * limits.velocity * (ramp + lasting)
@@ -95,18 +97,18 @@ class Limiter:
 
     @property
     def limited(self) -> bool:
-        """Whether the reference is not where the signal is."""
+        """Whether the reference differs from the signal."""
         return bool(self._behind.any())
 
     def follow(self, q: Floats, qd: Floats) -> Floats:
-        """One tick towards a position that itself moves.
+        """Advance by one tick towards a moving position.
 
         Args:
             q: Position of the signal, shape (n,) [rad].
-            qd: How fast it moves there, shape (n,) [rad/s].
+            qd: Velocity of the signal, shape (n,) [rad/s].
 
         Returns:
-            Where the reference is, shape (n,) [rad].
+            Position of the reference, shape (n,) [rad].
         """
         step = q - self.q
         bend = step - self._step
@@ -143,16 +145,16 @@ class Limiter:
         return self._torque is None or self._torque.allows(q, step / h, bend / (h * h))
 
     def _passed(self, q: Floats, step: Floats, bend: Floats, bend_before: Floats | None = None) -> Floats:
-        """State, shape (3, n), on the signal: derivatives of the cubic through the last four positions."""
+        """State, shape (3, n), of joints on the signal: derivatives of the cubic through the last four positions."""
         h, limit = self._period, self._limits.acceleration
         change = bend - (self._bend if bend_before is None else bend_before)
         mean = bend / (h * h)
-        # The acceleration's mean was within the limit; where it has got to by now is within it, too.
+        # The mean acceleration was within the limit, so the present one is clamped to the limit as well.
         qdd = np.clip(mean + change / (h * h), np.minimum(mean, -limit), np.maximum(mean, limit))
         return np.stack((q, step / h + h * (mean / 6.0 + qdd / 3.0), qdd))
 
     def _fits(self, step: Floats, bend: Floats) -> Bools:
-        """Return which joints' differences are within the limits, and can stay so."""
+        """Return which joints' differences are within the limits and can stay there."""
         fastest, hardest, harshest = self._most
         size, turn = np.abs(step), np.abs(bend)
         fits: Bools = size <= fastest
@@ -160,11 +162,12 @@ class Limiter:
         fits &= np.abs(bend - self._bend) <= harshest
         jerk = self._limits.jerk * self._period**3
         if (size + turn * turn * (0.5 / jerk)).max() > fastest:
-            # Velocity when the acceleration, less a tick's worth of jerk each tick, has come to nothing.
+            # Velocity at the time when the acceleration, reduced by a tick's worth of jerk per tick, has reached
+            # zero.
             ticks = np.floor(turn / jerk)
             towards = step * np.sign(bend) + ticks * (turn - 0.5 * jerk * (ticks + 1.0))
             fits &= towards <= fastest + self.TOLERANCE * turn
-            # Where it still rises, the same from what it has come to by now: it goes on from there when held back.
+            # If the acceleration is rising, check its present value as well, since limiting would start from that.
             rise = (bend - self._bend) * np.sign(bend)
             now = turn + rise
             reached = step * np.sign(bend) + turn / 6.0 + now / 3.0 + now * now * (0.5 / jerk)
@@ -172,7 +175,7 @@ class Limiter:
         return fits
 
     def _meets(self, qd: Floats, step: Floats, bend: Floats) -> Bools:
-        """Return which joints, put onto the signal now, can continue with it inside the limits."""
+        """Return which joints, if placed on the signal now, can continue on it within the limits."""
         h, limits = self._period, self._limits
         signal = self._signal_acceleration(qd, limits.acceleration)
         following = (qd - step / h) / h + 0.5 * signal  # second difference at the next tick
@@ -187,7 +190,8 @@ class Limiter:
         sign = np.sign(qd)
         speed, rise = np.abs(qd), sign * qdd
         ramp = np.abs(rise) / jerk
-        # The shortest stop from no acceleration, and the way from there to here or from here to there.
+        # The shortest stop from zero acceleration, plus the way from here to its start, or minus the way from there
+        # to here.
         top = speed + 0.5 * jerk * ramp**2
         gentle = top < limits.acceleration**2 / jerk
         swing = top / limits.acceleration + limits.acceleration / jerk
@@ -214,7 +218,7 @@ class Limiter:
         return clipped
 
     def _held_back(self, q: Floats, qd: Floats, passed: Floats, fits: Bools) -> tuple[Floats, Bools]:
-        """State, shape (3, n), where not all that fits passes, and which joints do."""
+        """State, shape (3, n), if not all joints pass unchanged, and which joints do."""
         limits, limit = self._limits, self._limits.acceleration
         if self._torque is not None:
             limit = min(limit, self._torque.acceleration(*self.state[:2]))
@@ -237,7 +241,7 @@ class Limiter:
         return state, fits
 
     def _catch_up(self, q: Floats, qd: Floats, limit: float, fits: Bools) -> Floats:
-        """State, shape (3, n), after a tick of the way onto a signal that goes on with its acceleration."""
+        """State, shape (3, n), one tick on the way to a signal that continues with its present acceleration."""
         request, limits, h = self._catch_request, self._limits, self._period
         fastest = (1.0 - self.ADVANTAGE) * limits.velocity
         present = self.state
@@ -247,7 +251,7 @@ class Limiter:
         request.current_position = (present[0] - (q - h * (qd - 0.5 * h * qdd))).tolist()
         request.current_velocity = (present[1] - (qd - h * qdd)).tolist()
         request.current_acceleration = (present[2] - qdd).tolist()
-        # If the signal brakes as hard as it may, the way that is gained by then is no longer than that behind.
+        # Gain no more on the signal than the lag, even if the signal brakes as hard as permitted.
         closing = (np.abs(q - self.q) + self.NEAR) * limits.acceleration / np.maximum(np.abs(qd), 1e-9)
         request.max_velocity = np.minimum(limits.velocity - qd, closing).tolist()
         request.min_velocity = np.maximum(-limits.velocity - qd, -closing).tolist()
@@ -259,7 +263,7 @@ class Limiter:
         return np.stack((q, qd, qdd)) + relative
 
     def _change_to(self, qd: Floats, limit: float) -> Floats:
-        """State, shape (3, n), after a tick of the shortest way to a velocity."""
+        """State, shape (3, n), one tick on the shortest way to a velocity."""
         request, h = self._brake_request, self._period
         present = self.state
         request.current_position, request.current_velocity = present[0].tolist(), present[1].tolist()
@@ -273,9 +277,9 @@ class Limiter:
 
 
 def _after_a_tick(generator: ruckig.Ruckig, request: ruckig.InputParameter) -> Floats | None:
-    """State, shape (3, n), one tick further; None where no way can be computed."""
+    """State, shape (3, n), one tick later; None if ruckig finds no trajectory."""
     result = ruckig.OutputParameter(request.degrees_of_freedom)
-    generator.reset()  # or it would take a state that has come back for one that it knows the future of
+    generator.reset()  # otherwise ruckig would continue an old trajectory if its state happens to recur
     try:
         if generator.update(request, result) < 0:
             return None

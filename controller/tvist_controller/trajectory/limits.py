@@ -10,11 +10,11 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """One number each, for every joint or for a path's parameter."""
+    """Limits that apply to each joint, or to each entry of a path's parameter."""
 
     velocity: float
-    """[rad/s]."""
+    """Velocity limit [rad/s]."""
     acceleration: float
-    """[rad/s^2]."""
+    """Acceleration limit [rad/s^2]."""
     jerk: float
-    """[rad/s^3]."""
+    """Jerk limit [rad/s^3]."""

@@ -1,4 +1,4 @@
-"""Planned motions: a time law along a path, with a rate at which their time goes."""
+"""Planned motions: a time law along a path, whose time passes at an adjustable rate."""
 
 import copy
 from collections.abc import Iterator
@@ -13,41 +13,41 @@ from tvist_controller.trajectory.pace import Pace
 from tvist_controller.trajectory.path import Path
 
 LOOK_AHEAD = 2.0
-"""Ticks by which the path is looked ahead of when its pace changes."""
+"""Ticks that a change of the pace looks ahead on the path."""
 
 LONGEST_LOOK = 1500
-"""Ticks for which a motion is compared with its pause: one that lasts longer is not about to end."""
+"""Ticks over which a motion is compared with its pause; a motion that lasts longer is not about to end."""
 SOONER = 25
-"""Ticks by which a pause must be over sooner than the motion, to be worth it."""
+"""Ticks by which a pause must come to rest sooner than the motion to be worthwhile."""
 
 SURELY = 0.12
-"""So long before the motion brakes, and as much more as it lasts longer, a pause is sooner for certain [s]."""
+"""If the motion begins to brake later than this plus the pause's extra time, the pause is certainly sooner [s]."""
 
 
 class TimeLaw(Protocol):
-    """How the parameter of a path goes in time, from rest at its start to rest at its end; it never turns back."""
+    """Time law of a path's parameter, from rest at its start to rest at its end; it never turns back."""
 
     limits: MotionLimits
-    """What every entry of the parameter keeps."""
+    """Limits for every entry of the parameter."""
     duration: float
-    """From rest to rest [s]."""
+    """Duration from rest to rest [s]."""
     brakes_at: float
-    """Until then it does not slow down [s]."""
+    """Time at which it begins to slow down [s]."""
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
-        """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], m numbers each."""
+        """Parameter [rad], its velocity [rad/s] and its acceleration [rad/s^2] at a time [s], with m numbers each."""
 
 
 class PlannedMotion(Trajectory):
     """A planned motion from rest to rest.
 
-    Its samples are the path's parameter: of a straight joint line the joint positions.
+    Its samples are the path's parameter; for a straight line in joint space these are the joint positions.
 
     Args:
         path: Path of the motion.
-        law: When it is where; from the path's start to its end.
+        law: Time law, from the path's start to its end.
         period: Tick [s].
-        speed: Rate of its time against the clock's to start with [-].
+        speed: Initial rate of its time relative to the clock's [-].
     """
 
     path: Path
@@ -57,20 +57,20 @@ class PlannedMotion(Trajectory):
         self.path, self._law, self._period = path, law, period
         self.limits = law.limits
         self.duration = law.duration
-        """From rest to rest at full speed [s]."""
+        """Duration from rest to rest at full speed [s]."""
         self.speed = speed
-        """Rate that its time is to go at, 0 to 1 [-]."""
+        """Target of the rate of its time, 0 to 1 [-]."""
         self._pace = Pace(law.limits, period, speed)
-        # Time on the path: whole ticks at an even rate since the rate last changed, so that nothing adds up.
+        # Time on the path, as whole ticks since the rate last changed, so that rounding errors do not add up.
         self._since, self._ticks = 0.0, 0
 
     @property
     def share(self) -> float:
-        """How much of its way is done, 0 to 1 [-]."""
+        """Completed share of its way, 0 to 1 [-]."""
         return 1.0 if self.finished else self._share_at(self.time)
 
     def time_at(self, share: float) -> float:
-        """When a share of the way, 0 to 1, is behind it at full speed [s]."""
+        """Time at full speed at which a share of the way, 0 to 1, is completed [s]."""
         early, late = 0.0, self.duration
         for _ in range(40):
             middle = 0.5 * (early + late)
@@ -84,17 +84,17 @@ class PlannedMotion(Trajectory):
         return (now[leading] - start[leading]) / way if way != 0.0 else 1.0
 
     def states(self, count: int) -> Iterator[tuple[Floats, Floats, Floats]]:
-        """Position, velocity and acceleration of the joints at some moments of the whole motion at full speed.
+        """Iterate over the joints' states at evenly spaced times of the whole motion at full speed.
 
         Args:
-            count: Number of states; each has three arrays of shape (n,).
+            count: Number of states; each has position, velocity and acceleration, arrays of shape (n,).
         """
         for time in np.linspace(0.0, self.duration, count).tolist():
             x, xd, xdd = (np.array(values) for values in self._law.at(time))
             yield self.path.states(x, xd, xdd)
 
     def next(self) -> Floats:
-        """Parameter one tick further; the path's end exactly from the first tick at or after the end."""
+        """Advance by one tick and return the parameter, which is exactly the path's end from the end time on."""
         if self.steady:
             self._ticks += 1
         else:
@@ -109,7 +109,7 @@ class PlannedMotion(Trajectory):
 
     @property
     def rate(self) -> float:
-        """Rate at which its time goes [-]."""
+        """Present rate of its time [-]."""
         return self._pace.rate
 
     @property
@@ -119,7 +119,7 @@ class PlannedMotion(Trajectory):
 
     @property
     def forecast(self) -> Forecast:
-        """Its way; how soon it brakes is known where its rate does not change."""
+        """Forecast of its motion; the time of braking is known only while its rate is constant."""
         time, rate = self.time, self._pace.rate
         known = rate > 0.0 and self.steady
         return Forecast(
@@ -132,21 +132,22 @@ class PlannedMotion(Trajectory):
 
     @property
     def steady(self) -> bool:
-        """Whether its rate is what it is to be."""
+        """Whether its rate has reached the target."""
         return self._pace.steady(self.speed)
 
     @property
     def velocity(self) -> float:
-        """Current velocity of the parameter's entry that goes farthest [rad/s]."""
+        """Present velocity of the leading entry of the parameter [rad/s]."""
         return float(np.abs(self._law.at(self.time)[1]).max()) * self._pace.rate
 
     def hold(self, acceleration: float) -> bool:
-        """Pause, where that lets it stand noticeably sooner than if it were let go on.
+        """Pause the motion, if it then stands noticeably sooner than by continuing.
 
-        Near its end there is hardly any acceleration left to pause with: a pause would only draw the end out.
+        Near the end hardly any acceleration is left for a pause, which would only draw the end out.
 
         Args:
-            acceleration: Limit for every entry of the parameter while it slows down, no more than its own [rad/s^2].
+            acceleration: Limit for every entry of the parameter while slowing down, at most the motion's own
+                [rad/s^2].
 
         Returns:
             Whether it pauses.
@@ -156,41 +157,41 @@ class PlannedMotion(Trajectory):
         most, forecast = self.limits.acceleration, self.forecast
         longer = self.velocity * (1.0 / acceleration - 1.0 / most) + 2.0 * most / self.limits.jerk
         if forecast.steady == 0.0 and self.rate == 1.0 and self.steady:
-            return False  # it brakes as hard as it may
+            return False  # it brakes as hard as it can
         if forecast.steady < longer + SURELY and not _stands_sooner(paused, self.fork()):
             return False
         self.speed, self._pace.acceleration = 0.0, acceleration
         return True
 
     def release(self, speed: float) -> None:
-        """Go on after a pause, at a rate [-]."""
+        """Resume after a pause, at a rate [-]."""
         self.speed, self._pace.acceleration = speed, self.limits.acceleration
 
     def fork(self) -> Self:
-        """An independent copy that goes on from here, with a pace of its own."""
+        """Return an independent copy of the present state, with a pace of its own."""
         other = copy.copy(self)
         other._pace = self._pace.fork()  # noqa: SLF001  one of its own kind
         return other
 
     @property
     def time(self) -> float:
-        """How much of it has passed, at full speed [s]."""
+        """Elapsed time of the motion, at full speed [s]."""
         return self._since + self._ticks * self._pace.rate * self._period
 
     @property
     def finished(self) -> bool:
-        """Whether the end was reached."""
+        """Whether it has reached its end."""
         return self.time >= self.duration
 
 
 def quickest_motion(path: Path, limits: MotionLimits, period: float, speed: float = 1.0) -> PlannedMotion:
-    """The motion along a path from rest to rest that a double S makes of limits.
+    """Return the double-S motion along a path from rest to rest within limits.
 
     Args:
         path: Path of the motion.
-        limits: That every joint is to keep.
+        limits: Limits for every joint.
         period: Tick [s].
-        speed: Rate of its time against the clock's to start with [-].
+        speed: Initial rate of its time relative to the clock's [-].
 
     Raises:
         ValueError: There is no such motion within these limits, or it would last for hours.
@@ -199,7 +200,7 @@ def quickest_motion(path: Path, limits: MotionLimits, period: float, speed: floa
 
 
 def _stands_sooner(paused: PlannedMotion, free: PlannedMotion) -> bool:
-    """Whether the one stands noticeably sooner than the other, and is at no tick further on its way."""
+    """Return whether the paused motion stands noticeably sooner than the free one, and is never ahead of it."""
     for _ in range(LONGEST_LOOK):
         if paused.standing or free.standing:
             break

@@ -1,4 +1,4 @@
-"""How fast a trajectory's own time passes: the speed slider, pause and resume."""
+"""Rate at which a trajectory's own time passes: speed slider, pause and resume."""
 
 import copy
 from collections.abc import Sequence
@@ -10,26 +10,27 @@ import ruckig
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 QUICKEST = 20.0
-"""Largest change of the rate in a second [1/s]: from standstill to full speed in a twentieth."""
+"""Largest change of the rate per second [1/s]: from standstill to full speed takes at least 1/20 s."""
 
 
 class Pace:
-    """Rate r of a trajectory's time against the clock's, 0 to 1, changed without leaving the limits.
+    """Rate r of a trajectory's time relative to the clock's, 0 to 1, whose changes keep the limits of the motion.
 
-    Along a path q(s) with ṡ = r the acceleration is q̈ = q'' r² + q' ṙ. So ṙ may be anything with |q̈| within the
-    limit of every joint: near the limits a motion is neither slowed nor hurried until its own curve leaves room.
-    The rate goes to its target time-optimally inside that room, its own jerk limited (ruckig).
+    Along a path q(s) with ṡ = r the acceleration is q̈ = q'' r² + q' ṙ. So ṙ may have any value that keeps |q̈|
+    within the limit of every joint; near the limits a motion is neither slowed down nor sped up until its own curve
+    leaves room. The rate approaches its target time-optimally within that room, with limited jerk of its own
+    (ruckig).
 
     Args:
-        limits: Limits of the motion, for every joint.
+        limits: Limits for every joint.
         period: Tick [s].
-        rate: To start with [-].
+        rate: Initial rate [-].
     """
 
     def __init__(self, limits: MotionLimits, period: float, rate: float) -> None:
         self._limits, self._period = limits, period
         self.acceleration = limits.acceleration
-        """Limit for every joint [rad/s^2]: the motion's, or less."""
+        """Acceleration limit for every joint [rad/s^2]: the motion's, or less."""
         self.rate, self._slope = rate, 0.0
         self._open()
 
@@ -39,25 +40,25 @@ class Pace:
         self._request.control_interface = ruckig.ControlInterface.Velocity
 
     def fork(self) -> Self:
-        """An independent copy that goes on from here."""
+        """Return an independent copy of the present state."""
         other = copy.copy(self)
         other._open()  # noqa: SLF001  one of its own kind
         return other
 
     def steady(self, target: float) -> bool:
-        """Whether the rate is at its target and stays there."""
+        """Return whether the rate has reached its target and stays there."""
         return self.rate == target and self._slope == 0.0
 
     def advance(self, target: float, curve: Sequence[Floats]) -> float:
-        """Time that passes on the path in this tick [s].
+        """Advance by one tick and return the time that passes on the path [s].
 
         Args:
-            target: Rate to go to [-].
-            curve: q' [rad/s] and q'' [rad/s^2] at the present point of the path and at the points just ahead, each
-                of shape (2, n): the rate must suit them all, since a tick is not infinitely short.
+            target: Target of the rate [-].
+            curve: q' [rad/s] and q'' [rad/s^2] at the present point of the path and at the points just ahead, each of
+                shape (2, n). The rate must suit all of them, since a tick has a finite length.
         """
         rooms = [self._room(qd, qdd) for qd, qdd in curve]
-        # A sliver of room either way: ruckig wants limits on both sides of zero.
+        # ruckig requires limits on both sides of zero, so leave a little room in both directions.
         lowest = min(max(room[0] for room in rooms), -1e-3)
         highest = max(min(room[1] for room in rooms), 1e-3)
         request = self._request
@@ -75,7 +76,7 @@ class Pace:
         return max(float(self._result.new_position[0]), 0.0)
 
     def _room(self, qd: Floats, qdd: Floats) -> tuple[float, float]:
-        """Lowest and highest ṙ that keep every joint inside its acceleration [1/s]."""
+        """Lowest and highest ṙ that keep every joint within its acceleration [1/s]."""
         lowest, highest = -QUICKEST, QUICKEST
         own = qdd * self.rate**2
         for velocity, acceleration in zip(qd.tolist(), own.tolist(), strict=True):

@@ -1,4 +1,4 @@
-"""To rest on a path, never leaving it."""
+"""Stops that stay on a path."""
 
 import math
 
@@ -13,24 +13,24 @@ from tvist_controller.trajectory.path import Path
 class PathStop(Trajectory):
     """Shortest stop along a path within limits of acceleration and jerk of its parameter.
 
-    Its samples are the parameter: so it stays on the path, and on a straight joint line all joints in phase.
-    Nothing that comes to rest on the same path from the same state, within the same limits and without turning
-    back, is slower at any moment or rests sooner: there the acceleration is the lowest there is until it has to be
-    taken back. So a stop that is at least as hard as anything the motion itself would have done never gets ahead of
-    the motion.
+    Its samples are the parameter, so it stays on the path; on a straight line in joint space, all joints stay in
+    phase. No other motion on the same path, from the same state and within the same limits, that does not turn back
+    is slower at any moment or comes to rest sooner: the stop always has the lowest possible acceleration, until the
+    acceleration has to return to zero. A stop that brakes at least as hard as the motion would ever have done is
+    therefore never ahead of the motion.
 
-    Its first step brakes already, by as much jerk as it may: the second difference b of the positions last played
-    becomes b - jerk·h, and the state of motion that it goes on from is that of central differences with this step.
-    What hardly moves, so that the limits let it stand at once, does.
+    It brakes from its first step with full jerk: the second difference b of the positions played last becomes b -
+    jerk·h, and the stop continues from the state of motion that central differences give with this step. If the
+    motion is so slow that the limits let it stand at once, it does.
 
     Args:
         path: Path of the stop.
         x: Newest sample, shape (m,) [rad].
-        step: By which it is ahead of the one before, along the path's direction, shape (m,) [rad].
-        xdd: Second difference of the last three, likewise, shape (m,) [rad/s^2].
-        acceleration: Limit that the joints keep in it [rad/s^2].
-        braking: Limit for the parameter's acceleration, with which they do [rad/s^2].
-        jerk: Limit for the parameter's jerk [rad/s^3].
+        step: Difference from the previous sample, along the path's direction, shape (m,) [rad].
+        xdd: Second difference of the last three samples, in the same direction, shape (m,) [rad/s^2].
+        acceleration: Acceleration limit for the joints [rad/s^2].
+        braking: Corresponding acceleration limit for the parameter [rad/s^2].
+        jerk: Jerk limit for the parameter [rad/s^3].
         period: Tick [s].
     """
 
@@ -50,20 +50,20 @@ class PathStop(Trajectory):
     ) -> None:
         self.path, self._origin = path, x
         self.acceleration = acceleration
-        """Limit that the joints keep [rad/s^2]."""
+        """Acceleration limit for the joints [rad/s^2]."""
         self.braking = braking
-        """Limit that the parameter keeps [rad/s^2]."""
+        """Acceleration limit for the parameter [rad/s^2]."""
         self.jerk = jerk
-        """Limit that the parameter keeps [rad/s^3]."""
+        """Jerk limit for the parameter [rad/s^3]."""
         before = path.forwards(xdd)
         most, present = jerk * period, max(path.forwards(step) / period, 0.0)
-        # The hardest from which the velocity still comes to nothing without turning back.
+        # The hardest braking from which the velocity can still reach zero without turning back.
         turning = jerk * (0.5 * period - math.sqrt(0.25 * period**2 + 2.0 * present / jerk))
         gentle = before > -braking
         bend = max(before - most, -braking, turning) if gentle else min(before + most, -braking)
         goes_on = -jerk if bend > -braking else 0.0
         speed = present + 0.5 * period * bend - period * period * goes_on / 6.0
-        halt = -present / period  # the second difference if the next step is none
+        halt = -present / period  # the second difference if the next step is zero
         if abs(halt - before) <= most and halt >= -braking:
             speed = bend = 0.0
         request = ruckig.InputParameter(1)
@@ -79,18 +79,18 @@ class PathStop(Trajectory):
 
     @property
     def duration(self) -> float:
-        """From its beginning until it rests [s]."""
+        """Time from its start until rest [s]."""
         return float(self._trajectory.duration)
 
     def share(self, time: float) -> float:
-        """How far forwards the parameter has come at a time after the beginning [rad]."""
+        """Distance that the parameter has covered at a time after the start [rad]."""
         return float(self._trajectory.at_time(min(time, self.duration))[0][0])
 
     def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration of the joints at k moments after the beginning.
+        """Position, velocity and acceleration of the joints at k times after the start.
 
         Args:
-            times: Shape (k,) [s].
+            times: Times, shape (k,) [s].
 
         Returns:
             Three arrays of shape (k, n).
@@ -101,18 +101,18 @@ class PathStop(Trajectory):
         return self.path.states(self._origin + x, xd, xdd)
 
     def next(self) -> Floats:
-        """Parameter one tick further."""
+        """Advance by one tick and return the parameter."""
         self._ticks += 1
         return self._at(self._ticks * self._period)
 
     @property
     def finished(self) -> bool:
-        """Whether it rests."""
+        """Whether it has come to rest."""
         return self._ticks * self._period >= self.duration
 
     @property
     def forecast(self) -> Forecast:
-        """Its way: it brakes from the beginning."""
+        """Forecast of its motion, which brakes from the start."""
         return Forecast(self.path, self._at(self.duration), self.braking, self.jerk, 0.0)
 
     @property

@@ -1,4 +1,4 @@
-"""When set-points are played: late enough for those that come late."""
+"""Timing of a stream: set-points are played late enough for late ones to arrive."""
 
 import math
 from collections import deque
@@ -6,37 +6,37 @@ from collections import deque
 from tvist_controller.trajectory.limits import MotionLimits
 
 WINDOW = 128
-"""Set-points over which lateness is remembered, in four parts."""
+"""Number of set-points over which lateness is observed, in four parts."""
 MAX_PERIODS, MAX_SECONDS = 2.0, 0.02
-"""Longest wait for set-points later than the earliest: the larger of the two."""
+"""Longest wait for late set-points, relative to the earliest; the larger of the two applies."""
 SPARE = 1
-"""Periods that a stream slower than the tick is waited for in any case, so that it may begin with jitter [-]."""
+"""Periods that a stream slower than the tick is delayed in any case, so that it may begin with jitter [-]."""
 SLACK = 0.3
-"""Wait longer than needed that is put up with, so that it need not change all the time [periods]."""
+"""Unnecessary delay that is tolerated, so that the delay need not change all the time [periods]."""
 SHARE = 0.05
-"""Share of the limits that changing the delay may take up [-]."""
+"""Share of the limits that a change of the delay may use [-]."""
 CALM = 0.5
-"""Time without need after which a delay that the limits made necessary is given up [s]."""
+"""Time after which a delay that the limits made necessary is reduced, if it is no longer needed [s]."""
 SLOW = 0.05
-"""Share of the velocity limit below which it is [-]."""
+"""Share of the velocity limit below which the stream must be for that [-]."""
 CLOSE = 1e-6
-"""Distance at which the delay counts as the wanted one [ticks]."""
+"""Difference below which the delay counts as equal to its target [ticks]."""
 
 
 class PlayOut:
-    """The position in a stream that is played at each tick, in sequence numbers.
+    """Position in a stream that is played at each tick, in sequence numbers.
 
-    The sender's clock is not ours, and the way here takes what it takes. Lateness of set-point k is the tick before
-    which it arrived less k periods. Play-out waits for the latest of the last ones, but not by much more than the
-    earliest needs; so jitter is waited out, a clock that is slow or fast is followed, and a break is not waited
-    for. The delay goes to where it should be through three lags in a row, which cannot overshoot: with q' the stream's
-    velocity, and D the delay, q̈ has a part -q' D̈. The lags' time constant keeps this, and what it does to jerk, to a
-    share of the limits; at rest it is nothing.
+    The sender's clock differs from ours, and the transport delay varies. The lateness of set-point k is the tick
+    before which it arrived, minus k periods. Play-out waits for the latest of the recent set-points, but not much
+    longer than the earliest needs. So it compensates jitter, follows a clock that is slow or fast, and does not wait
+    for a gap. The delay approaches its target through three first-order lags in series, which cannot overshoot. With
+    q' the stream's velocity and D the delay, q̈ contains a term -q' D̈. The lags' time constant limits this term, and
+    the corresponding one in jerk, to a share of the limits; at rest the time constant is zero.
 
     Args:
-        first: Set-point to play next; it has just come.
+        first: Set-point to play next; it has just arrived.
         look_ahead: Periods between the position and the newest set-point it needs [-].
-        ticks: Ticks in a period of the stream, at least one [-].
+        ticks: Ticks per period of the stream, at least one [-].
         limits: Limits of the stream.
         period: Tick [s].
     """
@@ -56,17 +56,17 @@ class PlayOut:
 
     @property
     def delay(self) -> float:
-        """Between a set-point that comes as early as any, and when its position is reached [ticks]."""
+        """Time from the arrival of the earliest set-points until their position is reached [ticks]."""
         return self._lags[2] - self._earliest
 
     @property
     def position(self) -> tuple[int, float]:
-        """An exact origin and the play-out position from there [sequence numbers]."""
-        # Rounded, so that it meets whole numbers where it should.
+        """An integer origin and the play-out position relative to it [sequence numbers]."""
+        # Rounded, so that it is exactly an integer where it should be.
         return self._origin, round((self._now - self._lags[2]) / self._ticks, 9)
 
     def breaks(self, sequence: int) -> bool:
-        """Whether a set-point that arrived before the coming tick is far from when it was to be expected."""
+        """Return whether a set-point that arrived before the coming tick is far from its expected time."""
         return abs(self._lateness(sequence) - self._earliest) > self._most
 
     def _lateness(self, sequence: int) -> float:
@@ -77,10 +77,10 @@ class PlayOut:
         return min(part[0] for part in (self._part, *self._parts))
 
     def hear(self, sequence: int) -> None:
-        """Learn from a set-point that arrived before the coming tick."""
+        """Take note of a set-point that arrived before the coming tick."""
         lateness = self._lateness(sequence)
         if lateness - self._earliest > self._most:
-            return  # a straggler: it is not waited for
+            return  # too late to wait for
         self._part = (min(self._part[0], lateness), max(self._part[1], lateness))
         self._count += 1
         if self._count >= WINDOW // 4:
@@ -92,11 +92,11 @@ class PlayOut:
             self._wanted = wanted
 
     def advance(self, speed: float, behind: float) -> None:
-        """Go on by a tick.
+        """Advance by one tick.
 
         Args:
-            speed: The fastest joint's in the stream [rad/s].
-            behind: Time by which the reference stays behind the stream without hope of catching up [s].
+            speed: Velocity of the fastest joint in the stream [rad/s].
+            behind: Time by which the reference lags behind the stream, if it cannot catch up [s].
         """
         self._now += 1
         delay = self._lags[2]
@@ -124,5 +124,5 @@ class PlayOut:
 
     @property
     def rate(self) -> float:
-        """Set-points played in a tick, at present [-]."""
+        """Set-points played per tick, at present [-]."""
         return (1.0 - self._rate) / self._ticks

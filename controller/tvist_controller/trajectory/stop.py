@@ -1,4 +1,4 @@
-"""From any state of motion straight to rest."""
+"""Stops from any state of motion, with independent joints."""
 
 import numpy as np
 import ruckig
@@ -8,7 +8,7 @@ from tvist_controller.trajectory.limits import Floats
 
 
 class JointStop(Trajectory):
-    """Shortest stop inside limits of acceleration and jerk; every joint stops as soon as it can.
+    """Shortest stop within limits of acceleration and jerk; every joint stops as soon as it can.
 
     Args:
         q: Position, shape (n,) [rad].
@@ -33,15 +33,15 @@ class JointStop(Trajectory):
         self._trajectory = ruckig.Trajectory(n)
         ruckig.Ruckig(n).calculate(request, self._trajectory)
         self.acceleration = acceleration
-        """Limit that it keeps [rad/s^2]."""
+        """Acceleration limit [rad/s^2]."""
         self.jerk = jerk
-        """Limit that it keeps [rad/s^3]."""
+        """Jerk limit [rad/s^3]."""
         self._period = period
         self._ticks = 0
 
     @property
     def duration(self) -> float:
-        """Until every joint rests [s]."""
+        """Time until every joint is at rest [s]."""
         return float(self._trajectory.duration)
 
     def at(self, time: float) -> tuple[Floats, Floats, Floats]:
@@ -50,7 +50,7 @@ class JointStop(Trajectory):
         return np.array(position), np.array(velocity), np.array(acceleration)
 
     def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
-        """Evaluate `at` at k moments, shape (k,) [s]; each result has shape (k, n)."""
+        """Evaluate `at` at k times, shape (k,) [s]; each result has shape (k, n)."""
         duration, at_time = self.duration, self._trajectory.at_time
         states = [at_time(min(time, duration)) for time in times.tolist()]
         position, velocity, acceleration = (
@@ -64,16 +64,16 @@ class JointStop(Trajectory):
         return self.at(self.duration)[0]
 
     def next(self) -> Floats:
-        """Position one tick further."""
+        """Advance by one tick and return the position."""
         self._ticks += 1
         return self.at(self._ticks * self._period)[0]
 
     @property
     def velocity(self) -> Floats:
-        """At the last reference, shape (n,) [rad/s]."""
+        """Velocity at the last reference, shape (n,) [rad/s]."""
         return self.at(self._ticks * self._period)[1]
 
     @property
     def finished(self) -> bool:
-        """Whether every joint rests."""
+        """Whether every joint is at rest."""
         return self._ticks * self._period >= self.duration

@@ -1,4 +1,4 @@
-"""Set-points from a client, played out by their sequence numbers."""
+"""Set-points from a client, played in the order of their sequence numbers."""
 
 import math
 from collections import deque
@@ -13,27 +13,27 @@ from tvist_controller.trajectory.play_out import PlayOut
 from tvist_controller.trajectory.stop import JointStop
 
 BRIDGED = 2
-"""Set-points in a row that are made up where none came."""
+"""Largest number of consecutive missing set-points that are extrapolated."""
 
 
 class SetpointStream(Trajectory):
-    """A reference made of a client's set-points.
+    """A reference generated from a client's set-points.
 
-    At the controller's own rate set-points pass straight through. Slower ones are the control points of a cubic
-    B-spline, which keeps the limits that they keep: it needs two periods, and a third is spare for jitter, so it is
-    three periods less a tick late. Where they come later, or by another clock, play-out waits as long as it has
-    to (`PlayOut`). One that is missing when its turn
-    comes is made up, of the parabola through its neighbours; where none come at all, the reference comes to rest
-    inside the limits until the stream goes on. After a break, and where the sender runs ahead, the newest wins.
-    Whatever comes of it goes through the `Limiter`.
+    At the controller's own rate, set-points pass through unchanged. Slower ones are the control points of a cubic
+    B-spline, which keeps the limits that they keep. The spline needs two periods, and a third is spare for jitter, so
+    the reference is three periods minus a tick late. If set-points arrive later, or by another clock, play-out waits
+    as long as necessary (`PlayOut`). A set-point that is missing when it is due is replaced by a point on the
+    parabola through its neighbours. If no set-points arrive at all, the reference comes to rest within the limits
+    until the stream continues. After a gap, and if the sender runs ahead, play-out continues with the newest
+    set-point. The result passes through the `Limiter`.
 
     Args:
-        q: Joint angles at which the arm rests, shape (n,) [rad].
+        q: Joint angles at which the arm is at rest, shape (n,) [rad].
         stream_period: Time between set-points, at least a tick [s].
         limits: Limits of velocity, acceleration and jerk, for every joint.
         period: Tick [s].
-        reach: Joints' range either way, shape (n,) [rad]; None for no end.
-        torque: What torque leaves to acceleration; None for enough.
+        reach: Largest position of each joint in either direction, shape (n,) [rad]; None for no limit.
+        torque: Motion that the torque permits; None for no limit.
     """
 
     limits: MotionLimits
@@ -61,27 +61,27 @@ class SetpointStream(Trajectory):
         self._play_out: PlayOut | None = None
         self._waiting: dict[int, Floats] = {}
         self._heard: list[int] = []
-        # The last four points of the curve, and the number of the newest: once there they stay what they are.
+        # The last four points of the curve, which no longer change, and the number of the newest.
         self._points: deque[Floats] = deque([self._rest] * 4, maxlen=4)
         self._head = 0
-        # The last three set-points that really came, with their numbers.
+        # The last three set-points that were received, with their numbers.
         self._real: deque[tuple[int, Floats]] = deque(maxlen=3)
         self._speed = 0.0
         self._pause: JointStop | None = None
         self.sequence: int | None = None
-        """Newest set-point that was taken in; the reference gets there by the delay later."""
+        """Number of the newest accepted set-point; the reference reaches it after the delay."""
         self.late = 0
-        """Set-points that came too late to be played, or twice."""
+        """Number of set-points that were too late to be played, or duplicates."""
         self.lost = 0
-        """Sequence numbers that were passed over; a gap counts for no more than `MAX_WAITING`."""
+        """Number of sequence numbers that were skipped; a gap counts as at most `MAX_WAITING`."""
         self.limited = 0
-        """Ticks in which the reference could not be where the set-points were."""
+        """Number of ticks in which the limits kept the reference from following the set-points."""
 
     MAX_WAITING = 1000
-    """Set-points that may wait for their play-out."""
+    """Largest number of set-points that may wait for their play-out."""
 
     def offer(self, sequence: int, q: Floats) -> bool:
-        """Take a set-point; False where it comes too late to be played, or the room to wait is full."""
+        """Take a set-point; return False if it is too late to be played, or too many are waiting."""
         known = bool(self._real) and sequence <= self._real[-1][0]
         if known or sequence in self._waiting or len(self._waiting) >= self.MAX_WAITING:
             self.late += 1
@@ -91,7 +91,7 @@ class SetpointStream(Trajectory):
         return True
 
     def next(self) -> Floats:
-        """Reference of the next tick."""
+        """Return the reference of the next tick."""
         if self._play_out is not None:
             self._play_out.advance(self._speed, self._limiter.behind)
         if self._heard:
@@ -105,7 +105,7 @@ class SetpointStream(Trajectory):
 
     @property
     def finished(self) -> bool:
-        """Never by itself: it is ended from outside."""
+        """Always False, since a stream is ended from outside."""
         return False
 
     @property
@@ -115,23 +115,23 @@ class SetpointStream(Trajectory):
 
     @property
     def delay(self) -> float:
-        """Between a set-point that comes as early as any, and when the curve has got there [s]."""
+        """Time from the arrival of the earliest set-points until the curve reaches them [s]."""
         return 0.0 if self._play_out is None else self._play_out.delay * self._period
 
     def _receive(self) -> None:
-        """Take in what arrived since the last tick."""
+        """Take over the set-points that arrived since the last tick."""
         play_out, newest = self._play_out, max(self._waiting)
         self.sequence = newest
         if play_out is None:
             play_out = self._begin(min(self._waiting))
         if newest in self._heard and play_out.breaks(newest):
-            # A break, or a sender ahead of its own clock: the newest wins from here.
+            # After a gap, or if the sender is ahead of its own clock, continue with the newest.
             play_out = self._restart(newest)
         for sequence in self._heard:
             play_out.hear(sequence)
         self._heard.clear()
         for sequence in sorted(number for number in self._waiting if number <= self._head):
-            # It was made up meanwhile; but what is made up next had better know it.
+            # It was replaced meanwhile, but later replacements should take it into account.
             self._keep(sequence, self._waiting.pop(sequence))
             self.late += 1
 
@@ -141,7 +141,7 @@ class SetpointStream(Trajectory):
         return self._play_from(first)
 
     def _restart(self, newest: int) -> PlayOut:
-        """Go on with the newest set-point; those that wait with it are the curve's last points."""
+        """Continue with the newest set-point; the others that wait become the curve's last points."""
         self._head = self._real[-1][0]
         for sequence in sorted(self._waiting):
             if sequence != newest:
@@ -170,7 +170,7 @@ class SetpointStream(Trajectory):
         return q, qd
 
     def _complete(self, needed: int) -> bool:
-        """Lengthen the curve up to a number, as far as there is something to make it of."""
+        """Extend the curve up to a number, as far as there are points for it."""
         while self._head < needed:
             missing = self._head + 1
             if self._waiting:
@@ -178,7 +178,7 @@ class SetpointStream(Trajectory):
                 if coming == missing:
                     self._put(coming)
                 else:
-                    missing = max(missing, min(coming, needed) - 3)  # earlier ones have gone off the curve
+                    missing = max(missing, min(coming, needed) - 3)  # earlier ones no longer affect the curve
                     self._make_up(missing, (*self._real, (coming, self._waiting[coming]))[-3:])
             elif missing - self._real[-1][0] <= BRIDGED:
                 self._make_up(missing, tuple(self._real))
@@ -197,11 +197,11 @@ class SetpointStream(Trajectory):
         self._real.append((sequence, q))
 
     def _make_up(self, sequence: int, known: tuple[tuple[int, Floats], ...]) -> None:
-        """A point in the place of one that is missing, of the parabola through those before and after."""
+        """Replace a missing set-point by a point on the parabola through those before and after it."""
         (last, q), (before, q_before) = known[-1], known[-2]
         chord = (q - q_before) / (last - before)
         point = q + (sequence - last) * chord
-        if len(known) == 3 and last - before <= BRIDGED + 1:  # across a break it is the straight line
+        if len(known) == 3 and last - before <= BRIDGED + 1:  # across a gap, use the straight line
             first, q_first = known[0]
             bend = (chord - (q_before - q_first) / (before - first)) / (last - first)
             point = point + (sequence - last) * (sequence - before) * bend
@@ -209,7 +209,7 @@ class SetpointStream(Trajectory):
         self._head = sequence
 
     def _wait(self) -> tuple[Floats, Floats]:
-        """Come to rest and stay until the stream goes on."""
+        """Come to rest, and wait until the stream continues."""
         if self._pause is None:
             limits = self.limits
             self._pause = JointStop(

@@ -1,1 +1,1 @@
-"""How fast it is on this machine, and whether it stays so: each part alone, served robots, and hours of both."""
+"""Measurements of speed on this machine: each part, served robots, and long runs of both."""

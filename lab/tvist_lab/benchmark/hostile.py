@@ -1,4 +1,4 @@
-"""How late ticks are while somebody sends messages of every kind, against how late they are without, turn by turn."""
+"""Lateness of ticks while a client sends messages of every kind, compared in turn with quiet runs."""
 
 import asyncio
 import sys
@@ -13,20 +13,20 @@ from tvist_lab.benchmark.one_robot import punctuality
 from tvist_lab.served import Served, served
 
 RATE = 100.0
-"""Messages a second."""
+"""Messages per second."""
 CONFIDENCE = 0.95
 
 
 async def hostile(pairs: int, seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Watch a served robot in pairs of runs, one quiet and one with a sender, the order changing from pair to pair.
+    """Measure a served robot in pairs of runs, one quiet and one with a sender, in alternating order.
 
     Args:
-        pairs: How many.
-        seconds: How long each run lasts.
-        tell: Told of what is measured next.
+        pairs: Number of pairs.
+        seconds: Duration of each run [s].
+        tell: Called with a description of each measurement before it starts.
 
     Returns:
-        For p99 of the lateness [µs] and for missed ticks a run: means without and with messages, and the mean
+        For p99 of the lateness [µs] and for missed ticks per run: means without and with messages, and the mean
         difference with the half-width of its 95 % interval (Student, over pairs).
     """
     found: dict[bool, list[tuple[float, float]]] = {False: [], True: []}

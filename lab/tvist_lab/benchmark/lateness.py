@@ -1,4 +1,4 @@
-"""Lateness over minutes, out of what a robot tells of every second."""
+"""Lateness over minutes, from a robot's telemetry of every second."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,11 +9,11 @@ from tvist_protocol.stream import Telemetry
 
 
 def over_all(heard: Sequence[Telemetry]) -> dict[str, float]:
-    """Lateness of all ticks that some seconds' telemetries are about [µs].
+    """Lateness of all ticks that several telemetry messages cover [µs].
 
-    The largest is exact. The 99th percentile is a bound, above which no more than one tick in a hundred can have
-    been: of a second it is known that no tick was later than its largest, one in a hundred than its 99th
-    percentile, and half than its median.
+    The largest value is exact. The 99th percentile is an upper bound, which at most one tick in a hundred can have
+    exceeded: in each second, no tick was later than the second's largest value, one in a hundred was later than its
+    99th percentile, and half were later than its median.
     """
     if not heard:
         nothing = float("nan")

@@ -1,4 +1,4 @@
-"""How many robots one process keeps at 500 Hz on one core."""
+"""Number of robots that one process can run at 500 Hz on one core."""
 
 import asyncio
 import os
@@ -15,25 +15,25 @@ from tvist_protocol.codec import decode_telemetry
 from tvist_protocol.stream import Telemetry
 
 NUMBERS = (1, 2, 4, 8, 12, 16, 20, 24, 28, 32, 40, 48, 64)
-"""Tried one after another."""
+"""Numbers of robots to try, in order."""
 FAILURES = 2
-"""Numbers in a row that fail before more robots are not tried: one may have been the machine's fault."""
+"""Consecutive failing numbers after which no larger ones are tried; a single failure may be the machine's fault."""
 TRIES = 2
-"""The better counts: what else the machine does only ever adds."""
+"""Number of tries, of which the better counts, since other load on the machine only ever adds lateness."""
 MISSED = 0.001
-"""Share of its ticks that no robot may miss more of."""
+"""Share of its ticks that each robot may miss [-]."""
 SETTLE = 2
-"""Telemetries that are left out at first: the start is not what is measured."""
+"""Number of telemetry messages ignored at first, so that the start is not measured."""
 
 
 async def robots_at_500_hz(seconds: float, tell: Callable[[str], None]) -> int:
-    """The largest number of robots in one process on one core none of which misses more than `MISSED`.
+    """Return the largest number of robots in one process on one core such that none misses more than `MISSED`.
 
-    A client on another core, where there is one, reads every state of every robot.
+    A client, on another core if there is one, reads every state of every robot.
 
     Args:
-        seconds: How long each number is watched.
-        tell: Told of what is measured next.
+        seconds: How long each number is measured [s].
+        tell: Called with a description of each measurement before it starts.
     """
     most, failed = 0, 0
     for number in NUMBERS:
@@ -49,7 +49,7 @@ async def robots_at_500_hz(seconds: float, tell: Callable[[str], None]) -> int:
 
 
 async def worst_share(number: int, seconds: float) -> float:
-    """Share of its ticks that the worst of some robots misses in a process bound to one core."""
+    """Return the largest share of missed ticks of any robot in a process bound to one core."""
     core = max(os.sched_getaffinity(0))
     name = "ur5e" if number == 1 else "ur5e-1"
     heard: dict[str, list[Telemetry]] = defaultdict(list)
@@ -71,7 +71,7 @@ async def worst_share(number: int, seconds: float) -> float:
                 await enough.wait()
             await asyncio.to_thread(close_session, session)
     except (TimeoutError, ServedError):
-        return 1.0  # beyond what it can do it does not even answer in time
+        return 1.0  # under too much load it does not even answer in time
     return max(_share(told[SETTLE:]) for told in heard.values())
 
 

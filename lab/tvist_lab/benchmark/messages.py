@@ -1,4 +1,4 @@
-"""Messages of every type and size, sound and unsound, to load a robot with."""
+"""Valid and invalid messages of every type and size, to put load on a robot."""
 
 import random
 from collections.abc import Callable
@@ -15,19 +15,19 @@ from tvist_protocol.simulation import SimulationInject, SimulationStep
 
 POSE = (1.57, -1.57, 1.57, -1.57, -1.57, 0.0)
 STRANGER = "none of ours"
-"""A token that names no lease."""
+"""A token that belongs to no lease."""
 NEAR = 0.2
-"""How far from the pose targets are [rad]."""
+"""Distance of targets from the pose [rad]."""
 FILTERS = ("zv", "zvd", "ei", "none", "auto", "nonsense")
 
 
 class Messages:
-    """A source of messages: half of them have the token of the lease, half an invalid token.
+    """A source of messages; half of them have the token of the lease, half have an invalid token.
 
     Args:
-        seed: Seed of the choice.
-        token: Names the lease.
-        calibration: One that fits the robot.
+        seed: Seed of the random choice.
+        token: Token of the lease.
+        calibration: A calibration that fits the robot.
     """
 
     def __init__(self, seed: int, token: str, calibration: Calibration) -> None:
@@ -36,12 +36,12 @@ class Messages:
         self._calibration = msgspec.to_builtins(calibration)
 
     def next(self) -> bytes:
-        """The next message."""
+        """Return the next message."""
         make: Callable[[], bytes] = self._random.choice((self._sound, self._sound, self._unsound, self._long))
         return make()
 
     def _sound(self) -> bytes:
-        """A command as a client would send it; whether the robot takes it now is another question."""
+        """Return a valid command, which the robot may still refuse in its present state."""
         return encode(self._random.choice(self._commands()))
 
     def _commands(self) -> list[c.Command]:
@@ -89,7 +89,7 @@ class Messages:
         return chance.randbytes(self._size())
 
     def _long(self) -> bytes:
-        """A command that is longer than it need be."""
+        """Return a command that is longer than necessary."""
         chance, size = self._random, self._size()
         token = chance.choice((self._token, STRANGER))
         junk: Any = chance.choice(([{}], [1], [1.5], ["ab"], [[0]]))
@@ -108,5 +108,5 @@ class Messages:
         return msgspec.msgpack.encode(chance.choice(longs))[:MAX_BYTES]
 
     def _size(self) -> int:
-        """From some bytes to as many as a message may have, each order of magnitude as often as another."""
+        """Size from a few bytes to the largest permitted one, with all orders of magnitude equally likely."""
         return int(2.0 ** self._random.uniform(4.0, 17.99))

@@ -1,9 +1,9 @@
-"""Clients that read every state, each by a connection of its own; all in this one process.
+"""Clients that read every state, each over its own connection, all in this process.
 
     python -m tvist_lab.benchmark.observers ENDPOINT ROBOT COUNT
 
-A line on stdout says that they all listen. They read until stdin ends; then another line says what each received
-and missed.
+A line on stdout says that all of them listen. They read until stdin ends; then another line gives the numbers of
+states that each received and missed.
 """
 
 import json
@@ -22,14 +22,14 @@ class Observer:
     """Reads states.
 
     Args:
-        session: Its own.
+        session: A session used by no other observer.
         robot: Name of the robot.
     """
 
     def __init__(self, session: zenoh.Session, robot: str) -> None:
         self.received = 0
         self.lost = 0
-        """States that did not come between two that did."""
+        """Number of states missing between two that arrived."""
         self._last: int | None = None
         session.declare_subscriber(keys.state(robot), Callback(self._on_state, indirect=False))
 
@@ -46,7 +46,7 @@ def main(endpoint: str, robot: str, count: int) -> None:
     sessions = [open_session(endpoint) for _ in range(count)]
     observers = list(map(partial(Observer, robot=robot), sessions))
     for session in sessions:
-        list(session.get(keys.info(robot)))  # a query goes the same way: the subscription has passed
+        list(session.get(keys.info(robot)))  # goes the same way as the subscription
     sys.stdout.write("ready\n")
     sys.stdout.flush()
     sys.stdin.read()

@@ -1,4 +1,4 @@
-"""One served robot: punctuality, how soon it answers, and what it uses of the machine."""
+"""One served robot: punctuality, response times, and use of resources."""
 
 import asyncio
 import random
@@ -21,15 +21,15 @@ from tvist_protocol.stream import State, Telemetry
 SWING = 0.05
 """Amplitude of the streamed sine [rad]."""
 COMMANDS = 200
-"""Commands that are timed."""
+"""Number of commands whose response time is measured."""
 
 
 async def one_robot(seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Watch a robot served by another process, with a recorder and a client that reads every state.
+    """Measure a robot served by another process, with a recorder and a client that reads every state.
 
     Args:
-        seconds: How long to watch it tick, and how long to stream set-points.
-        tell: Told of what is measured next.
+        seconds: How long to measure its ticks, and how long to stream set-points [s].
+        tell: Called with a description of each measurement before it starts.
     """
     with tempfile.TemporaryDirectory() as folder:
         async with served(["--record", str(Path(folder) / "bench.mcap")]) as server:
@@ -57,7 +57,7 @@ async def one_robot(seconds: float, tell: Callable[[str], None]) -> dict[str, An
 
 
 async def punctuality(server: Served, seconds: float) -> tuple[dict[str, float], float]:
-    """Lateness of its ticks; share of a core that it takes."""
+    """Return the lateness of its ticks, and the share of a core that it uses."""
     robot = server.robot
     heard: list[Telemetry] = []
     states = 0
@@ -78,7 +78,7 @@ async def punctuality(server: Served, seconds: float) -> tuple[dict[str, float],
 
 
 async def _setpoints(robot: Robot, arm: Arm, seconds: float) -> list[float]:
-    """From each set-point's put to the arrival of the first state that carries it, or a newer one [s]."""
+    """Times from sending each set-point to the arrival of the first state with this or a newer one [s]."""
     middle = np.array((await robot.state()).target_q)
     sent: list[float] = []
     took: list[float] = []
@@ -90,7 +90,7 @@ async def _setpoints(robot: Robot, arm: Arm, seconds: float) -> list[float]:
 
     forget = robot.on_state(on_state)
     async with arm.servo(period=PERIOD) as servo:
-        # A little slower than the robot ticks: the moment within its period, too, goes through all there are.
+        # Slightly slower than the robot ticks, so that the set-points are sent at all moments within its period.
         pace = PERIOD * (1.0 + PERIOD / seconds)
         began = time.monotonic()
         for number in range(round(seconds / PERIOD)):
@@ -104,7 +104,7 @@ async def _setpoints(robot: Robot, arm: Arm, seconds: float) -> list[float]:
 
 
 async def _commands(arm: Arm) -> list[float]:
-    """Round trips of commands, each sent at no particular moment of a period [s]."""
+    """Round trips of commands, each sent at a random moment within a period [s]."""
     chance, took = random.Random(0), []  # noqa: S311  no secret
     for _ in range(COMMANDS):
         await asyncio.sleep(chance.uniform(0.0, 2.0 * PERIOD))

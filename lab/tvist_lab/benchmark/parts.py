@@ -1,4 +1,4 @@
-"""How long each part of the line takes in this process, one core."""
+"""Processing time of each part of the control line, in this process on one core."""
 
 import time
 from collections.abc import Callable
@@ -28,18 +28,18 @@ from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_shaping import TvistFilter, shaper
 
 TICKS = 1250
-"""Number of ticks of a motion: Q1 to Q3 without its last moment."""
+"""Number of ticks of a motion: Q1 to Q3 without its very end."""
 BATCHES = 5
-"""Repetitions, of which the fastest counts: what else the machine does only ever adds."""
+"""Number of repetitions, of which the fastest counts, since other load on the machine only ever adds time."""
 MUJOCO_STEP = 0.00025
-"""Step at which MuJoCo agrees with the plant [s]."""
+"""Step at which MuJoCo agrees with our plant [s]."""
 
 
 def parts(tell: Callable[[str], None]) -> dict[str, float]:
-    """Time of a tick of each part and of the whole line [us], how many times faster than MuJoCo and than time.
+    """Return the time per tick of each part and of the line [us], and the speed relative to MuJoCo and real time.
 
     Args:
-        tell: Told of what is measured next.
+        tell: Called with a description of each measurement before it starts.
     """
     setup = free_setup(truth=False)
     motion, payload = _motion(setup), body(setup.payload)
@@ -69,7 +69,7 @@ def _motion(setup: Setup) -> list[np.ndarray[Any, Any]]:
 
 
 def _fastest(batch: Callable[[], int]) -> float:
-    """Time of one of what a batch does many times [us]."""
+    """Return the time of one item of a batch [us], which returns its number of items."""
     best = float("inf")
     for _ in range(BATCHES):
         began = time.perf_counter()
@@ -122,7 +122,7 @@ def _cycle(setup: Setup) -> float:
 
 
 def _line(setup: Setup) -> float:
-    """The whole server in process: messages in, encoded states out."""
+    """Time per tick of the whole server in process, from incoming messages to encoded states [us]."""
     host = LoopbackHost(setup)
     host.subscribe("state", len)
     host.request("bench", encode(TakeControl(client="bench")))

@@ -1,4 +1,4 @@
-"""Clients that only read, in a process of their own: what they say at their end."""
+"""Clients that only read, in a separate process, and their final counts."""
 
 import asyncio
 import json
@@ -9,14 +9,14 @@ from contextlib import asynccontextmanager
 
 @asynccontextmanager
 async def readers(module: str, *arguments: str) -> AsyncIterator[list[dict[str, int]]]:
-    """Run a module of this package that says a line when its clients read, and another when its stdin ends.
+    """Run a module of this package that prints a line when its clients read, and another when its stdin ends.
 
     Args:
-        module: Its name, `observers` or `rtde_clients`.
+        module: Name of the module, `observers` or `rtde_clients`.
         arguments: Arguments of the module.
 
     Yields:
-        A list, in which stands at the end what each client received and lost.
+        A list, which at the end contains the numbers received and lost of each client.
     """
     command = [sys.executable, "-m", f"tvist_lab.benchmark.{module}", *arguments]
     pipe = asyncio.subprocess.PIPE
@@ -24,9 +24,9 @@ async def readers(module: str, *arguments: str) -> AsyncIterator[list[dict[str, 
     said: list[dict[str, int]] = []
     try:
         assert process.stdout is not None
-        await process.stdout.readline()  # they all read
+        await process.stdout.readline()  # all clients are reading
         yield said
-        out, _ = await process.communicate(b"")  # which ends its stdin
+        out, _ = await process.communicate(b"")  # closes its stdin
         said += json.loads(out)
     finally:
         if process.returncode is None:

@@ -1,9 +1,9 @@
-"""Clients of RTDE that read at 500 Hz, each with a recipe of its own; all in this one process.
+"""Clients of RTDE that read at 500 Hz, each with a different recipe, all in this process.
 
     python -m tvist_lab.benchmark.rtde_clients ADDRESS PORT COUNT
 
-A line on stdout says that they all read. They read until stdin ends; then another line says what each received
-and missed.
+A line on stdout says that all of them read. They read until stdin ends; then another line gives the numbers of
+packages that each received and missed.
 """
 
 import json
@@ -24,30 +24,30 @@ SINGLE_VALUES = (
     "output_int_register_0", "output_double_register_0", "input_int_register_0", "input_double_register_0",
 )  # fmt: skip
 RECIPE = 22
-"""Variables of each client, about as many as clients in use ask for."""
+"""Number of variables of each client, about as many as real clients request."""
 PERIOD = 0.002
-"""[s]."""
+"""Control period [s]."""
 
 
 def recipe(number: int) -> list[str]:
-    """Variables of a client; no two have the same, and all share some."""
+    """Return the variables of a client; all recipes differ, but share some variables."""
     pool = [*JOINT_VALUES, *SINGLE_VALUES]
     return ["timestamp", *(pool[(7 * number + 3 * k + k // 11) % len(pool)] for k in range(RECIPE - 1))]
 
 
 class Client:
-    """One connection, that reads data packages.
+    """One connection that reads data packages.
 
     Args:
         address: IP address of the robot.
         port: Port of the robot's RTDE interface.
-        names: Its recipe.
+        names: Variables of its recipe.
     """
 
     def __init__(self, address: str, port: int, names: list[str]) -> None:
         self.received = 0
         self.lost = 0
-        """Ticks that did not come between two that did."""
+        """Number of ticks missing between two that arrived."""
         self._last: int | None = None
         self._data = b""
         self.socket = socket.create_connection((address, port), 10.0)
@@ -58,7 +58,7 @@ class Client:
         self._ask("S", b"")
 
     def read(self) -> bool:
-        """Take what has come; whether the connection is still there."""
+        """Take the received data; return whether the connection is still open."""
         data = self.socket.recv(65536)
         self._data += data
         while len(self._data) >= 3 and len(self._data) >= (size := int.from_bytes(self._data[:2], "big")):

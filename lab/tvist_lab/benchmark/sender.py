@@ -1,6 +1,6 @@
 """A process that sends a robot messages of every kind: `python -m tvist_lab.benchmark.sender ENDPOINT RATE SEED`.
 
-It takes control first, and says `ready`; it ends when its input is closed.
+It first takes control, then prints `ready`; it ends when its stdin is closed.
 """
 
 import sys
@@ -20,11 +20,11 @@ from tvist_protocol.replies import Accepted
 
 ROBOT = "ur5e"
 MADE = 500
-"""Messages that are made beforehand, and sent in turn."""
+"""Number of messages that are created in advance and sent in turn."""
 
 
 def main() -> None:
-    """Send until nobody wants it any more."""
+    """Send messages until stdin is closed."""
     endpoint, rate, seed = sys.argv[1], float(sys.argv[2]), int(sys.argv[3])
     session = open_session(endpoint)
     command = keys.command(ROBOT)
@@ -60,7 +60,7 @@ def _ask(session: zenoh.Session, key: str, data: bytes) -> bytes:
 
 
 def _forget(_: zenoh.Reply) -> None:
-    """Nobody waits for it."""
+    """Ignore the reply."""
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""Whether it stays as it is: a robot in real time for minutes, under a load like that of a laboratory.
+"""Long-term stability: a robot in real time for minutes, under a load like that of a laboratory.
 
-Processes as in reality: the robot with its recorder is one, a client that streams set-points and sends a command a
-second is this one, and five observers, each with a connection of its own, share a third.
+The processes are as in reality: the robot with its recorder is one; a client that streams set-points and sends one
+command per second is this process; five observers, each with its own connection, share a third one.
 """
 
 import asyncio
@@ -33,18 +33,18 @@ SWING = 0.2
 CYCLE = 4.0
 """Period of the sine [s]."""
 WARM = 60.0
-"""Memory is compared with what it was then [s]; in a short soak, with what it was after a quarter."""
+"""Time at which memory is measured for comparison [s]; in a short soak, a quarter of its duration."""
 
 
 async def soak(minutes: float, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Serve a robot and watch it.
+    """Serve a robot and monitor it.
 
     Args:
-        minutes: How long.
-        tell: Told every minute how it goes.
+        minutes: Duration of the run [min].
+        tell: Called every minute with the present counts.
 
     Returns:
-        What was missed, late, lost, and used.
+        Counts of missed, late and lost messages, and the resources used.
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "soak.mcap"
@@ -62,7 +62,7 @@ class _Watch:
         self._server, self._seconds, self._tell = server, seconds, tell
         self._heard: list[Telemetry] = []
         self._memory: list[float] = []
-        """Every second [MB]."""
+        """Memory at every second [MB]."""
 
     async def run(self) -> dict[str, Any]:
         robot, pid = self._server.robot, self._server.pid
@@ -112,7 +112,7 @@ class _Watch:
             )
 
     async def _stream(self, arm: Arm, began: float) -> tuple[int, int]:
-        """Set-points on a sine, at 500 Hz; how many, and how often the robot ended the stream by itself."""
+        """Stream a sine at 500 Hz; return the number of set-points, and how often the robot itself ended the stream."""
         sent = stopped = 0
         while time.monotonic() < began + self._seconds:
             middle = list((await arm.robot.rest()).target_q)
@@ -128,7 +128,7 @@ class _Watch:
     async def _swing(servo: Servo, middle: list[float], until: float) -> None:
         began = time.monotonic()
         while (now := time.monotonic()) < until:
-            # The sine's square begins without velocity, and comes back to the middle.
+            # The square of the sine starts with zero velocity and returns to the middle.
             swing = SWING * math.sin(math.pi * servo.sequence * PERIOD / CYCLE) ** 2
             servo.set([angle + swing for angle in middle])
             await asyncio.sleep(max(0.0, began + servo.sequence * PERIOD - now))
@@ -141,7 +141,7 @@ class _Watch:
 
 
 def _observed(server: Served) -> AbstractAsyncContextManager[list[dict[str, int]]]:
-    """Observers in a process; what they say at their end stands in the list."""
+    """Run observers in a process; the list contains their final counts."""
     return readers("observers", server.endpoint, "ur5e", str(OBSERVERS))
 
 
@@ -154,7 +154,7 @@ def _observers(observed: list[dict[str, int]]) -> dict[str, int]:
 
 
 def _recording(path: Path) -> dict[str, int]:
-    """What the recording lacks: gaps between its states, and what the recorder counted as dropped."""
+    """Return what the recording lacks: gaps between its states, and messages that the recorder counted as dropped."""
     recorded = gaps = 0
     last: int | None = None
     with path.open("rb") as stream:

@@ -1,4 +1,4 @@
-"""What clients of UR's interfaces cost a served robot."""
+"""Load that clients of UR's interfaces put on a served robot."""
 
 from collections.abc import Callable
 from typing import Any
@@ -10,16 +10,16 @@ from tvist_plant.plant import PERIOD
 from tvist_server.ur_ports import UrPorts
 
 CLIENTS = 10
-"""Number of RTDE clients at 500 Hz, each with a recipe of its own."""
+"""Number of RTDE clients at 500 Hz, each with a different recipe."""
 ADDRESS = "127.0.0.1"
 
 
 async def ur_interfaces(seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Watch a robot without clients at its interfaces, and with ten that read every tick.
+    """Measure a robot without clients at its UR interfaces, and with ten clients that read every tick.
 
     Args:
-        seconds: How long, each time.
-        tell: Told of what is measured next.
+        seconds: Duration of each measurement [s].
+        tell: Called with a description of each measurement before it starts.
     """
     port = str(free_port())
     options = ["--ur-address", ADDRESS]

@@ -1,1 +1,1 @@
-"""Moves by the hundred, unshaped and shaped, in this process; and a bench for shapers on several arms."""
+"""Hundreds of moves, unshaped and shaped, in this process; and a benchmark of shapers on several arms."""

@@ -1,4 +1,4 @@
-"""The eight arms of the bench."""
+"""The eight arms of the benchmark."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,21 +13,21 @@ from tvist_plant.imperfections import Imperfections, YieldingBase
 from tvist_plant.plant import Plant
 
 SUBSTEPS = 8
-"""Number of the integrator's steps per period for an arm with imperfections, which are explicit in it."""
+"""Number of integrator steps per period for an arm with imperfections, which are integrated explicitly."""
 SCATTER = 0.15
-"""By which each stiffness and gain differs from the description's, up or down by chance [-]."""
+"""Relative deviation of each stiffness and gain from the description, with random sign [-]."""
 
 
 @dataclass(frozen=True)
 class ArmVariant:
-    """One of them; the controller goes by the description all the same."""
+    """One of the arms. The controller uses the unchanged description for all of them."""
 
     name: str
-    """In JSON."""
+    """Name in JSON."""
     label: str
-    """What it has."""
+    """What distinguishes it, for people."""
     make: Callable[[RobotDescription, Payload, int], Plant]
-    """Description, payload carried and seed to a plant that knows its truth."""
+    """Creates a plant that provides the truth from description, carried payload and seed."""
 
 
 def _imperfect(description: RobotDescription, carried: Payload, imperfections: Imperfections) -> FlexibleArm:

@@ -1,4 +1,4 @@
-"""What any shaper has to be compared with: waiting (the unshaped motion), and these."""
+"""Baselines for the comparison of shapers, besides waiting (the unshaped motion)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,25 +18,25 @@ from tvist_shaping.filter import TvistFilter
 from tvist_shaping.taps import mean_delay
 
 CONFIGURATIONS = 150
-"""Over which the range of the lowest mode is looked for."""
+"""Number of configurations in which the range of the lowest mode is determined."""
 SEARCHED = 2000
-"""Over which the longest mean delay is looked for: what exceeds it would exceed the limits of a motion, too."""
+"""Number of configurations searched for the longest mean delay. A delay above it would exceed the motion's limits."""
 
 
 @dataclass(frozen=True)
 class Baseline:
-    """A way to make a move that shaping by the modes has to beat."""
+    """An alternative to shaping by the estimated modes, for comparison."""
 
     name: str
-    """In JSON."""
+    """Name in JSON."""
     label: str
-    """For people."""
+    """Name for people."""
     shaper: str | None = None
-    """Shaper of the catalogue; None: no shaper, the motion itself takes longer."""
+    """Shaper of the catalogue; None if the motion itself is slower instead."""
     f_d: float | None = None
-    """Frequency it is designed for; None: the estimate at the move's target [Hz]."""
+    """Design frequency [Hz]; None for the estimate at the move's target."""
     zeta: float | None = None
-    """Damping it is designed for [-]."""
+    """Design damping ratio [-]; None for the estimate at the move's target."""
 
     def shaped(
         self, recipe: Recipe, description: RobotDescription, move: Move, reference: Floats, ticks: int
@@ -44,11 +44,11 @@ class Baseline:
         """Samples of the whole motion, shape (T, n) [rad].
 
         Args:
-            recipe: Says where estimates come from.
+            recipe: Source of the estimates.
             description: The robot.
             move: The move.
             reference: Its reference, shape (T', n) [rad].
-            ticks: How long the shaped motion lasts that this is compared with.
+            ticks: Duration of the shaped motion that it is compared with.
         """
         start, target = np.array(move.start), np.array(move.target)
         if self.shaper is None:
@@ -58,10 +58,10 @@ class Baseline:
         return shape(tvist.filter, reference)[0]
 
     def tvist(self, recipe: Recipe, description: RobotDescription, move: Move) -> TvistFilter:
-        """Its fixed filter for a move; only where it has a shaper.
+        """Return its fixed filter for a move; only for a baseline with a shaper.
 
         Args:
-            recipe: Says where estimates come from.
+            recipe: Source of the estimates.
             description: The robot.
             move: The move.
         """
@@ -71,7 +71,7 @@ class Baseline:
             there = recipe.estimator(description, move.mass, 1).estimate(np.array(move.target))
             f_d, zeta = float(there[0][0]), float(there[1][0])
         made = shaper(self.shaper)
-        # However low a wrong estimate is.
+        # Sufficient even if the estimate is too low.
         longest = max(1.0, 1.01 * made.duration_periods / f_d)
         return TvistFilter(made, Fixed([f_d], [zeta]), joints=description.joints, max_delay=longest)
 
@@ -83,12 +83,12 @@ FROZEN = Baseline("zv_frozen_at_end", "ZV for the end pose", "zv")
 def baselines(
     recipe: Recipe, description: RobotDescription, masses: tuple[float, float]
 ) -> tuple[Baseline, ...]:
-    """All of them; the fixed ones are designed for the lowest mode's range over the workspace and the payloads.
+    """Return all baselines; fixed ones are designed for the lowest mode's range over workspace and payloads.
 
     Args:
-        recipe: Says where estimates come from.
+        recipe: Source of the estimates.
         description: The robot.
-        masses: Least and largest payload [kg].
+        masses: Smallest and largest payload [kg].
     """
     f_d, zeta = workspace_range(recipe, description, masses)
     fixed = []
@@ -102,7 +102,7 @@ def baselines(
 def workspace_range(
     recipe: Recipe, description: RobotDescription, masses: tuple[float, float]
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Least and largest damped frequency [Hz] and damping ratio [-] of the lowest mode, as estimated."""
+    """Smallest and largest damped frequency [Hz] and damping ratio [-] of the lowest mode, as estimated."""
     found = [
         (f_d[0], zeta[0]) for f_d, zeta in _over_workspace(recipe, description, masses, 1, CONFIGURATIONS)
     ]
@@ -116,10 +116,10 @@ def longest_mean_delay(
     """Return the longest mean delay of the product of the modes' ZV shapers, over workspace and payloads [s].
 
     Args:
-        recipe: Says where estimates come from.
+        recipe: Source of the estimates.
         description: The robot.
-        masses: Least and largest payload [kg].
-        modes: Whose shapers they are.
+        masses: Smallest and largest payload [kg].
+        modes: Number of modes.
     """
     return max(
         mean_delay(f_d, zeta) for f_d, zeta in _over_workspace(recipe, description, masses, modes, SEARCHED)
@@ -129,7 +129,7 @@ def longest_mean_delay(
 def _over_workspace(
     recipe: Recipe, description: RobotDescription, masses: tuple[float, float], modes: int, count: int
 ) -> Iterator[tuple[Floats, Floats]]:
-    """Damped frequencies [Hz] and damping ratios [-] of the lowest modes, with the least payload and the largest."""
+    """Damped frequencies [Hz] and damping ratios [-] of the lowest modes, with the smallest and the largest payload."""
     for mass in sorted(set(masses)):
         estimator = recipe.estimator(description, mass, modes)
         for q in WORKSPACE.spread(count, description.joints, seed=0):

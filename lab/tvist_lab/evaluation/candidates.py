@@ -1,4 +1,4 @@
-"""What is judged on the bench: filters by name, the held product, and baselines."""
+"""Candidates of the benchmark: filters by name, the product with held mean delay, and baselines."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -24,35 +24,35 @@ class Task:
     """A reference to be shaped."""
 
     description: RobotDescription
-    """What the controller knows of the arm."""
+    """The controller's model of the arm."""
     move: Move
-    """From where to where; its mass is the one declared."""
+    """The move; its mass is the declared one."""
     reference: Floats
-    """Shape (T, n) [rad]."""
+    """Reference, shape (T, n) [rad]."""
 
 
 class Candidate(ABC):
-    """A way to shape."""
+    """A way to shape a motion."""
 
     name: str
-    """In JSON."""
+    """Name in JSON."""
     label: str
-    """For people."""
+    """Name for people."""
 
     @property
     def told_target(self) -> bool:
-        """Whether it is told where a motion ends before it begins: then it is nothing for a stream."""
+        """Whether it is given the end of a motion before the motion begins, and therefore cannot shape a stream."""
         return False
 
     @abstractmethod
     def stepper(self, task: Task) -> RunningShaper | None:
-        """At rest at the start; None for what plans the whole motion instead of shaping a reference."""
+        """Return the shaper, at rest at the start; None if it plans the whole motion instead of shaping a reference."""
 
     def shaped(self, task: Task) -> Shaped:
-        """A whole motion, watched for tails.
+        """Shape a whole motion, and check it for tails.
 
         Raises:
-            ShaperFaultError: The output is no position, does not end, or goes on after its end.
+            ShaperFaultError: The output is not a position, does not come to rest, or moves on after its end.
         """
         stepper = self.stepper(task)
         assert stepper is not None
@@ -61,7 +61,7 @@ class Candidate(ABC):
 
 @dataclass(frozen=True)
 class Named(Candidate):
-    """A filter by its name, made as the server makes it."""
+    """A filter by name, created as the server creates it."""
 
     recipe: Recipe
     name: str
@@ -69,29 +69,29 @@ class Named(Candidate):
 
     @property
     def told_target(self) -> bool:
-        """One filter makes use of it."""
+        """Whether the filter uses the target, which one of them does."""
         return self.recipe.shaper == AIMED
 
     def stepper(self, task: Task) -> "Filtering":
-        """The filter, reset and aimed."""
+        """Return the filter, reset and given the target."""
         return _from_rest(self.recipe.make(task.description, task.move.mass), task)
 
 
 @dataclass(frozen=True)
 class Held(Candidate):
-    """The modes' zero-vibration shapers, one after the other, held back to a constant mean delay."""
+    """The modes' zero-vibration shapers in series, delayed to a constant mean delay."""
 
     recipe: Recipe
-    """Says where estimates come from."""
+    """Source of the estimates."""
     mean_delay: float
-    """To which they are held back [s]."""
+    """The constant mean delay [s]."""
     modes: int
     """Number of modes."""
     name: str
     label: str
 
     def stepper(self, task: Task) -> "Filtering":
-        """The filter, reset."""
+        """Return the filter, reset."""
         description = task.description
         estimator = self.recipe.estimator(description, task.move.mass, self.modes)
         design = ProductDesign(self.mean_delay, modes=self.modes)
@@ -100,7 +100,7 @@ class Held(Candidate):
 
 @dataclass(frozen=True)
 class Shaping(Candidate):
-    """A baseline that is a fixed shaper."""
+    """A baseline with a fixed shaper."""
 
     recipe: Recipe
     baseline: Baseline
@@ -113,12 +113,12 @@ class Shaping(Candidate):
         return self.baseline.f_d is None
 
     def stepper(self, task: Task) -> "Filtering":
-        """The fixed filter, reset; where it is designed for the target, that is known to it."""
+        """Return the fixed filter, reset; it knows the target if it is designed for it."""
         return _from_rest(self.baseline.tvist(self.recipe, task.description, task.move), task)
 
 
 def _from_rest(tvist: Filter, task: Task) -> "Filtering":
-    """A filter at rest where a move starts, told where it ends as the robot tells it."""
+    """Return a filter at rest at the start of a move, which is given the target as the robot does it."""
     tvist.reset(task.move.start)
     tvist.aim(task.move.target)
     return Filtering(sound(tvist), lambda: tvist.delay)
@@ -126,7 +126,7 @@ def _from_rest(tvist: Filter, task: Task) -> "Filtering":
 
 @dataclass(frozen=True)
 class Longer(Candidate):
-    """A double S that takes as long as another candidate's motion, and knows no model."""
+    """A double S that takes as long as another candidate's motion, and uses no model."""
 
     like: Candidate
     name: str
@@ -134,15 +134,15 @@ class Longer(Candidate):
 
     @property
     def told_target(self) -> bool:
-        """It plans the way there."""
+        """True, since it plans the motion."""
         return True
 
     def stepper(self, task: Task) -> None:  # noqa: ARG002
-        """It shapes no reference."""
+        """Return None, since it does not shape a reference."""
         return
 
     def shaped(self, task: Task) -> Shaped:
-        """A double S with less jerk."""
+        """Return a double S with less jerk."""
         other = self.like.shaped(task)
         ticks = len(task.reference) + round(other.delay / PERIOD)
         start, target = np.array(task.move.start), np.array(task.move.target)
@@ -151,12 +151,12 @@ class Longer(Candidate):
 
 @dataclass(frozen=True)
 class Filtering:
-    """A filter at work."""
+    """A filter in operation."""
 
     step: Callable[[Floats], Floats]
-    """Sample to shaped sample."""
+    """Converts a sample to a shaped sample."""
     declared: Callable[[], float]
-    """Its delay now."""
+    """Returns the present delay of the filter."""
 
     @property
     def delay(self) -> float:

@@ -1,7 +1,7 @@
-"""Does a shaper know what is to come? Two references that differ only after a tick must give equal outputs up to it.
+"""Check of causality: references that differ only after some tick must give equal outputs up to that tick.
 
-A candidate that is told the target of a move beforehand is told the same one with every reference: it may know where
-the move was to end, and must know no more of the way there than the others.
+A candidate that is given the target of a move in advance gets the same target with every reference: it may know where
+the move was to end, but no more of the way there than other candidates.
 """
 
 from dataclasses import replace
@@ -14,19 +14,20 @@ from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
 
 PLACES = (0.15, 0.5, 0.8)
-"""Ticks after which the references differ, as shares of the motion [-]."""
+"""Positions after which the references differ, as shares of the motion [-]."""
 ELSEWHERE = 1.0
-"""Acceleration with which the other reference goes its own way [rad/s²]."""
+"""Acceleration with which the other reference deviates [rad/s²]."""
 TWICE = "gives another output when the same reference is run again: it keeps something, or draws by chance"
 
 
 def check_causal(candidate: Candidate, task: Task) -> None:
-    """Run a shaper on a reference, on others with the same beginning, and on the first again.
+    """Run a shaper on a reference, on others with the same beginning, and again on the first one.
 
-    A shaper that remembers a reference, or looks where it is kept, gives other outputs for another future.
+    A shaper that remembers a reference, or reads it where it is stored, gives different outputs for a different
+    future.
 
     Raises:
-        ShaperFaultError: It does, or the same reference gives another output the second time.
+        ShaperFaultError: It does so, or the same reference gives a different output the second time.
     """
     first = _outputs(candidate, task)
     if first is None:
@@ -54,9 +55,9 @@ def _outputs(candidate: Candidate, task: Task) -> Floats | None:
 
 
 def _elsewhere(candidate: Candidate, task: Task, tick: int, sign: float) -> Task:
-    """Return the task with a reference that leaves the first one on a parabola after a tick.
+    """Return the task with a reference that deviates from the first one on a parabola after a tick.
 
-    A candidate that is told the target is still told that of the first reference.
+    A candidate that is given the target still gets that of the first reference.
     """
     reference = task.reference.copy()
     late = PERIOD * np.arange(1, len(reference) - tick)

@@ -1,4 +1,4 @@
-"""Curved paths: how far a shaper leaves the way it was asked to go."""
+"""Curved paths: the deviation of a shaped motion from its path."""
 
 import math
 from collections.abc import Sequence
@@ -14,23 +14,23 @@ from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 
 CORNERS = 5
-"""Curved paths."""
+"""Number of curved paths."""
 
 
 @dataclass(frozen=True)
 class Bend:
-    """A curved path by one candidate."""
+    """A curved path for one candidate."""
 
     description: RobotDescription
     candidate: Candidate
     corner: tuple[Move, Move]
-    """The second goes on where the first ends."""
+    """Two moves; the second starts where the first ends."""
 
 
 def bends(
     description: RobotDescription, candidates: Sequence[Candidate], moves: Sequence[Move]
 ) -> list[Bend]:
-    """Every candidate that shapes references, on each of a few moves that go on to where the next one starts."""
+    """Pair each candidate that shapes references with a few moves, each continued to the start of the next one."""
     paths = [
         (first, replace(second, start=first.target, target=second.start, mass=first.mass))
         for first, second in zip(moves[:CORNERS], [*moves[1:], moves[0]], strict=False)
@@ -44,7 +44,7 @@ def bends(
 
 
 def bend(job: Bend) -> float | None:
-    """How far a candidate leaves a curved path [rad]; None where it cannot be ranked."""
+    """Return a candidate's deviation from a curved path [rad]; None if it cannot be ranked."""
     first, second = job.corner
     start, corner, target = (np.array(q) for q in (first.start, first.target, second.target))
     reference = round_a_corner(start, corner, target)
@@ -56,10 +56,10 @@ def bend(job: Bend) -> float | None:
 
 
 def path_error(path: Floats, q: Floats) -> float:
-    """Largest distance of points from a path in joint space, whatever the time [rad].
+    """Largest distance of points from a path in joint space, regardless of time [rad].
 
     Args:
-        path: Its corners, shape (T, n) [rad].
+        path: Vertices of the path, shape (T, n) [rad].
         q: Points, shape (T', n) [rad].
     """
     start, way = path[:-1], np.diff(path, axis=0)

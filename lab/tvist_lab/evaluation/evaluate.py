@@ -1,4 +1,4 @@
-"""Moves, each unshaped and shaped, and what that comes to."""
+"""Evaluation of moves, each unshaped and shaped, and its summary."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -26,29 +26,29 @@ from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 
 WORTH = 0.2
-"""An unshaped peak below this is no vibration to reduce: the move is listed, but not in the percentages [m/s²]."""
+"""Unshaped peak [m/s²] below which a move has no vibration to reduce, so that it is listed but not in percentages."""
 RESAMPLED = 2000
-"""Bootstrap samples of an interval."""
+"""Number of bootstrap samples for an interval."""
 AT_ONCE = 8
-"""Motions that a process makes before it answers, and twice as many are too few to start another."""
+"""Motions that a process makes before it returns results; less than twice as many do not justify another process."""
 
 
 @dataclass(frozen=True)
 class MoveJob:
-    """One move and how it is to be made."""
+    """One move and the ways to make it."""
 
     description: RobotDescription
-    """The arm, and what the controller believes of it."""
+    """The arm, and the controller's model of it."""
     move: Move
     recipe: Recipe
     baselines: tuple[Baseline, ...] = ()
-    """To be run beside it."""
+    """Baselines to run as well."""
     seed: int = 0
     """Seed of gear errors."""
 
     @property
     def motions(self) -> int:
-        """How many it takes: unshaped, shaped, and one a baseline."""
+        """Number of motions: unshaped, shaped, and one for each baseline."""
         return 2 + len(self.baselines)
 
 
@@ -61,11 +61,11 @@ class Made:
     duration: float
     """Duration of the shaped reference [s]."""
     still_after: float | None
-    """From the start of the unshaped reference; None: not still when the rest ended [s]."""
+    """Time until still, from the start of the unshaped reference [s]; None if not still at the end of the recording."""
     acceleration: float
-    """Largest |q̈*| over the limit of the unshaped reference [-]."""
+    """Largest |q̈*| relative to the limit of the unshaped reference [-]."""
     velocity: float
-    """Largest |q̇*| over its limit [-]."""
+    """Largest |q̇*| relative to the limit of the unshaped reference [-]."""
 
 
 @dataclass(frozen=True)
@@ -75,30 +75,30 @@ class JudgedMove:
     unshaped: Made
     shaped: Made
     baselines: dict[str, Made] = field(default_factory=dict)
-    """By their names."""
+    """Results of the baselines, by name."""
 
     @property
     def counts(self) -> bool:
-        """Whether there is vibration worth a percentage."""
+        """Whether there is enough vibration for a percentage."""
         return self.unshaped.peak >= WORTH
 
     def reduction(self, made: Made) -> float:
-        """By which a way lowers the peak [%]."""
+        """Reduction of the peak compared with the unshaped move [%]."""
         return 100.0 * (1.0 - made.peak / self.unshaped.peak)
 
     def delay(self, made: Made) -> float:
-        """By which a way's reference lasts longer [ms]."""
+        """Extra duration of the reference compared with the unshaped one [ms]."""
         return round(1e3 * (made.duration - self.unshaped.duration), 6)
 
 
 def record(job: MoveJob) -> tuple[Recording, Recording]:
-    """A move unshaped and shaped, on the same arm with the same seed."""
+    """Record a move unshaped and shaped, on the same arm with the same seed."""
     unshaped, shaped, _ = _record(job)
     return unshaped, shaped
 
 
 def judge(job: MoveJob) -> JudgedMove:
-    """Make a move in every way and measure it."""
+    """Make a move in every way, and measure it."""
     unshaped, shaped, others = _record(job)
     return JudgedMove(
         measured(unshaped), measured(shaped), {name: measured(other) for name, other in others.items()}
@@ -106,7 +106,7 @@ def judge(job: MoveJob) -> JudgedMove:
 
 
 def evaluate(jobs: Sequence[MoveJob]) -> Iterator[JudgedMove]:
-    """All jobs in order, each as soon as it is done, on all cores."""
+    """Judge all jobs on all cores; yield the results in order, each as soon as it is available."""
     motions = max((job.motions for job in jobs), default=1)
     return spread(judge, jobs, few=2 * AT_ONCE // motions, chunk=max(AT_ONCE // motions, 1))
 
@@ -150,7 +150,7 @@ def _record(job: MoveJob) -> tuple[Recording, Recording, dict[str, Recording]]:
 
 
 def report(jobs: Sequence[MoveJob], judged: Sequence[JudgedMove]) -> dict[str, Any]:
-    """What `tvist evaluate --json` prints of the moves."""
+    """Return the part of `tvist evaluate --json` about the moves."""
     counted = [one for one in judged if one.counts]
     rows = [_row(job, one) for job, one in zip(jobs, judged, strict=True)]
     names = judged[0].baselines if judged else {}
@@ -197,12 +197,12 @@ def _row(job: MoveJob, one: JudgedMove) -> dict[str, Any]:
 
 
 def _summary(pairs: list[tuple[JudgedMove, Made]]) -> dict[str, Any]:
-    """Summarize one way over all moves; reductions only over those that count."""
+    """Summarize one way over all moves; reductions only over moves that count."""
     reductions = np.array([one.reduction(made) for one, made in pairs if one.counts])
     delays = np.array([one.delay(made) for one, made in pairs])
     accelerations, velocities = np.array([[made.acceleration, made.velocity] for _, made in pairs]).T
     quiet = [made.peak for one, made in pairs if not one.counts]
-    # How long until still after the unshaped reference would have stopped: moves differ in length, this does not.
+    # Count the time until still from the stop of the unshaped reference, since the lengths of moves differ.
     late = [
         round(1e3 * (made.still_after - one.unshaped.duration), 6)
         for one, made in pairs
@@ -226,7 +226,7 @@ def _summary(pairs: list[tuple[JudgedMove, Made]]) -> dict[str, Any]:
 
 
 def interval(values: Floats, percentile: float) -> list[float] | None:
-    """95 % bootstrap interval of a percentile; None where there are no values."""
+    """95 % bootstrap interval of a percentile; None if there are no values."""
     if not values.size:
         return None
     random = np.random.default_rng(0)

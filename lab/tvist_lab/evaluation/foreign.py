@@ -1,4 +1,4 @@
-"""Shapers from a person's own file."""
+"""Shapers from the user's own files."""
 
 import importlib.util
 import inspect
@@ -21,16 +21,16 @@ from tvist_protocol.values import Payload
 from tvist_shaping.estimators.base import Estimator
 
 MODES = 4
-"""That are told to a shaper from a file."""
+"""Number of modes that a shaper from a file is given."""
 
 
 class CandidateError(ValueError):
-    """A file holds no shaper; the sentence says why."""
+    """A file contains no shaper; the message says why."""
 
 
 @dataclass(frozen=True)
 class Info:
-    """What a shaper is told at every tick."""
+    """Information that a shaper gets at every tick."""
 
     period: float
     """Tick [s]."""
@@ -39,27 +39,27 @@ class Info:
     limits: MotionLimits
     """Limits of the reference, for every joint: velocity [rad/s], acceleration [rad/s²], jerk [rad/s³]."""
     payload: Payload
-    """Declared: mass [kg], com [m], inertia [kg m²]."""
+    """Declared payload: mass [kg], com [m], inertia [kg m²]."""
     robot: str
     """Model of the arm."""
     f_d: Floats
     """Damped frequencies of the lowest modes, as estimated at the last shaped reference [Hz], shape (4,)."""
     zeta: Floats
-    """Damping ratios of the same [-], shape (4,)."""
+    """Damping ratios of the same modes [-], shape (4,)."""
 
 
 @dataclass(frozen=True)
 class FromFile(Candidate):
-    """A shaper from a person's own file."""
+    """A shaper from the user's own file."""
 
     path: str
     recipe: Recipe
-    """Says where the estimate comes from that it is told."""
+    """Source of the estimates that it gets."""
     name: str
     label: str
 
     def stepper(self, task: Task) -> "Foreign":
-        """A new one, reset."""
+        """Return a new shaper, reset."""
         description, move = task.description, task.move
         estimator = self.recipe.estimator(description, move.mass, MODES)
         info = Info(
@@ -81,17 +81,17 @@ class FromFile(Candidate):
 
 
 class Foreign:
-    """A shaper that nothing is known of, at work.
+    """A user's shaper in operation.
 
     Args:
-        made: Has `step`, and may have `reset` and `delay`.
-        info: What it is told, but for the modes.
+        made: The shaper; it has `step`, and may have `reset` and `delay`.
+        info: The information that it gets, without the modes.
         estimator: Estimator of these modes.
         start: Joint angles at which the reference rests, shape (n,) [rad].
-        reach: How far each joint turns either way, shape (n,) [rad].
+        reach: Largest angle of each joint in either direction, shape (n,) [rad].
 
     Raises:
-        ShaperFaultError: Its `reset` raises.
+        ShaperFaultError: Its `reset` raises an exception.
     """
 
     def __init__(self, made: Any, info: Info, estimator: Estimator, start: Floats, reach: Floats) -> None:
@@ -105,7 +105,7 @@ class Foreign:
 
     @property
     def delay(self) -> float | None:
-        """What it declares."""
+        """The delay that it declares; None if it declares none."""
         try:
             declared = getattr(self._made, "delay", None)
         except Exception as error:
@@ -113,10 +113,10 @@ class Foreign:
         return float(declared) if isinstance(declared, int | float | np.floating) else None
 
     def step(self, q: Floats) -> Floats:
-        """One tick.
+        """Shape one sample.
 
         Raises:
-            ShaperFaultError: It raises, or what it gives is no position.
+            ShaperFaultError: It raises an exception, or its output is not a position.
         """
         f_d, zeta = self._estimator.estimate(self._q_star)
         info = replace(self._info, f_d=f_d.copy(), zeta=zeta.copy())
@@ -148,12 +148,12 @@ _loaded: dict[Path, Callable[[], Any]] = {}
 
 
 def load_shaper(path: Path) -> Callable[[], Any]:
-    """What makes a new shaper of a file: its class with `step`, or its function `step`.
+    """Return a function that creates the file's shaper: its class with `step`, or one that returns its module.
 
-    The file is run once a process: what it keeps in its module lasts from motion to motion.
+    The file is run once in each process, so the state of its module persists from motion to motion.
 
     Raises:
-        CandidateError: It cannot be read or run, or holds no shaper, or several.
+        CandidateError: The file cannot be read or run, or contains no shaper or several.
     """
     file = path.resolve()
     if file not in _loaded:

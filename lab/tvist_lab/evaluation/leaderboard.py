@@ -1,4 +1,4 @@
-"""The bench's leaderboard: rows from scores."""
+"""The benchmark's leaderboard, computed from scores."""
 
 import math
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from tvist_lab.evaluation.shaperbench import PAYLOAD_ERRORS, BenchJob, Score, Sc
 from tvist_lab.recordings import Floats
 
 KEPT = 1.003
-"""A peak below this times its limit keeps it [-]."""
+"""Largest ratio of a peak to its limit that counts as within the limit [-]."""
 
 
 def leaderboard(
@@ -25,14 +25,14 @@ def leaderboard(
     done: Sequence[Scores],
     bent: Sequence[tuple[Bend, float | None]],
 ) -> dict[str, Any]:
-    """Rows, the earliest still first; those that cannot be ranked at the end.
+    """Return the rows, ordered by the time until still; candidates that cannot be ranked come last.
 
     Args:
-        candidates: The first is waiting.
-        faults: One a candidate, of `inspect`.
+        candidates: Candidates, of which the first is waiting.
+        faults: Result of `inspect` for each candidate.
         jobs: Jobs of the candidates without a fault.
-        done: What came of them.
-        bent: Curved paths and what came of them.
+        done: Results of these jobs.
+        bent: Curved paths and their results.
     """
     by_candidate: dict[str, list[tuple[BenchJob, Scores]]] = {one.name: [] for one in candidates}
     for job, scores in zip(jobs, done, strict=True):
@@ -74,13 +74,13 @@ def leaderboard(
 
 
 def _place(row: dict[str, Any]) -> tuple[float, float]:
-    """Settling, then residual; what is never still comes last."""
+    """Key of the order: settling, then residual; a candidate that never settles comes last."""
     still = row["time_until_still_ms"]["median"]
     return (math.inf if still is None else still, row["residual_m_s2"]["median"])
 
 
 def _beats(other: dict[str, Any], row: dict[str, Any]) -> bool:
-    """Whether another is better in settling or residual and worse in neither."""
+    """Return whether another candidate is better in settling or residual, and worse in neither."""
     ours, theirs = _place(row), _place(other)
     return theirs != ours and theirs[0] <= ours[0] and theirs[1] <= ours[1]
 
@@ -117,7 +117,7 @@ def _row(
 
 
 def _summary(pairs: list[tuple[Score, Score]]) -> dict[str, Any]:
-    """Summarize scores, each with that of waiting on the same arm, move and payload."""
+    """Summarize scores, each paired with the score of waiting for the same arm, move and payload."""
     still = np.array([1e3 * score.still for score, _ in pairs])
     worth = [100.0 * (1.0 - a.residual / b.residual) for a, b in pairs if b.residual >= WORTH]
     return {
@@ -134,6 +134,6 @@ def _percentiles(values: Sequence[float], **shares: float) -> dict[str, float]:
 
 
 def _time(values: Floats, share: float) -> float | None:
-    """Percentile of times of which some may be endless; None where it is."""
+    """Percentile of times, some of which may be infinite; None if the percentile is."""
     found = float(np.percentile(values, share, method="higher"))
     return round(found, 6) if math.isfinite(found) else None

@@ -1,7 +1,7 @@
-"""The control line without a server: a reference, what a shaper makes of it, and what an arm does with that.
+"""The control line without a server: a reference, its shaping, and the response of an arm.
 
-A shaper sees nothing but the reference, so what it makes of it can be computed first, and then be given to any number
-of arms. To the bit it is what the line does tick by tick.
+A shaper sees only the reference, so its output can be computed first and then be applied to any number of arms. The
+result equals that of the tick-by-tick line to the last bit.
 """
 
 from collections.abc import Callable
@@ -28,29 +28,29 @@ from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.filter import TvistFilter
 
 PAPER = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
-"""The paper's limits, and a `move_j`'s where none are given."""
+"""The paper's limits, which are also the defaults of `move_j`."""
 LONGEST = 3.0
-"""Time after the reference's end in which a shaped reference has to end [s]."""
+"""Time after the reference's end within which a shaped reference has to end [s]."""
 REST = 0.7
-"""Time simulated after that [s]."""
+"""Time simulated after the end of the shaped reference [s]."""
 
 Step = Callable[[Floats], Floats]
-"""A shaper at work: sample of the reference to shaped sample, both of shape (n,) [rad]."""
+"""A shaper in operation: converts a sample to a shaped sample, both of shape (n,) [rad]."""
 
 
 class Unchanged(TvistFilter):
-    """Gives what it gets: a trajectory that was shaped before is not shaped again."""
+    """Returns its input, for trajectories that are shaped already."""
 
     def __init__(self, joints: int) -> None:
         super().__init__(shaper("none"), Fixed([10.0], [0.1]), joints=joints)
 
     def filter(self, q_ref: npt.ArrayLike) -> Floats:
-        """The sample."""
+        """Return the sample."""
         return np.asarray(q_ref)
 
 
 class Played(Trajectory):
-    """A reference known in full.
+    """A reference that is completely known.
 
     Args:
         q: Its samples, shape (T, n) [rad].
@@ -60,19 +60,19 @@ class Played(Trajectory):
         self._q, self._next = q, 0
 
     def next(self) -> Floats:
-        """The next sample; after the last one, that again."""
+        """Return the next sample; after the last one, return that again."""
         q: Floats = self._q[min(self._next, len(self._q) - 1)]
         self._next += 1
         return q
 
     @property
     def finished(self) -> bool:
-        """Whether the last sample was given."""
+        """Whether the last sample was returned."""
         return self._next >= len(self._q)
 
 
 def point_to_point(start: Floats, target: Floats, limits: MotionLimits = PAPER) -> Floats:
-    """Reference of a double S from the first sample that may move to the one at the target, shape (T, n) [rad]."""
+    """Reference of a double S, from the first sample that may move to the one at the target, shape (T, n) [rad]."""
     trajectory = quickest_motion(JointLine(start, target), limits, PERIOD)
     samples = []
     while not trajectory.finished:
@@ -81,10 +81,10 @@ def point_to_point(start: Floats, target: Floats, limits: MotionLimits = PAPER) 
 
 
 def round_a_corner(start: Floats, corner: Floats, target: Floats, limits: MotionLimits = PAPER) -> Floats:
-    """Two double S of which the second begins when the first has a quarter of its time left: a curved path.
+    """A curved path: two double S, of which the second begins when a quarter of the first's time is left.
 
     Returns:
-        Shape (T, n) [rad]. Where both move, velocity and acceleration are sums.
+        Samples, shape (T, n) [rad]. While both move, velocity and acceleration are sums.
     """
     first, second = point_to_point(start, corner, limits), point_to_point(corner, target, limits)
     joined = (3 * len(first)) // 4
@@ -98,19 +98,19 @@ def round_a_corner(start: Floats, corner: Floats, target: Floats, limits: Motion
 
 
 def lengthened(start: Floats, target: Floats, ticks: int, limits: MotionLimits = PAPER) -> Floats:
-    """Reference of a double S that takes as long as another motion, by a lower jerk: no shaper, no model at all.
+    """Reference of a double S with reduced jerk that takes as long as another motion; it uses no shaper and no model.
 
     Args:
-        start: Shape (n,) [rad].
-        target: Shape (n,) [rad].
-        ticks: How long it is to last.
-        limits: What it keeps.
+        start: Joint angles at the start, shape (n,) [rad].
+        target: Joint angles at the end, shape (n,) [rad].
+        ticks: Requested duration.
+        limits: Limits of the motion.
 
     Returns:
-        Shape (T, n) [rad], T at most a tick from what was wanted.
+        Samples, shape (T, n) [rad]; T differs from the request by at most a tick.
     """
     low, high = np.log(1e-2 * limits.jerk), np.log(limits.jerk)
-    for _ in range(30):  # the lower the jerk, the longer it takes
+    for _ in range(30):  # the duration increases as the jerk decreases
         middle = 0.5 * (low + high)
         slower = MotionLimits(limits.velocity, limits.acceleration, float(np.exp(middle)))
         if quickest_motion(JointLine(start, target), slower, PERIOD).duration > ticks * PERIOD:
@@ -123,14 +123,15 @@ def lengthened(start: Floats, target: Floats, ticks: int, limits: MotionLimits =
 
 
 def shape(step: Step, reference: Floats) -> tuple[Floats, bool]:
-    """What a shaper makes of a reference that rests at its last sample.
+    """Shape a reference that is at rest at its last sample.
 
     Args:
         step: The shaper, at rest at the first sample.
-        reference: Shape (T, n) [rad].
+        reference: Reference, shape (T, n) [rad].
 
     Returns:
-        Shaped samples up to the last that moves and for a while more, shape (T', n) [rad]; and whether it ended.
+        Shaped samples up to the last one that moves and for a while longer, shape (T', n) [rad]; and whether it
+        ended.
     """
     target, shaped = reference[-1], [step(q) for q in reference]
     quiet = 0
@@ -146,21 +147,21 @@ def shape(step: Step, reference: Floats) -> tuple[Floats, bool]:
 def simulate(
     cycle: ControlCycle, start: Floats, reference: Floats, shaped: Floats, seed: int, delay: float = 0.0
 ) -> Recording:
-    """Let a plant follow a shaped reference from rest, and rest for a while.
+    """Let a plant follow a shaped reference from rest, and then rest for a while.
 
     Args:
-        cycle: The line, with `Unchanged` for a filter and any plant at its end.
+        cycle: The control line, with `Unchanged` as its filter and any plant.
         start: Joint angles at which the arm rests, shape (n,) [rad].
-        reference: The unshaped one that all is compared with, shape (T, n) [rad].
-        shaped: What the arm is to follow, shape (T', n) [rad].
+        reference: The unshaped reference, which everything is compared with, shape (T, n) [rad].
+        shaped: The reference that the arm follows, shape (T', n) [rad].
         seed: Seed of sensor noise and gear errors.
-        delay: That the shaper declares [s].
+        delay: Delay that the shaper declares [s].
 
     Returns:
-        Columns that the metrics on a common clock want, from a tick before the motion on.
+        Columns for the metrics on a common clock, from a tick before the motion on.
 
     Raises:
-        ValueError: The plant does not know its truth.
+        ValueError: The plant does not provide the truth.
     """
     plant = cycle.plant
     cycle.reset(start, seed=seed)
@@ -200,14 +201,14 @@ def control_line(
     carried: Payload,
     plant: Plant | None = None,
 ) -> ControlCycle:
-    """The line from shaped reference to arm, without a shaper.
+    """Create a control line from shaped reference to arm, without a shaper.
 
     Args:
-        description: What the controller believes the arm to be.
+        description: The controller's model of the arm.
         start: Joint angles at which the arm rests, shape (n,) [rad].
-        declared: The payload the controller counts on.
-        carried: The payload the arm has.
-        plant: What the line moves; None: the arm that the description describes.
+        declared: Declared payload.
+        carried: Payload that the arm carries.
+        plant: Plant to control; None for the arm of the description.
     """
     joints = description.joints
     return ControlCycle(

@@ -1,4 +1,4 @@
-"""The bench's results as a page of the documentation."""
+"""The benchmark's results as a page of the documentation."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,7 +10,7 @@ COLUMNS = (
 
 
 def page(result: dict[str, Any]) -> str:
-    """All tables, and what the columns mean."""
+    """Return all tables, with explanations of their columns."""
     ranked = [row for row in result["shapers"] if row["ranked"]]
     arms = list(result["arms"])
     return f"""# ShaperBench
@@ -88,7 +88,7 @@ The other two tables show the median of *ring* in m/s².
 
 
 def _told(ranked: Sequence[dict[str, Any]]) -> str:
-    """A sentence on those that know the target of a move."""
+    """Return a sentence about the candidates that know the target of a move."""
     names = [f"`{row['name']}`" for row in ranked if row["told_target"]]
     if not names:
         return ""
@@ -118,7 +118,7 @@ def _figures(row: dict[str, Any]) -> list[str]:
 def _by(
     ranked: Sequence[dict[str, Any]], key: str, names: Sequence[str], path: tuple[str, str], digits: int
 ) -> str:
-    """One column a name, the best of each in bold."""
+    """Return a table with one column for each name, and the best value of each in bold."""
     values = {row["name"]: [row[key][name][path[0]][path[1]] for name in names] for row in ranked}
     best = [
         min((column[place] for column in values.values() if column[place] is not None), default=None)

@@ -1,4 +1,4 @@
-"""Moves to evaluate: from a file, or drawn at random."""
+"""Moves to evaluate, read from a file or drawn at random."""
 
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -20,38 +20,38 @@ from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import Angle, Mass
 
 LEAST = 1e-4
-"""A move whose joints turn by less than this goes nowhere [rad]."""
+"""A move in which no joint turns by more than this counts as going nowhere [rad]."""
 STROKE = (0.3, 1.0)
-"""Share of the way to an independent configuration that a random move goes [-]."""
+"""Length of a random move, as a share of the way to an independent configuration [-]."""
 TRIES = 1000
-"""Draws for one random move before none is believed to exist."""
+"""Number of draws for one random move before giving up."""
 WITH_WRISTS = Region(low=(*WORKSPACE.low, -np.pi, -np.pi), high=(*WORKSPACE.high, np.pi, np.pi))
-"""The workspace with the wrist's two outer joints anywhere."""
+"""The workspace with any angles of the wrist's two outer joints."""
 
 
 class MovesError(ValueError):
-    """Moves cannot be evaluated; the sentence names the move, the joint and the limit."""
+    """Moves cannot be evaluated; the message names the move, the joint and the limit."""
 
 
 @dataclass(frozen=True)
 class Move:
-    """From rest to rest."""
+    """A move from rest to rest."""
 
     start: tuple[float, ...]
-    """One angle a joint [rad]."""
+    """Joint angles at the start [rad]."""
     target: tuple[float, ...]
-    """One angle a joint [rad]."""
+    """Joint angles at the end [rad]."""
     mass: float
     """Mass of the payload [kg]."""
 
 
 class _Entry(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A move of a file."""
+    """A move in a file."""
 
     start: tuple[Angle, ...]
     target: tuple[Angle, ...]
     payload: Mass | None = None
-    """Payload of this move; None: the command's [kg]."""
+    """Payload of this move; None for the one given on the command line [kg]."""
 
 
 Entries = Annotated[tuple[_Entry, ...], Meta(min_length=1)]
@@ -61,14 +61,14 @@ def read_moves(path: Path, description: RobotDescription, masses: Callable[[], f
     """Read and check a file of moves.
 
     Args:
-        path: JSON: a list of maps with `start` and `target`, one angle a joint [rad], and `payload` [kg] where a
-            move has one of its own.
+        path: JSON file with a list of maps with `start` and `target`, one angle per joint [rad], and optionally
+            `payload` [kg].
         description: The robot.
-        masses: What the arm carries in the next move that does not say so [kg].
+        masses: Returns the payload of the next move that does not specify one [kg].
 
     Raises:
-        MovesError: It cannot be read, or a move is beyond a limit or goes nowhere.
-        UserFileError: It is no file of that size, or is nested too deeply.
+        MovesError: The file cannot be read, or a move exceeds a limit or goes nowhere.
+        UserFileError: The file is not text, too large or nested too deeply.
     """
     try:
         entries = checked(parse_json(read_bytes(path, "moves")), Entries)
@@ -86,21 +86,21 @@ def read_moves(path: Path, description: RobotDescription, masses: Callable[[], f
 
 
 def write_moves(path: Path, moves: Sequence[Move]) -> None:
-    """Write a file that `read_moves` reads."""
+    """Write a file for `read_moves`."""
     entries = [_Entry(start=move.start, target=move.target, payload=move.mass) for move in moves]
     path.write_bytes(msgspec.json.format(msgspec.json.encode(entries), indent=1) + b"\n")
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """Random moves, and how many draws they took."""
+    """Random moves, and the number of draws they took."""
 
     moves: list[Move]
     draws: int
 
     @property
     def share(self) -> float:
-        """Share of the draws that were free of collision [-]."""
+        """Share of the draws that were free of collisions [-]."""
         return len(self.moves) / self.draws
 
 
@@ -113,18 +113,18 @@ def draw_moves(
     wrists: bool = False,
     progress: Callable[[], None] = lambda: None,
 ) -> Drawn:
-    """Random moves between configurations of the workspace, free of collision from start to target.
+    """Draw random moves between configurations of the workspace, free of collisions from start to target.
 
     Args:
         description: The robot.
-        count: How many.
-        seed: Seed of everything drawn.
-        masses: Least and largest mass carried, uniform between them [kg].
-        wrists: Turn the two outer joints of the wrist, too; otherwise they rest at zero.
-        progress: Told of each move found.
+        count: Number of moves.
+        seed: Seed of all random numbers.
+        masses: Smallest and largest carried mass, uniformly distributed between them [kg].
+        wrists: Whether to turn the two outer joints of the wrist, too; otherwise they stay at zero.
+        progress: Called after each move found.
 
     Raises:
-        MovesError: Hardly any draw is free of collision.
+        MovesError: Hardly any draw is free of collisions.
     """
     random = np.random.default_rng(seed)
     collision = CollisionModel(description, body(paper_payload(description, masses[1])))
@@ -144,7 +144,7 @@ def draw_moves(
 
 
 def is_free(collision: CollisionModel, move: Move) -> bool:
-    """Whether the arm meets neither itself nor the floor on a straight way in joint space."""
+    """Return whether the arm stays clear of itself and the floor on the straight line in joint space."""
     start, target = np.array(move.start), np.array(move.target)
     if collision.meeting(start) or collision.meeting(target):
         return False
@@ -152,7 +152,7 @@ def is_free(collision: CollisionModel, move: Move) -> bool:
 
 
 def meeting(collision: CollisionModel, move: Move) -> str | None:
-    """What meets what on a move, in words; None where nothing does."""
+    """Return which bodies meet on a move, in words; None if none do."""
     start, target = np.array(move.start), np.array(move.target)
     found = collision.on_way(JointLine(start, target).whole)
     if found is None:
@@ -162,7 +162,7 @@ def meeting(collision: CollisionModel, move: Move) -> str | None:
 
 
 def collisions(description: RobotDescription, moves: Sequence[Move]) -> list[str | None]:
-    """What meets what on each move."""
+    """Return which bodies meet on each move."""
     collision = CollisionModel(description, body(paper_payload(description, 0.0)))
     found = []
     for move in moves:
@@ -176,7 +176,7 @@ def collisions(description: RobotDescription, moves: Sequence[Move]) -> list[str
 def _draws(
     random: np.random.Generator, region: Region, joints: int, masses: tuple[float, float]
 ) -> Iterator[Move]:
-    """Candidates without end."""
+    """Yield candidates without end."""
     used = min(len(region.low), joints)
     low, high = (np.array(side)[:used] for side in (region.low, region.high))
     while True:
@@ -204,7 +204,7 @@ def _check(number: int, move: Move, description: RobotDescription) -> None:
 
 
 def _in_words(why: str) -> str:
-    """A sentence with the place as a person counts: `[2].start[1]` is move 3, start, joint 2."""
+    """Return a sentence with the position counted from 1: `[2].start[1]` is move 3, start, joint 2."""
     words = re.sub(r"^\[(\d+)\]\.?", lambda found: f"move {int(found[1]) + 1}, ", why)
     words = re.sub(
         r"^(move \d+, \w+)\[(\d+)\]", lambda found: f"{found[1]}, joint {int(found[2]) + 1}", words

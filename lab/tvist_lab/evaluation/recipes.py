@@ -1,4 +1,4 @@
-"""Filters for a move: as the server makes them, with a payload believed in and, on purpose, a wrong frequency."""
+"""Filters for a move, as the server creates them, and optionally with a deliberately wrong frequency."""
 
 from dataclasses import dataclass, replace
 
@@ -20,11 +20,11 @@ from tvist_shaping.named import Registry
 
 
 class RecipeError(ValueError):
-    """There is no such filter for this arm; the sentence says why."""
+    """There is no such filter for this arm; the message says why."""
 
 
 class Mistaken(Estimator):
-    """Another estimator's modes, at a frequency that is wrong by a share.
+    """Another estimator's modes with wrong frequencies.
 
     Args:
         right: The other estimator.
@@ -39,28 +39,28 @@ class Mistaken(Estimator):
 
     @property
     def modes(self) -> int:
-        """Number of modes, the same as the other's."""
+        """Number of modes, equal to the other estimator's."""
         return self._right.modes
 
     @property
     def f_d_min(self) -> float:
-        """The other's, as wrong [Hz]."""
+        """Lowest frequency of the other estimator, with the error [Hz]."""
         return self._right.f_d_min * self._factor
 
     @property
     def zeta_max(self) -> float:
-        """The other's."""
+        """Highest damping ratio of the other estimator [-]."""
         return self._right.zeta_max
 
     def _part(self) -> None:
         self._right = self._right.fork()
 
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
-        """Modes at a configuration; see `Estimator.estimate`."""
+        """Return the modes at a configuration; see `Estimator.estimate`."""
         return self._wrong(self._right.estimate(q))
 
     def settle(self, q: Floats) -> tuple[Floats, Floats]:
-        """Modes anew; see `Estimator.settle`."""
+        """Compute the modes anew; see `Estimator.settle`."""
         return self._wrong(self._right.settle(q))
 
     def _wrong(self, modes: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
@@ -71,29 +71,29 @@ class Mistaken(Estimator):
 
 @dataclass(frozen=True)
 class Recipe:
-    """What a filter is made of; it travels between processes, where a filter would not."""
+    """Ingredients of a filter; they can be sent to another process, which a filter cannot."""
 
     shaper: str
     """Name of a filter, as in `set_shaper`."""
     calibration: Calibration | None
-    """What is known of the arm; where there is a modal model, that, else polynomials."""
+    """Calibration of the arm; its modal model is used if there is one, else its polynomials."""
     frequency_error: float = 0.0
     """Share by which every frequency is too high [-]."""
     modes: int = 1
-    """That a shaper of the catalogue suppresses; more than one takes a modal calibration."""
+    """Number of modes that a shaper of the catalogue suppresses; more than one requires a modal calibration."""
     own: tuple[OwnShaper, ...] = ()
-    """Shapers from files, which may be named beside those that come with the package."""
+    """Shapers from files, available by name beside those that come with the package."""
 
     def make(self, description: RobotDescription, mass: float) -> Filter:
-        """The filter for a payload that is believed to be the paper's disc, of another mass.
+        """Create the filter for a declared payload that is the paper's disc with another mass.
 
         Args:
             description: The robot.
             mass: Mass of the declared payload [kg].
 
         Raises:
-            RecipeError: The calibration is of another arm, or does not know the modes that the filter wants.
-            RefusalError: There is no such filter, or its parts do not go together.
+            RecipeError: The calibration belongs to another arm, or has fewer modes than the filter needs.
+            RefusalError: There is no such filter, or its parts do not fit together.
         """
         known = Registry(own.shaper for own in self.own)
         modes = wanted_modes(self.shaper, self.modes, "shaper", known)
@@ -103,15 +103,15 @@ class Recipe:
         return choose_filter(self.shaper, estimator, description.joints, known=known)
 
     def estimator(self, description: RobotDescription, mass: float, modes: int) -> Estimator:
-        """What the filter learns the modes from.
+        """Create the estimator that provides the filter's modes.
 
         Args:
             description: The robot.
             mass: Mass of the declared payload [kg].
-            modes: How many.
+            modes: Number of modes.
 
         Raises:
-            RecipeError: The calibration is of another arm, or does not know so many.
+            RecipeError: The calibration belongs to another arm, or has fewer modes.
         """
         known = self.calibration
         if known is None:
@@ -131,5 +131,5 @@ class Recipe:
 
 
 def spared(limits: MotionLimits, tvist: Filter) -> MotionLimits:
-    """What a reference is to keep so that the shaped one keeps these limits."""
+    """Limits of a reference such that the shaped reference keeps the given limits."""
     return replace(limits, acceleration=(1.0 - tvist.excess) * limits.acceleration)

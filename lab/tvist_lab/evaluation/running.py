@@ -1,4 +1,4 @@
-"""A shaper on one reference: run to its end, and watched for what it hides."""
+"""A shaper applied to one reference until it ends, with checks for hidden motion."""
 
 import time
 from collections.abc import Callable
@@ -14,49 +14,49 @@ from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
 WATCHED = 0.5
-"""Time for which a shaped reference that has ended is watched for a tail [s]."""
+"""Time for which the output is checked for a tail after it has ended [s]."""
 TAIL = 1e-6
-"""So far it may move in that time, or stay away from the target [rad]."""
+"""Largest motion in that time, and largest distance from the target [rad]."""
 SLACK = 3
-"""Ticks by which a shaper may end later than it declares: interpolation takes samples on both sides."""
+"""Ticks by which a shaper may end later than declared, since interpolation uses samples on both sides."""
 WARM = 20
-"""First ticks of a reference, whose time does not count: they may compile."""
+"""Number of first ticks whose processing time is ignored, since they may compile code."""
 ENDED = 10
-"""So many ticks at the target are an end."""
+"""Number of ticks at the target after which the output has ended."""
 
 
 class ShaperFaultError(Exception):
-    """A shaper cannot be ranked; the sentence says why."""
+    """A shaper cannot be ranked; the message says why."""
 
 
 @dataclass(frozen=True)
 class Shaped:
-    """What a shaper made of a reference."""
+    """Result of shaping a reference."""
 
     q: Floats
-    """Shape (T', n), up to the end and a few ticks more [rad]."""
+    """Samples up to the end and a few ticks more, shape (T', n) [rad]."""
     delay: float
-    """From the reference's end to its own, but no more than it declared [s]."""
+    """Time from the reference's end to the output's, limited to the declared delay [s]."""
     cost: float | None
-    """Processor time of a tick, as it happened to take [s]."""
+    """Measured processor time per tick [s]."""
 
 
 class RunningShaper(Protocol):
-    """A shaper at work on one reference."""
+    """A shaper in operation on one reference."""
 
     def step(self, q: Floats) -> Floats:
-        """The next sample, shape (n,) [rad]."""
+        """Return the next sample, shape (n,) [rad]."""
 
     @property
     def delay(self) -> float | None:
-        """By which its last output is spread over the past [s]; None where it does not say."""
+        """Time over which the last output depends on the past [s]; None if the shaper does not declare it."""
 
 
 def sound(tvist: Filter) -> Callable[[Floats], Floats]:
-    """Shape by a filter for as long as its shaper's function gives weights: no figure may come from old ones.
+    """Shape with a filter, but fail when its shaper's function does, so that no figure is based on old weights.
 
     Returns:
-        Sample to shaped sample; raises `ShaperFaultError` where the function fails.
+        Function from sample to shaped sample; it raises `ShaperFaultError` if the shaper's function fails.
     """
 
     def step(q: Floats) -> Floats:
@@ -69,10 +69,10 @@ def sound(tvist: Filter) -> Callable[[Floats], Floats]:
 
 
 def run(stepper: RunningShaper, reference: Floats) -> Shaped:
-    """Feed a reference to a shaper, let it end, and watch it for a while.
+    """Apply a shaper to a reference until it ends, and monitor it for a while after that.
 
     Raises:
-        ShaperFaultError: It does not end at the target, or goes on after its end or its declared delay.
+        ShaperFaultError: It does not end at the target, or moves after its end or its declared delay.
     """
     target, stop = reference[-1], len(reference) - 1
     warm = min(WARM, stop)
@@ -107,7 +107,7 @@ def run(stepper: RunningShaper, reference: Floats) -> Shaped:
 
 
 def _keep_word(q: list[Floats], stop: int, declared: list[float | None], own: float) -> None:
-    """Check that nothing moves later than was declared at that tick."""
+    """Check that the output does not move for longer than was declared at each tick."""
     for late, said in enumerate(declared):
         if said is None or late * PERIOD <= said + SLACK * PERIOD:
             continue

@@ -1,4 +1,4 @@
-"""ShaperBench: every shaper on eight arms, the same random moves, and payloads that are not quite what is declared."""
+"""ShaperBench: all shapers on eight arms, with the same random moves, and payloads other than declared."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -35,32 +35,32 @@ PAYLOAD_ERRORS = (0.0, 0.1, -0.1)
 
 @dataclass(frozen=True)
 class BenchJob:
-    """A move by one candidate with one payload error, on all arms."""
+    """A move with one candidate and one payload error, on all arms."""
 
     description: RobotDescription
     candidate: Candidate
     move: Move
-    """With the mass that is carried."""
+    """The move, with the carried mass."""
     error: float
     """Error of the declared mass [-]."""
     seed: int
     """Seed of gear errors and scatter."""
     arms: tuple[int, ...]
-    """Numbers of the arms."""
+    """Indices of the arms."""
 
 
 @dataclass(frozen=True)
 class Score:
-    """One move on one arm."""
+    """Result of one move on one arm."""
 
     arm: int
     error: float
     still: float
-    """Time until still, from the stop of the unshaped reference; ∞ where it was not still when the rest ended [s]."""
+    """Time until still, from the stop of the unshaped reference [s]; ∞ if not still at the end of the recording."""
     residual: float
-    """Envelope of α within 3 to 60 Hz, largest after that stop and the shaper's delay [m/s²]."""
+    """Largest envelope of α within 3 to 60 Hz after that stop plus the shaper's delay [m/s²]."""
     in_motion: float
-    """rms of α against the rigid arm [m/s²]."""
+    """rms of α relative to the rigid arm [m/s²]."""
 
 
 @dataclass(frozen=True)
@@ -77,11 +77,11 @@ class Scores:
     cost: float | None
     """Processor time of a tick [s]."""
     fault: str | None = None
-    """Why there are no scores."""
+    """Why there are no scores; None if there are."""
 
 
 def inspect(candidate: Candidate, description: RobotDescription, moves: Sequence[Move]) -> str | None:
-    """Why a candidate cannot be ranked, found before anything moves; None where nothing was."""
+    """Return why a candidate cannot be ranked, determined without any motion; None if no reason was found."""
     for move in moves[:2]:
         try:
             check_causal(candidate, _task(description, move))
@@ -98,7 +98,7 @@ def jobs(
     *,
     quick: bool,
 ) -> list[BenchJob]:
-    """All of them: candidate by move by payload error; when it has to be quick, each move has one error in turn."""
+    """Return all jobs: candidate by move by payload error; in the quick version, one error in turn for each move."""
     arms = tuple(range(len(ARMS)))
     errors = [
         (PAYLOAD_ERRORS[number % len(PAYLOAD_ERRORS)],) if quick else PAYLOAD_ERRORS
@@ -118,7 +118,7 @@ def play(jobs: Sequence[BenchJob]) -> Iterator[Scores]:
 
 
 def judge(job: BenchJob) -> Scores:
-    """Shape once, and let every arm follow."""
+    """Shape once, and let every arm follow the result."""
     description, move = job.description, job.move
     declared = move.mass * (1.0 + job.error)
     task = _task(description, replace(move, mass=declared))
@@ -150,7 +150,7 @@ def _score(number: int, job: BenchJob, recording: Recording) -> Score:
         still = still_after(recording, motion) - motion.duration(recording)
     except NotMeasurableError:
         still = math.inf
-    # The published target is a tick late.
+    # The published target is one tick late.
     declared = recording["shaper_delay"][motion.reference_stop]
     after = motion.reference_stop + 1 + math.ceil(declared / recording.period - 1e-6)
     ringing = envelope(best_tool_acceleration(recording)[after + 1 :], recording.period)
@@ -181,5 +181,5 @@ def kinematics(description: RobotDescription) -> Kinematics:
 
 
 def draw(description: RobotDescription, count: int, seed: int) -> list[Move]:
-    """The moves of the bench, each with a payload of its own up to what the arm is rated for."""
+    """Return the moves of the benchmark, each with its own payload up to the arm's rating."""
     return draw_moves(description, count, seed, (0.0, description.limits.payload)).moves

@@ -1,4 +1,4 @@
-"""Who stands on the bench."""
+"""The candidates of the benchmark."""
 
 from collections.abc import Sequence
 
@@ -20,9 +20,9 @@ OWN = (
     ("short", 1, "constant mean delay, short"),
     ("auto-target", 1, "constant mean delay, given the end of each move"),
 )
-"""Our shapers: name, modes, what they are."""
+"""Our shapers: name, number of modes, description."""
 PRODUCT_MODES = 3
-"""Whose zero-vibration shapers the product is of."""
+"""Number of modes in the product of zero-vibration shapers."""
 
 
 def candidates(
@@ -31,16 +31,16 @@ def candidates(
     mine: str | OwnShaper | None,
     against: Sequence[str] | None,
 ) -> list[Candidate]:
-    """Who stands on the bench.
+    """Return the candidates.
 
     Args:
         description: The robot.
-        calibration: With a modal model; all estimates are its.
-        mine: A person's own shaper: path of a file with a class that has `step`, or one that was loaded.
-        against: Names of those to run beside waiting, which all are compared with; None: all.
+        calibration: Calibration with a modal model, the source of all estimates.
+        mine: The user's own shaper: path of a file with a class that has `step`, or a loaded shaper.
+        against: Names of the candidates to run besides waiting, with which all are compared; None for all.
 
     Raises:
-        KeyError: There is none of a name.
+        KeyError: There is no candidate of that name.
     """
     waiting = Named(Recipe("none", calibration), "none", "waiting, unshaped")
     recipe = Recipe("zv", calibration)
@@ -66,7 +66,7 @@ def candidates(
 
 
 def _product(recipe: Recipe, description: RobotDescription) -> Held:
-    """Held back to the longest mean delay that it has anywhere, with any payload that the bench declares."""
+    """Return the product, delayed to its longest mean delay over the workspace and all declared payloads."""
     most = (1.0 + max(PAYLOAD_ERRORS)) * description.limits.payload
     delay = longest_mean_delay(recipe, description, (0.0, most), PRODUCT_MODES)
     return Held(recipe, delay, PRODUCT_MODES, "product", "constant mean delay, product of three ZV")

@@ -1,4 +1,4 @@
-"""The catalogue of shapers: what each leaves when the frequency is wrong, and what that costs in time."""
+"""The catalogue of shapers: residual vibration at a wrong frequency, and its cost in time."""
 
 from collections.abc import Iterable, Sequence
 
@@ -14,23 +14,23 @@ FAMILIES = {
     "Extra-insensitive": ("ei", "ei_exact", "si", "ei2", "ei2_exact", "ei3", "ei3_exact"),
     "Negative impulses: short, but beyond the reference's limits": ("um_zv", "um_zvd"),
 }
-"""Panels, and who is in them; whoever is in none has one at the end."""
+"""Panels and their shapers; those in none of them share a panel at the end."""
 COLORS = (UNSHAPED, SHAPED, THIRD, "#CC79A7", INK, "#E69F00", "#56B4E9", FAINT)
 SHOWN = (0.4, 1.7)
-"""True over assumed frequency on the axis [-]."""
+"""Range of the axis: true divided by assumed frequency [-]."""
 HIGHEST = 25.0
-"""Residual vibration on the axis [%]."""
+"""Largest residual vibration on the axis [%]."""
 ALLOWED = 0.05
-"""Residual vibration that the width of a band is told for [-]."""
+"""Residual vibration at which the width of a band is measured [-]."""
 WIDEST = 1.6
-"""Width of a band that is drawn; one without end is drawn here [-]."""
+"""Largest width that is drawn; unlimited bands are drawn here [-]."""
 
 
 def catalogue_figure(shapers: Iterable[Shaper], zeta: float = 0.0) -> Figure:
-    """Residual vibration of each shaper over the true frequency, and the width of its band over its duration.
+    """Residual vibration of each shaper against the true frequency, and the width of its band against its duration.
 
     Args:
-        shapers: The shapers; one that is not for this damping, and one that does not shape, is left out.
+        shapers: The shapers; those that do not support this damping, or do not shape, are left out.
         zeta: Damping ratio, assumed and true [-].
     """
     shown = {shaper.name: shaper for shaper in shapers if zeta < shaper.zeta_max and shaper.duration_periods}
@@ -67,7 +67,7 @@ def _curves(panel: Axes, shapers: Sequence[Shaper], zeta: float) -> None:
 def _price(panel: Axes, shapers: Sequence[Shaper], zeta: float) -> None:
     points: dict[tuple[float, float], list[Shaper]] = {}
     for shaper in shapers:
-        low, high = shaper.band(ALLOWED * (1.0 + 1e-4), zeta)  # a hump of 5 % is within 5 %
+        low, high = shaper.band(ALLOWED * (1.0 + 1e-4), zeta)  # count a hump of exactly 5 % as inside
         width = min(high - low, WIDEST)
         duration = shaper.function(1.0, zeta).duration
         points.setdefault((round(duration, 2), round(width, 2)), []).append(shaper)

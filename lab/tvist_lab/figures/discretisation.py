@@ -1,4 +1,4 @@
-"""Figure 7: what becomes of a shaped reference when a moving impulse is rounded to ticks."""
+"""Figure 7: error of a shaped reference when a moving impulse is rounded to ticks."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,7 +12,7 @@ PERIOD = 0.002
 ZETA = 0.2
 """Damping ratio of the mode shown [-]."""
 F_D = (10.0, 8.6)
-"""Damped frequency at the start and at the end of what is shown [Hz]."""
+"""Damped frequency at the start and the end of the time shown [Hz]."""
 VELOCITY = 1.5
 """Largest velocity of the reference [rad/s]."""
 ACCELERATION = 2.0
@@ -22,10 +22,9 @@ DURATION = 0.06
 
 
 def figure_7() -> Figure:
-    """The discretisation problem: a ZV while f_d falls, its second impulse rounded to ticks or between them.
+    """Discretisation of a ZV shaper while f_d falls, with its second impulse rounded to ticks or between them.
 
-    Top: the impulse's delay. Middle: how far the shaped reference is from the exact one. Bottom: its
-    acceleration.
+    Top: the impulse's delay. Middle: deviation of the shaped reference from the exact one. Bottom: its acceleration.
     """
     ticks = round(DURATION / PERIOD)
     first = round(0.5 / PERIOD)
@@ -69,7 +68,7 @@ def figure_7() -> Figure:
 
 
 def _shape(first: int, f_d: Floats) -> tuple[Floats, Floats, Floats]:
-    """The reference from a tick on, shaped exactly, with rounded and with fractional delays [rad]."""
+    """Return the reference from a tick on, shaped exactly, with rounded delays and with fractional ones [rad]."""
     line = tvist_shaping.DelayLine(1, 200)
     line.fill([_reference(0.0)])
     shaped = []
@@ -90,7 +89,7 @@ def _shape(first: int, f_d: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _reference(time: float) -> float:
-    """A joint that accelerates from rest [rad]."""
+    """Position of a joint that accelerates from rest [rad]."""
     time = max(time, 0.0)
     ramp = VELOCITY / ACCELERATION
     return 0.5 * ACCELERATION * min(time, ramp) ** 2 + VELOCITY * max(time - ramp, 0.0)

@@ -1,4 +1,4 @@
-"""Figures of moves by the hundred: what each leaves, and one of them in time."""
+"""Figures of hundreds of moves: the residual vibration of each, and one of them against time."""
 
 from collections.abc import Sequence
 
@@ -11,11 +11,11 @@ from tvist_lab.metrics import amplitude, best_tool_acceleration, motions
 from tvist_lab.recordings import Recording
 
 FLOOR = 1e-4
-"""Smaller peaks are drawn here [m/s²]."""
+"""Smaller peaks are drawn at this value [m/s²]."""
 
 
 def residual_by_move_figure(judged: Sequence[JudgedMove]) -> Figure:
-    """Peak |α| after the stop, shaped over unshaped, a point a move; and how the reductions are distributed."""
+    """Peak |α| after the stop, shaped against unshaped, one point per move; and the distribution of the reductions."""
     figure, (above, below) = panels(2, 6.0, share_x=False, ratios=(3, 2))
     for counts, color, label in (
         (True, SHAPED, "Move"),
@@ -43,7 +43,7 @@ def residual_by_move_figure(judged: Sequence[JudgedMove]) -> Figure:
 
 
 def vibration_figure(unshaped: Recording, shaped: Recording, number: int) -> Figure:
-    """|α| of one move around its stop, unshaped and shaped; time is zero where the unshaped reference stops."""
+    """|α| of one move around its stop, unshaped and shaped; time is zero when the unshaped reference stops."""
     figure, (panel,) = panels(1, 2.8)
     for recording, color, label in ((unshaped, UNSHAPED, "Unshaped"), (shaped, SHAPED, "Shaped")):
         motion = motions(recording)[0]

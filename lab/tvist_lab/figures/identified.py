@@ -1,4 +1,4 @@
-"""How well a calibration says what was measured."""
+"""Accuracy of a calibration, compared with the measurements."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,13 +17,13 @@ def identified_figure(
     true_f_d: Floats | None,
     true_zeta: Floats | None,
 ) -> Figure:
-    """Estimated against measured (f_d, ζ), a point a configuration, and against the truth where it is known.
+    """Estimated against measured (f_d, ζ), one point per configuration, and against the truth if it is known.
 
     Args:
-        calibration: With the polynomials.
+        calibration: Calibration with polynomials.
         q: Configurations, shape (N, n) [rad].
-        f_d: Measured, shape (N,) [Hz].
-        zeta: Measured, shape (N,) [-].
+        f_d: Measured damped frequencies, shape (N,) [Hz].
+        zeta: Measured damping ratios, shape (N,) [-].
         true_f_d: Damped frequency of the lowest true mode, shape (N,) [Hz].
         true_zeta: Damping ratio of the lowest true mode, shape (N,) [-].
     """

@@ -1,4 +1,4 @@
-"""Why the mean delay must not change: the same motion through a filter whose delay does, and one whose does not."""
+"""Effect of a varying mean delay: the same motion through a filter with varying delay and one with constant delay."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -23,11 +23,11 @@ MODES = 3
 """Number of modes in the product of zero-vibration shapers."""
 NAMES = ("zv of three modes", "auto, its mean delay constant")
 AFTER = 100
-"""Ticks shown after the reference has stopped."""
+"""Number of ticks shown after the reference has stopped."""
 
 
 def mean_delay_figure() -> Figure:
-    """A UR5e from Q3 to Q1: mean delay, velocity and acceleration of the shaped elbow, by two filters.
+    """A UR5e from Q3 to Q1: mean delay, velocity and acceleration of the shaped elbow, with two filters.
 
     Top: the mean delay. Middle and bottom: velocity and acceleration, with the reference's limits.
     """

@@ -1,4 +1,4 @@
-"""ShaperBench's figure: how soon the arm is still against what rings after the shaped stop."""
+"""ShaperBench's figure: time until the arm is still against the residual vibration after the shaped stop."""
 
 import math
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from tvist_lab.figures.style import FAINT, SHAPED, THIRD, note, panels, title
 
 
 def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
-    """Each ranked shaper as a point, medians over arms, moves and payload errors; the front as a line.
+    """Draw each ranked shaper as a point, with medians over arms, moves and payload errors, and the front as a line.
 
     Args:
         rows: Rows of the leaderboard.
@@ -46,12 +46,12 @@ def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
 
 
 def _point(row: dict[str, Any]) -> tuple[float, float]:
-    """What rings [m/s²] and the time until still [ms]."""
+    """Residual vibration [m/s²] and time until still [ms]."""
     return row["residual_m_s2"]["median"], row["time_until_still_ms"]["median"]
 
 
 def _beside(place: int, point: tuple[float, float], points: Sequence[tuple[float, float]]) -> bool:
-    """Whether a name stands to the right: away from a neighbour at its level, else by turns."""
+    """Return whether to put a name on the right: away from a neighbour of similar height, else alternately."""
     x, y = point
     level = [other for other, height in points if abs(math.log(y / height)) < 0.12]
     if any(0.0 < other - x < 45.0 for other in level):

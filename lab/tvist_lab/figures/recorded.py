@@ -19,24 +19,24 @@ LEAD = 0.1
 REST = 1.0
 """Time shown after the shaped reference has stopped [s]."""
 NEAR = 0.15
-"""Largest distance to the attained position on the axis [mm]: five times the repeatability."""
+"""Largest distance to the attained position on the axis [mm]; five times the repeatability."""
 
 Recorded = tuple[Recording, MotionRows]
 """A recording and one of its motions."""
 
 
 def motion_figure(name: str, unshaped: Recorded, shaped: Recorded) -> Figure:
-    """Accelerations of the reference, E, |α|, and the mode the shaper works with, against time.
+    """Accelerations of the reference, E, |α|, and the mode that the shaper uses, against time.
 
-    Time is zero where the reference starts.
+    Time is zero when the reference starts.
 
     Args:
-        name: Name of the motion, used as heading.
+        name: Name of the motion, used as the heading.
         unshaped: The motion without shaping.
         shaped: Recording of the same motion with shaping.
 
     Raises:
-        NotMeasurableError: The attained position cannot be told: too little rest was recorded.
+        NotMeasurableError: The attained position cannot be determined, because too little rest was recorded.
     """
     return _figure(name, ((unshaped, UNSHAPED, "Unshaped"), (shaped, SHAPED, "Shaped")))
 
@@ -45,17 +45,17 @@ def observed_figure(name: str, recorded: Recorded) -> Figure:
     """Draw the same panels for one motion of any recording.
 
     Args:
-        name: Name of the motion, used as heading.
+        name: Name of the motion, used as the heading.
         recorded: The motion.
 
     Raises:
-        NotMeasurableError: The attained position cannot be told: too little rest was recorded.
+        NotMeasurableError: The attained position cannot be determined, because too little rest was recorded.
     """
     return _figure(name, ((recorded, SHAPED, "Recorded"),))
 
 
 def _figure(name: str, drawn: Sequence[tuple[Recorded, str, str]]) -> Figure:
-    """The five panels, each recording with its colour and its name."""
+    """Draw the five panels from recordings with their colours and names."""
     figure, axes = panels(5, 8.6, ratios=(1.25, 1, 1.25, 0.85, 0.85))
     for recorded, color, label in drawn:
         _draw(axes, recorded, color, label)
@@ -90,7 +90,7 @@ def _figure(name: str, drawn: Sequence[tuple[Recorded, str, str]]) -> Figure:
 
 
 def _draw(axes: list[Axes], recorded: Recorded, color: str, label: str) -> None:
-    """One recording into the five panels."""
+    """Draw one recording into the five panels."""
     recording, motion = recorded
     start = recording.time[motion.start]
     first = int(np.searchsorted(recording.time, start - LEAD))
@@ -112,7 +112,7 @@ def _draw(axes: list[Axes], recorded: Recorded, color: str, label: str) -> None:
 
 
 def _name_joints(panel: Axes, recorded: Recorded) -> None:
-    """Names of joints beside their accelerations; joints that move alike share a line and its words."""
+    """Write names of joints beside their accelerations; joints that move alike share a line and its label."""
     recording, motion = recorded
     qdd = recording["target_qdd"][motion.start : motion.shaped_stop + 2]
     largest = float(np.max(np.abs(qdd)))
@@ -141,6 +141,6 @@ def _name_joints(panel: Axes, recorded: Recorded) -> None:
 
 
 def _grow(panel: Axes, low: float, high: float) -> None:
-    """An axis that holds a range and all that is drawn."""
+    """Extend an axis to include a range and everything drawn."""
     bottom, top = panel.get_ylim()
     panel.set_ylim(min(bottom, low), max(top, high))

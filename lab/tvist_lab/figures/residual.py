@@ -1,4 +1,4 @@
-"""Figure 16: the tool's acceleration after the stop, and the residual vibration read off it."""
+"""Figure 16: the tool's acceleration after the stop, and the residual vibration derived from it."""
 
 from collections.abc import Mapping
 
@@ -22,7 +22,7 @@ DASHES = (0, (4, 2))
 def figure_16(motions: Mapping[str, tuple[Recorded, Recorded]]) -> Figure:
     """|α| around the stop of each motion, unshaped and shaped, with the fitted decay from t_b on.
 
-    Time is zero where the reference starts.
+    Time is zero when the reference starts.
 
     Args:
         motions: Name to the recording and motion without and with shaping.
@@ -60,7 +60,7 @@ def figure_16(motions: Mapping[str, tuple[Recorded, Recorded]]) -> Figure:
 
 
 def _draw(panel: Axes, recorded: Recorded, color: str, label: str) -> Residual:
-    """One recording; returns what was read off it."""
+    """Draw one recording; return the residual vibration derived from it."""
     recording, motion = recorded
     start = recording.time[motion.start]
     rv = residual(recording, motion)

@@ -9,7 +9,7 @@ import tvist_shaping
 from tvist_lab.figures.style import FAINT, INK, MUTED, SHAPED, THIRD, UNSHAPED, legend, note, panels
 
 DESIGN = 10.5
-"""Middle of the workspace's span [Hz]."""
+"""Middle of the frequency range over the workspace [Hz]."""
 SPAN = (6.0, 15.0)
 """Range of the first mode's damped frequency over the UR5e's workspace with 5 kg [Hz]."""
 SHOWN = (5.5, 16.0)
@@ -24,9 +24,9 @@ def figure_4(
     """Residual vibration of ZV, ZVD and EI, undamped, over the true frequency.
 
     Args:
-        design: Frequency the shapers are made for [Hz].
+        design: Frequency that the shapers are designed for [Hz].
         span: Frequencies of the mode over the workspace [Hz].
-        shapers: Name to impulses; None shows the paper's three.
+        shapers: Name to impulses; None for the paper's three.
     """
     if shapers is None:
         shapers = {

@@ -1,4 +1,4 @@
-"""How the figures look: colours that a colour-blind reader can tell, few lines, units on every axis."""
+"""Style of the figures: colours for colour-blind readers, few lines, units on every axis."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,13 +16,13 @@ SHAPED = "#0072B2"
 THIRD = "#009E73"
 """Bluish green."""
 INK = "#333333"
-"""Text and axes."""
+"""Colour of text and axes."""
 FAINT = "#8A8A8A"
-"""Limits and other help lines."""
+"""Colour of limits and other auxiliary lines."""
 MUTED = "#5A5A5A"
-"""Words of less weight."""
+"""Colour of less important text."""
 DPI = 150
-"""Resolution of saved bitmaps: 6.4 inches are 960 pixels."""
+"""Resolution of saved bitmaps [dpi]; 6.4 inches are 960 pixels."""
 WIDTH = 6.4
 """Width of every figure [inch]."""
 
@@ -30,12 +30,12 @@ WIDTH = 6.4
 def panels(
     rows: int, height: float, *, share_x: bool = True, ratios: Sequence[float] | None = None
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of stacked panels in the house's style.
+    """Create a figure of stacked panels in this style.
 
     Args:
         rows: Number of panels.
         height: Height of the figure [inch].
-        share_x: All panels have the lowest one's axis.
+        share_x: Whether all panels share the lowest one's axis.
         ratios: Relative heights of the panels.
     """
     figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
@@ -49,7 +49,7 @@ def panels(
 
 
 def _plain(panel: Axes) -> None:
-    """Open frame, faint grid."""
+    """Style a panel: open frame, faint grid."""
     for side in ("top", "right"):
         panel.spines[side].set_visible(False)
     for side in ("left", "bottom"):
@@ -62,12 +62,12 @@ def _plain(panel: Axes) -> None:
 
 
 def title(panel: Axes, words: str) -> None:
-    """A heading at a panel's upper left."""
+    """Write a heading at a panel's upper left."""
     panel.set_title(words, loc="left", fontsize=9.5, color=INK, fontweight="bold")
 
 
 def legend(figure: Figure, panel: Axes) -> None:
-    """One legend for the whole figure, above its panels, from what a panel shows."""
+    """Draw one legend for the whole figure above its panels, with the entries of one panel."""
     handles, labels = panel.get_legend_handles_labels()
     figure.legend(
         handles,
@@ -82,20 +82,20 @@ def legend(figure: Figure, panel: Axes) -> None:
 
 
 def note(panel: Axes, words: str, at: tuple[float, float], *, color: str = INK, **how: Any) -> None:
-    """Small words within a panel, at a point of the data."""
+    """Write small text within a panel, at a point in data coordinates."""
     backing = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8}
     panel.annotate(words, at, color=color, fontsize=8, bbox=backing, **how)
 
 
 def save(figure: Figure, path: str | Path) -> Path:
-    """Write a figure; the suffix chooses the format, missing folders are made.
+    """Write a figure; the suffix determines the format, and missing folders are created.
 
     Returns:
-        The file.
+        Path of the file.
     """
     file = Path(path)
     file.parent.mkdir(parents=True, exist_ok=True)
-    # Without a date in it, an equal figure is an equal file.
+    # Without the date, equal figures give equal files.
     metadata = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
     figure.savefig(file, dpi=DPI, metadata=metadata.get(file.suffix))
     return file

@@ -1,1 +1,1 @@
-"""Learn the arm's frequency and damping from its own accelerometer, as section 3.3 of the paper does."""
+"""Identification of the arm's frequency and damping from its own accelerometer, as in section 3.3 of the paper."""

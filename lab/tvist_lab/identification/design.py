@@ -1,8 +1,8 @@
-"""Choose ring-downs so that few of them give the most information: greedy D-optimal design.
+"""Choice of the few most informative ring-downs: greedy D-optimal design.
 
-The arm as it is guessed is made to ring at many configurations; each ring-down has an information matrix about the
-parameters. One after the other those are chosen that make the determinant of the sum largest, so the volume of what
-is still possible smallest (Fedorov, 1972).
+The guessed arm is made to ring at many configurations, and each ring-down gives an information matrix of the
+parameters. Ring-downs are chosen one after the other such that the determinant of the sum becomes as large as
+possible, and so the volume of the remaining uncertainty as small as possible (Fedorov, 1972).
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
 
 NOISE = 0.03
-"""rms that is counted on, an axis [m/s^2]."""
+"""Assumed noise, rms per axis [m/s^2]."""
 LIMITS = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
 """Limits of the jog, as in a client's `move_j`."""
 
@@ -30,13 +30,13 @@ def choose(
     """Choose ring-downs.
 
     Args:
-        arm: With its payloads.
+        arm: Guessed arm with its payloads.
         candidates: Configurations, each of shape (n,) [rad].
-        jog: The move that makes it ring.
-        counts: How many ring-downs with each payload; together no more than candidates.
+        jog: The move that excites the arm.
+        counts: Number of ring-downs with each payload; together at most the number of candidates.
 
     Returns:
-        Candidates and payloads by number, the most informative first; none twice.
+        Indices of candidates and payloads, the most informative first, without repetition.
     """
     knowledge = np.diag(arm.deviation**-2)
     says = {
@@ -57,7 +57,7 @@ def choose(
 
 
 def predicted(arm: ArmModes, q: Floats, payload: int, jog: Jog) -> Ringing:
-    """Ring-down after a jog of the arm as guessed, linear about its end and with perfect feed-forward."""
+    """Predict the ring-down after a jog of the guessed arm, linearized at its end, with perfect feed-forward."""
     flexible, mass = arm.flexible(payload), arm.mass(q, payload)
     drivetrain = arm.drivetrain(arm.guess)
     inertia, damping, stiffness = drivetrain.system(mass)
@@ -85,7 +85,7 @@ def predicted(arm: ArmModes, q: Floats, payload: int, jog: Jog) -> Ringing:
 
 
 def _pushes(rows: Floats, rigid: Floats, jog: Floats) -> Floats:
-    """What drives do to their motors during and after a jog, shape (ticks, n) [N m]."""
+    """Torques of the drives on their motors during and after a jog, shape (ticks, n) [N m]."""
     _, B, K_d, K_p, _ = rows
     motion = quickest_motion(JointLine(np.zeros_like(jog), jog), LIMITS, PERIOD)
     way = []

@@ -1,4 +1,4 @@
-"""Two multivariate polynomials through measured (f_d, ζ)."""
+"""Fit of two multivariate polynomials to measured (f_d, ζ)."""
 
 import math
 from dataclasses import dataclass
@@ -11,36 +11,36 @@ from tvist_protocol.calibration import PolynomialModel, Spread
 from tvist_shaping import terms
 
 BASIS: Literal["trigonometric"] = "trigonometric"
-"""Polynomials in the sines and cosines of the joint angles: they repeat with every turn and never run away."""
+"""Polynomials in the sines and cosines of the joint angles, which are periodic and therefore bounded."""
 FOLDS = 10
-"""Parts the measurements are cut into for cross-validation."""
+"""Number of parts that the measurements are divided into for cross-validation."""
 
 
 class FitError(ValueError):
-    """The measurements do not carry a model; the sentence says what to do."""
+    """The measurements are not sufficient for a model; the message says what to do."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A model and how far measurements lie from it."""
+    """A model and its deviations from the measurements."""
 
     model: PolynomialModel
     residual_f_d: Spread
     residual_zeta: Spread
     cross_validated_f_d: Spread
-    """Each measurement judged by a fit that did not see it."""
+    """Deviation of each measurement from a fit that did not include it."""
     cross_validated_zeta: Spread
     unseen_f_d: Floats
-    """What fits that did not see a measurement say of it, shape (N,) [Hz]."""
+    """f_d that fits without a measurement give for it, shape (N,) [Hz]."""
     unseen_zeta: Floats
-    """[-]."""
+    """ζ that fits without a measurement give for it, shape (N,) [-]."""
 
 
 def check_count(configurations: int, joints: tuple[int, ...], degree: int) -> None:
     """Check that there are enough configurations, before or after they are measured.
 
     Raises:
-        FitError: There are fewer than one and a half times the coefficients.
+        FitError: There are fewer than one and a half times as many as coefficients.
     """
     size = terms(np.zeros((1, max(joints) + 1)), joints=joints, basis=BASIS, degree=degree).shape[1]
     needed = math.ceil(1.5 * size)
@@ -54,18 +54,18 @@ def check_count(configurations: int, joints: tuple[int, ...], degree: int) -> No
 def fit_polynomials(
     q: Floats, f_d: Floats, zeta: Floats, weights: Floats, *, joints: tuple[int, ...], degree: int
 ) -> Fit:
-    """Weighted least squares of the relative deviation.
+    """Fit the relative deviation by weighted least squares.
 
     Args:
         q: Configurations, shape (N, n) [rad].
-        f_d: Measured there, shape (N,) [Hz].
-        zeta: Measured there, shape (N,) [-].
+        f_d: Measured damped frequencies, shape (N,) [Hz].
+        zeta: Measured damping ratios, shape (N,) [-].
         weights: Weight of each sample, shape (N,) [-].
-        joints: Joints the modes depend on.
+        joints: Joints that the modes depend on.
         degree: Highest total degree.
 
     Raises:
-        FitError: There are fewer measurements than one and a half times the coefficients.
+        FitError: There are fewer than one and a half times as many measurements as coefficients.
     """
     check_count(len(q), joints, degree)
     design = terms(q, joints=joints, basis=BASIS, degree=degree)

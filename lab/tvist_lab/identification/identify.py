@@ -1,4 +1,4 @@
-"""From ring-downs all over the workspace to a calibration."""
+"""Identification of a calibration from ring-downs across the workspace."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -24,28 +24,28 @@ CONFIGURATIONS = 160
 REPEATS = 3
 DEGREE = 2
 ANCHOR_WEIGHT = 6.0
-"""Weight of a pose the user names, against one of a configuration spread over the workspace [-]."""
+"""Weight of a pose that the user names, relative to a configuration spread over the workspace [-]."""
 
 ATTEMPTS = 3
-"""Configurations tried for each that is wanted: some the arm cannot reach, some cannot be fitted."""
+"""Number of configurations tried for each one required, since some cannot be reached and some not be fitted."""
 
 Progress = Callable[[], None]
 
 
 class IdentificationError(ClientError):
-    """The robot could not be identified; the sentence says what to do."""
+    """The robot could not be identified; the message says what to do."""
 
 
 @dataclass(frozen=True)
 class MeasurementPlan:
-    """What to measure."""
+    """Measurements to make."""
 
     configurations: int = CONFIGURATIONS
-    """Usable configurations wanted, spread over the workspace."""
+    """Required number of usable configurations, spread over the workspace."""
     anchors: tuple[tuple[float, ...], ...] = ()
-    """Further ones that matter more, where the robot is going to work [rad]."""
+    """Additional, more important configurations, in which the robot is going to work [rad]."""
     repeats: int = REPEATS
-    """Jogs averaged at each."""
+    """Number of jogs averaged at each configuration."""
     degree: int = DEGREE
     """Degree of the polynomials."""
     seed: int = 0
@@ -55,27 +55,29 @@ class MeasurementPlan:
 
 @dataclass(frozen=True)
 class Identification:
-    """A calibration and what it was checked against."""
+    """A calibration and the data it was checked with."""
 
     calibration: Calibration
     q: Floats
-    """Configurations measured, shape (N, n) [rad]."""
+    """Measured configurations, shape (N, n) [rad]."""
     f_d: Floats
-    """Measured, shape (N,) [Hz]."""
+    """Measured damped frequencies, shape (N,) [Hz]."""
     zeta: Floats
-    """Measured, shape (N,) [-]."""
+    """Measured damping ratios, shape (N,) [-]."""
     true_f_d: Floats | None
-    """Lowest true mode at each, where the robot tells the truth, shape (N,) [Hz]."""
+    """Damped frequency of the lowest true mode at each configuration, if the robot publishes the truth, shape (N,)
+    [Hz].
+    """
     true_zeta: Floats | None
-    """[-]."""
+    """Damping ratio of the lowest true mode, shape (N,) [-]."""
     against: str
-    """What the errors below are against: the truth, or measurements that a fit did not see."""
+    """Reference of the errors below: the truth, or measurements that a fit did not include."""
     error_f_d: Spread
     """Error of the calibration's f_d [%]."""
     error_zeta: Spread
     """Error of the calibration's ζ [%]."""
     anchors: int = 0
-    """How many of the configurations, the first ones, were named."""
+    """Number of named configurations, which come first."""
 
     def poses(self) -> list[dict[str, float]]:
         """Measured and estimated mode at each named pose."""
@@ -103,19 +105,19 @@ async def identify(
     command: str,
     progress: Progress,
 ) -> Identification:
-    """Identify a robot as section 3.3 of the paper does, as a client.
+    """Identify a robot as in section 3.3 of the paper, as a client.
 
     Args:
         robot: The robot, on a network or in process.
-        arm: Control of it.
+        arm: Control of the robot.
         plan: What to measure.
         name: Name of the calibration.
-        command: What the user typed, for the calibration's provenance.
-        progress: Told of each configuration done.
+        command: Command line that the user typed, for the calibration's provenance.
+        progress: Called after each configuration.
 
     Raises:
-        FitError: There are too few configurations, or too few of them could be used.
-        IdentificationError: No ring-down at all could be used.
+        FitError: There are too few configurations, or too few of them were usable.
+        IdentificationError: No ring-down was usable.
     """
     info = await robot.info()
     joints = tuple(j for j in (1, 2, 3) if j < len(info.joints)) or (0,)
@@ -163,7 +165,7 @@ async def identify(
 
 
 async def _ring_down(robot: Robot, arm: Arm, q: Floats, plan: MeasurementPlan) -> RingDown | None:
-    """What rings at a configuration; None where it cannot be reached or fitted."""
+    """Measure the ring-down at a configuration; return None if it cannot be reached or fitted."""
     try:
         ring = await measure(robot, arm, q, plan.jog, plan.repeats)
     except RefusedError as error:
@@ -174,7 +176,7 @@ async def _ring_down(robot: Robot, arm: Arm, q: Floats, plan: MeasurementPlan) -
 
 
 async def _true_mode(robot: Robot) -> tuple[float, float] | None:
-    """The lowest true mode, where the robot tells it: at rest for longer than it takes to be computed anew."""
+    """Return the lowest true mode, if the robot publishes it; wait at rest until it has been updated."""
     with collect(robot) as collected:
         await robot.advance(60)
     return (collected.truths[-1].f_d[0], collected.truths[-1].zeta[0]) if collected.truths else None

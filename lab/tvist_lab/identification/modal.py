@@ -1,4 +1,4 @@
-"""From a few ring-downs with one or two payloads to modes at any configuration with any payload."""
+"""Identification of modes at any configuration with any payload, from a few ring-downs with one or two payloads."""
 
 import contextlib
 from collections.abc import Callable, Sequence
@@ -21,23 +21,24 @@ from tvist_protocol.errors import RefusedError
 from tvist_protocol.values import Payload
 
 CANDIDATES = 60
-"""Configurations that are looked at, to choose from."""
+"""Number of configurations to choose from."""
 SPARE = 4
-"""Ring-downs that are planned for each that is wanted: some the arm cannot reach."""
+"""Number of ring-downs planned for each one required, since the arm cannot reach some of them."""
 QUIET = 2.0
-"""A ring-down whose rms is less than this times its noise says nothing [-]."""
+"""A ring-down whose rms is less than this times its noise contains no information [-]."""
 Progress = Callable[[], None]
 
 
 @dataclass(frozen=True)
 class ModalIdentification:
-    """A calibration and what it was checked against."""
+    """A calibration and the data it was checked with."""
 
     calibration: Calibration
     ringings: tuple[Ringing, ...]
     errors: tuple[ModeErrors, ...] | None
-    """Against the truth at configurations and with payloads that were not measured, the lowest mode first; None where
-    the robot does not tell it."""
+    """Errors against the truth for configurations and payloads that were not measured, the lowest mode first; None if
+    the robot does not publish it.
+    """
 
 
 async def identify_modal(
@@ -55,15 +56,15 @@ async def identify_modal(
     Args:
         robot: The robot, on a network or in process.
         control: The arm under control.
-        description: Its masses and geometry.
+        description: Masses and geometry of the arm.
         plan: What to measure.
         name: Name of the calibration.
-        command: What the user typed, for the calibration's provenance.
-        progress: Told of each ring-down done.
+        command: Command line that the user typed, for the calibration's provenance.
+        progress: Called after each ring-down.
 
     Raises:
-        IdentificationError: The description is of another arm, ring-downs are too few, too quiet or contradict each
-            other; the sentence says which, and what to do.
+        IdentificationError: The description belongs to another arm, or ring-downs are too few, too quiet or
+            contradictory; the message says which, and what to do.
     """
     info = await robot.info()
     if info.model != description.robot.model:
@@ -94,7 +95,7 @@ async def _measure(
     plan: ModalPlan,
     progress: Progress,
 ) -> tuple[list[Ringing], int]:
-    """The ring-downs that say most, and how many more were tried."""
+    """Return the most informative ring-downs, and the number of others that were tried."""
     payloads = arm.payloads
     counts = [len(range(number, plan.ring_downs, len(payloads))) for number in range(len(payloads))]
     order = choose(arm, candidates, plan.jog, [SPARE * count for count in counts])
@@ -123,13 +124,13 @@ async def _measure(
 
 
 async def _carry(control: Arm, payload: Payload) -> None:
-    """Have a simulated arm carry something, and say so."""
+    """Make a simulated arm carry a payload, and declare it."""
     await control.reset(payload=payload)
     await control.set_payload(payload.mass, payload.com, payload.inertia)
 
 
 async def _ringing(robot: Robot, control: Arm, q: Floats, payload: int, jog: Jog) -> Ringing | None:
-    """What rings at a configuration; None where it cannot be reached or was not heard whole."""
+    """Measure the ring-down at a configuration; return None if it cannot be reached or was not received completely."""
     try:
         return await listen(robot, control, q, payload, jog)
     except RecordingError:

@@ -1,4 +1,4 @@
-"""Ring-downs fitted, judged and written as a calibration."""
+"""Fit and check of ring-downs, and the resulting calibration."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,19 +26,19 @@ from tvist_protocol.calibration import Calibration, ModalModel, Provenance, Ring
 from tvist_protocol.info import Info
 
 CONTRADICTION = 0.2
-"""Share of a ring-down that its own poles explain and the others' do not, from which on it contradicts them ... [-]"""
+"""A ring-down contradicts the others if this share of it is explained only by its own poles [-]."""
 SIGNIFICANT = 60.0
-"""... where noise alone does not make that; see `OwnPoles.significance` [-]."""
+"""Significance that is required for a contradiction, to exclude noise; see `OwnPoles.significance` [-]."""
 SUSPECTS = 3
-"""Ring-downs that are left out for a trial."""
+"""Number of ring-downs that are left out in turn."""
 GUILTY = 3
-"""More than one in so many, and it cannot be said which are wrong."""
+"""If more than one ring-down in this number is wrong, the wrong ones cannot be determined."""
 TOLD = 3
-"""Modes whose errors are told."""
+"""Number of modes whose errors are reported."""
 CERTAIN = (0.05, 0.2)
-"""Deviation of a ring-down's own f_d and ζ up to which a model is judged by them [-]."""
+"""Largest standard errors of a ring-down's own f_d and ζ for which a model is judged by them [-]."""
 WORKSPACE = 200
-"""Configurations in which the range of the modes is looked for."""
+"""Number of configurations in which the range of the modes is determined."""
 MARGIN = 0.85
 """Margin on the lowest frequency found over the workspace, and on the distance to the highest damping ratio [-]."""
 
@@ -61,7 +61,7 @@ def calibrate(
     name: str,
     command: str,
 ) -> Calibration:
-    """Fit, judge and put down.
+    """Fit, check and create a calibration.
 
     Raises:
         IdentificationError: The ring-downs contradict each other.
@@ -109,10 +109,10 @@ def calibrate(
 
 
 def _check_contradictions(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> None:
-    """Find what no springs and drives can explain together.
+    """Find ring-downs that no springs and drives can explain together.
 
-    A ring-down that is wrong spoils the fit of the others, too. So of those that are explained worst the one is left
-    out without which the rest fits best, until all that is left agrees.
+    A wrong ring-down also spoils the fit of the others. So among the worst explained ones, the one whose omission
+    gives the best fit is left out, until the remaining ones agree.
     """
     rest = list(range(len(ringings)))
     guilty: list[int] = []
@@ -147,12 +147,12 @@ def _check_contradictions(arm: ArmModes, ringings: Sequence[Ringing], fit: Modal
 
 
 def _own(arm: ArmModes, ringing: Ringing, fit: ModalFit) -> OwnPoles:
-    """A ring-down's own poles beside those of a fit."""
+    """Fit a ring-down's own poles, starting from those of a fit."""
     return own_poles(arm, ringing, fit.drivetrain.poles(arm.mass(ringing.q, ringing.payload))[0][:MODES])
 
 
 def _cross_validate(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> list[ModeErrors | None]:
-    """Errors of each mode by fits that did not see a configuration, where its own ring-down is certain enough."""
+    """Errors of each mode from fits without a configuration, if its own ring-down is accurate enough."""
     pairs: list[list[tuple[float, float, float, float]]] = [[] for _ in range(TOLD)]
     for place in {r.q.tobytes() for r in ringings}:
         others = [r for r in ringings if r.q.tobytes() != place]
@@ -174,7 +174,7 @@ def _cross_validate(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -
 
 
 def _range(arm: ArmModes, fit: ModalFit, rated: float) -> tuple[float, float]:
-    """Lowest f_d and highest ζ that a filter has to count on, with some room."""
+    """Lowest f_d and highest ζ that a filter has to support, with a margin."""
     description = arm.description
     everywhere = IDENTIFIED.spread(WORKSPACE, description.joints, 0)
     lowest, highest = np.inf, 0.0

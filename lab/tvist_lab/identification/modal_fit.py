@@ -1,11 +1,12 @@
-"""Springs and drives from few ring-downs, by separable least squares.
+"""Estimation of springs and drives from a few ring-downs, by separable least squares.
 
-Each ring-down is the sum of the lowest modes, whose poles the parameters make, with amplitudes of its own:
+Each ring-down is a sum of the lowest modes, whose poles depend on the parameters, with its own amplitudes:
 
     α(t) = Σ_k Re(c_k e^(s_k(p) t)) + d e^(-rt) + g,    p the logarithms of the parameters
 
-The vectors c, d, g enter linearly and are eliminated (variable projection; Golub and Pereyra, 1973), so no mode has to
-be found in a signal or matched with one of the model. What measurements do not tell stays at a weak guess.
+The vectors c, d, g enter linearly and are eliminated (variable projection; Golub and Pereyra, 1973), so modes need
+not be detected in a signal or matched with the model's. Parameters that the measurements do not determine stay near
+their guesses, which have a low weight.
 """
 
 from collections.abc import Sequence
@@ -26,33 +27,33 @@ from tvist_shaping.estimators.poles import follow
 Complex = npt.NDArray[np.complex128]
 
 MODES = 4
-"""Modes that ring-downs are made of; a robot arm's further ones are over in a few ticks."""
+"""Number of modes in a ring-down; a robot arm's higher ones decay within a few ticks."""
 STEP = 1e-4
-"""Change of a logarithm for differences [-]."""
+"""Step of a logarithm for finite differences [-]."""
 EVALUATIONS = 60
 STARTS = 4
-"""Points that are searched from, the guess the first."""
+"""Number of starting points of the search; the first one is the guess."""
 SPREAD = 0.35
-"""Standard deviation of the others about it [-]."""
+"""Standard deviation of the other starting points about the guess [-]."""
 
 
 @dataclass(frozen=True)
 class ModalFit:
-    """Parameters and how sure they are."""
+    """Parameters and their accuracy."""
 
     logarithms: Floats
-    """Shape (P,)."""
+    """Logarithms of the parameters, shape (P,)."""
     deviations: Floats
     """Standard deviations of the logarithms, shape (P,)."""
     residual_to_noise: Floats
-    """rms of what the model leaves of each ring-down, over its noise, shape (N,) [-]."""
+    """rms of the residual of each ring-down, divided by its noise, shape (N,) [-]."""
     cost: float
-    """Half the sum of squares, that of the guess included [-]."""
+    """Half the sum of squares, including that of the guess [-]."""
     drivetrain: Drivetrain
 
 
 class _Signal:
-    """One ring-down, the mass matrix it rang with, and the projection that eliminates amplitudes."""
+    """One ring-down, its mass matrix, and the projection that eliminates the amplitudes."""
 
     def __init__(self, mass: Floats, force: Floats, noise: float) -> None:
         self.mass, self.force, self.noise = mass, force, noise
@@ -60,13 +61,13 @@ class _Signal:
         self._always = np.column_stack([np.exp(-SLOW_POLE * self.time), np.ones(len(force))])
 
     def left(self, poles: Complex) -> Floats:
-        """What poles leave of it, over its noise, flat."""
+        """Residual of the signal for some poles, divided by its noise, flattened."""
         ringing = np.exp(np.outer(self.time, poles))
         orthonormal, _ = np.linalg.qr(np.column_stack([ringing.real, ringing.imag, self._always]))
         return np.asarray((self.force - orthonormal @ (orthonormal.T @ self.force)).ravel() / self.noise)
 
     def change(self, drivetrains: Sequence[Drivetrain], poles: Complex, shapes: Complex) -> Floats:
-        """Derivative of `left` by each parameter, from a step of each; shape (samples, P)."""
+        """Derivative of `left` with respect to each parameter, from a step in each, shape (samples, P)."""
         here = self.left(poles)
         columns = []
         for drivetrain in drivetrains:
@@ -79,12 +80,12 @@ class _Signal:
 
 
 def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None = None) -> ModalFit:
-    """Find the parameters.
+    """Estimate the parameters.
 
     Args:
-        arm: With the payloads of the ring-downs.
-        ringings: At least one.
-        start: Logarithms to search from; None: the guess.
+        arm: Arm with the payloads of the ring-downs.
+        ringings: At least one ring-down.
+        start: Logarithms at which the search starts; None for the guess.
     """
     signals = [_Signal(arm.mass(r.q, r.payload), r.force, r.noise) for r in ringings]
 
@@ -107,7 +108,7 @@ def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None =
         max_nfev=EVALUATIONS,
     )
     samples = sum(signal.force.size for signal in signals)
-    # What the model cannot follow is no white noise, but it is all that is known of its size.
+    # The model error is not white noise, but its size is the only known estimate.
     excess = max(float(np.mean(found.fun[:samples] ** 2)), 1.0)
     changes = found.jac[:samples]
     knowledge = changes.T @ changes / excess + np.diag(arm.deviation**-2)
@@ -127,10 +128,10 @@ def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None =
 
 
 def fit_from_many(arm: ArmModes, ringings: Sequence[Ringing]) -> ModalFit:
-    """The best of fits from several starts.
+    """Return the best fit from several starting points.
 
-    Parameters can stand in for each other, so that several sets explain ring-downs alike. Those that do count for
-    the deviations, each with its likelihood: a parameter in which they differ is not certain.
+    Parameters can compensate for each other, so that several sets explain the ring-downs equally well. All of these
+    sets contribute to the deviations, weighted by their likelihood: a parameter in which they differ is uncertain.
     """
     rng = np.random.default_rng(0)
     starts = [arm.guess, *(arm.guess + rng.normal(0.0, SPREAD, (STARTS - 1, len(arm.guess))))]
@@ -143,14 +144,14 @@ def fit_from_many(arm: ArmModes, ringings: Sequence[Ringing]) -> ModalFit:
 
 
 def sensitivity(arm: ArmModes, signal: _Signal, logarithms: Floats) -> Floats:
-    """Derivative of what is left of a ring-down by each parameter, shape (samples, P)."""
+    """Derivative of a ring-down's residual with respect to each parameter, shape (samples, P)."""
     poles, shapes = (part[:MODES] for part in arm.drivetrain(logarithms).poles(signal.mass))
     steps = STEP * np.eye(len(logarithms))
     return signal.change([arm.drivetrain(logarithms + step) for step in steps], poles, shapes)
 
 
 def information(arm: ArmModes, ringing: Ringing, logarithms: Floats) -> Floats:
-    """What a ring-down says about the parameters: the inverse of their covariance, shape (P, P)."""
+    """Information of a ring-down about the parameters: the inverse of their covariance, shape (P, P)."""
     signal = _Signal(arm.mass(ringing.q, ringing.payload), ringing.force, ringing.noise)
     change = sensitivity(arm, signal, logarithms)
     return np.asarray(change.T @ change)
@@ -158,28 +159,30 @@ def information(arm: ArmModes, ringing: Ringing, logarithms: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class OwnPoles:
-    """Modes of one ring-down, how sure they are, and how far others are from explaining it."""
+    """Modes of one ring-down, their accuracy, and how much worse other poles explain it."""
 
     f_d: Floats
-    """Shape (k,) [Hz]."""
+    """Damped frequencies, shape (k,) [Hz]."""
     zeta: Floats
-    """Shape (k,) [-]."""
+    """Damping ratios, shape (k,) [-]."""
     f_d_error: Floats
     """Standard deviation of the logarithm of f_d, shape (k,) [-]."""
     zeta_error: Floats
     """Standard deviation of the logarithm of ζ, shape (k,) [-]."""
     significance: float
-    """Sum of squares that the other poles leave more than these, over the noise's variance; 8 by chance [-]."""
+    """Increase of the residual's sum of squares with the other poles, divided by the noise's variance; 8 by chance
+    [-].
+    """
     share: float
-    """Its root, against that of all that rings [-]."""
+    """rms of the part that only these poles explain, relative to that of the vibration without its noise [-]."""
 
 
 LOOSE = 0.5
-"""Deviation of the logarithms of f_d and ζ that a ring-down's own poles may take from where they are looked for [-]."""
+"""Standard deviation of the logarithms of f_d and ζ of a ring-down's own poles, about their starting values [-]."""
 
 
 def own_poles(arm: ArmModes, ringing: Ringing, poles: Complex) -> OwnPoles:
-    """Poles that fit one ring-down best, near others, whatever springs and drives would have to be."""
+    """Fit poles to one ring-down, starting near others, independent of springs and drives."""
     signal = _Signal(arm.mass(ringing.q, ringing.payload), ringing.force, ringing.noise)
     start = _logarithms(poles)
 
@@ -206,7 +209,7 @@ def own_poles(arm: ArmModes, ringing: Ringing, poles: Complex) -> OwnPoles:
 
 
 def describe(poles: Complex) -> tuple[Floats, Floats]:
-    """f_d [Hz] and ζ [-] of poles."""
+    """Return f_d [Hz] and ζ [-] of poles."""
     return np.asarray(poles.imag / (2.0 * np.pi)), np.asarray(-poles.real / np.abs(poles))
 
 

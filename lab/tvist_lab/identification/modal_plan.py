@@ -1,4 +1,4 @@
-"""What is measured for a modal calibration, and where."""
+"""Measurements for a modal calibration, and their configurations."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,19 +13,21 @@ from tvist_protocol.values import Payload
 
 RING_DOWNS = 12
 LEAST = 4
-"""Ring-downs below which the model is little more than its guesses."""
+"""Number of ring-downs below which the model consists of little more than its guesses."""
 
 
 @dataclass(frozen=True)
 class ModalPlan:
-    """What to measure."""
+    """Measurements to make."""
 
     ring_downs: int = RING_DOWNS
-    """In all, the same number with each payload, one more where it does not divide."""
+    """Total number of ring-downs, divided equally among the payloads, with one more for some if necessary."""
     payloads: tuple[Payload, ...] = ()
-    """Carried one after the other by a simulated arm; none: what it carries, which is what is declared."""
+    """Payloads that a simulated arm carries one after the other; empty to use the declared one, which the arm
+    carries.
+    """
     seed: int = 0
-    """Seed of the candidates."""
+    """Seed of the candidate configurations."""
     jog: Jog = field(default_factory=Jog)
 
 
@@ -33,7 +35,7 @@ def check(plan: ModalPlan, payloads: int) -> None:
     """Check that there are enough ring-downs, before the arm moves.
 
     Raises:
-        IdentificationError: There are not.
+        IdentificationError: There are too few.
     """
     least = max(LEAST, payloads)
     if plan.ring_downs < least:
@@ -46,7 +48,7 @@ def check(plan: ModalPlan, payloads: int) -> None:
 def free_configurations(
     description: RobotDescription, payloads: Sequence[Payload], count: int, plan: ModalPlan
 ) -> list[Floats]:
-    """Configurations in which the arm meets nothing, at either end of the jog, whatever it carries."""
+    """Return configurations in which the arm is clear at both ends of the jog, with every payload."""
     joints = description.joints
     models = [CollisionModel(description, body(payload)) for payload in payloads]
     jog = plan.jog.of(joints)

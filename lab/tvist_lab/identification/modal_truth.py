@@ -1,4 +1,4 @@
-"""A modal calibration against the truth of a simulated arm, where nothing was measured."""
+"""Comparison of a modal calibration with the truth of a simulated arm, away from the measurements."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ from tvist_protocol.info import Info
 from tvist_shaping.errors import EstimatorError
 
 UNSEEN = 60
-"""Configurations and payloads at which the truth is asked for, where there is one."""
+"""Number of configurations and payloads at which the truth is requested, if there is one."""
 
 
 async def against_truth(
@@ -28,9 +28,9 @@ async def against_truth(
     plan: ModalPlan,
     info: Info,
 ) -> tuple[ModeErrors, ...] | None:
-    """Errors where nothing was measured, at random; None where the robot tells no truth.
+    """Errors at random configurations that were not measured; None if the robot does not publish the truth.
 
-    With random payloads, too, where the arm was made to carry some; else with what is declared.
+    If the arm was made to carry several payloads, the payloads are random, too; otherwise the declared one is used.
     """
     with collect(robot) as collected:
         start = (await robot.state()).target_q

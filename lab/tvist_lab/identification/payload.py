@@ -1,11 +1,11 @@
-"""What the arm carries, by its own torques: at rest in several poses, and in a short motion beside that.
+"""Identification of the payload from the arm's own torques: at rest in several poses, and checked in a short motion.
 
-At rest the motors hold the arm against gravity, which is linear in the payload's mass and first moment:
+At rest, the motors balance gravity, which is linear in the payload's mass and first moment:
 
     τ - g(q) = Y(q) (m, m c),    g of the bare arm
 
-Each pose is reached from either side, so that what friction holds has either sign. In motion the same two say what the
-arm needs beyond gravity; friction and rotors are found beside them.
+Each pose is approached from both sides, so that friction acts in both directions. In motion, the same two quantities
+determine the torques beyond gravity; friction and rotors are estimated along with them.
 """
 
 import math
@@ -31,53 +31,53 @@ from tvist_protocol.values import Payload
 
 POSES = 6
 CANDIDATES = 60
-"""Poses that are looked at, to choose from."""
+"""Number of poses to choose from."""
 ASIDE = 0.08
-"""How far every joint comes from, to either side [rad]."""
+"""Distance from which each joint approaches a pose, on both sides [rad]."""
 REST = 0.8
-"""Time to come to rest in a pose [s]."""
+"""Time for the arm to come to rest in a pose [s]."""
 LOOK = 0.2
 """Time over which torques are averaged [s]."""
 SWING = 0.5
-"""How far the short motion goes [rad]."""
+"""Length of the short motion [rad]."""
 BLOCK = 10
-"""Ticks that a motion's torques are averaged over."""
+"""Number of ticks over which a motion's torques are averaged."""
 LEAST = 3
-"""Poses that are needed."""
+"""Smallest number of poses."""
 LEAST_ERROR = 0.01
-"""Error of a torque that is counted on at least, as a share of the joint's friction [-]."""
+"""Smallest assumed error of a torque, as a share of the joint's friction [-]."""
 ROTOR = 3.0
-"""Largest inertia of a rotor that is counted on [kg m^2]."""
+"""Largest assumed inertia of a rotor [kg m^2]."""
 STEEL = 7850.0
-"""Density that a payload's size is guessed from [kg/m^3]."""
+"""Density for estimating a payload's size [kg/m^3]."""
 DISAGREEMENT = (0.3, 4.0)
-"""Masses at rest and in motion differ by more than this [kg], and this many standard deviations: one is wrong."""
+"""If masses at rest and in motion differ by more than this [kg] and by this many standard deviations, one is wrong."""
 CERTAIN = 4.0
-"""Standard deviations within which a mass may be another [-]."""
+"""Number of standard deviations for the bounds of a mass [-]."""
 LIGHT = 0.1
-"""Below that mass nothing is said of its centre [kg]."""
+"""Mass below which the centre of mass is not reported [kg]."""
 
 Progress = Callable[[], None]
 
 
 @dataclass(frozen=True)
 class PayloadFound:
-    """Mass and centre of mass, and how sure they are."""
+    """Mass and centre of mass, with their accuracy."""
 
     payload: Payload
-    """To be declared; the inertia is that of a steel ball of the same mass."""
+    """Payload to declare; its inertia is that of a steel ball of the same mass."""
     mass_deviation: float
-    """Standard deviation [kg]."""
+    """Standard deviation of the mass [kg]."""
     com_deviation: tuple[float, float, float]
     """Standard deviation of each coordinate [m]."""
     mass_in_motion: float
-    """What the short motion says [kg]."""
+    """Mass according to the short motion [kg]."""
     mass_in_motion_deviation: float
-    """[kg]."""
+    """Standard deviation of that mass [kg]."""
     declared: Payload
-    """Before."""
+    """Payload declared before."""
     poses: int
-    """In which the arm rested."""
+    """Number of poses in which the arm rested."""
 
 
 async def identify_payload(
@@ -89,19 +89,19 @@ async def identify_payload(
     seed: int = 0,
     progress: Progress,
 ) -> PayloadFound:
-    """Find what the arm carries, as a client.
+    """Identify the payload, as a client.
 
     Args:
         robot: The robot, on a network or in process.
         control: The arm under control.
         description: The arm's masses, geometry and friction.
-        poses: In how many it rests, at least 3.
-        seed: Seed of the poses to choose from.
-        progress: Told of each pose done, and of the motion.
+        poses: Number of poses to rest in, at least 3.
+        seed: Seed of the candidate poses.
+        progress: Called after each pose, and after the motion.
 
     Raises:
-        IdentificationError: The robot is not the one described, poses are too few or out of reach, or torques at rest
-            and in motion disagree.
+        IdentificationError: The description belongs to another robot, poses are too few or out of reach, or torques
+            at rest and in motion disagree.
     """
     info = await robot.info()
     if info.model != description.robot.model:
@@ -141,7 +141,7 @@ async def identify_payload(
             f"at rest the arm seems to carry {mass:.2f} kg, in motion {in_motion:.2f} kg: it touches something, or the "
             "torques are not those of its motors"
         )
-    # What cannot be told from the rated payload is no more than that: more is never accepted.
+    # A heavier payload could not be declared, so a mass that is indistinguishable from the rated one is set to it.
     rated = info.limits.payload
     if rated < mass < rated + CERTAIN * float(deviations[0]):
         mass = rated
@@ -159,7 +159,7 @@ async def identify_payload(
 
 
 class _Regressor:
-    """The torques that a payload adds, linear in mass and first moment."""
+    """Torques that a payload adds, linear in its mass and first moment."""
 
     def __init__(self, description: RobotDescription) -> None:
         self._bare = rigid_model(description, Body())
@@ -177,7 +177,7 @@ class _Regressor:
     def dynamic(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
         """Y(q, q̇, q̈) without the payload's inertia about the flange, shape (n, 4).
 
-        That inertia is the same for a mass point 1 m to either side: half their difference is of the moment alone.
+        This inertia is equal for point masses 1 m to either side, so half their difference contains the moment alone.
         """
         none = self.torque(q, qd, qdd)
         mass, *sides = (np.array(pin.rnea(m, m.createData(), q, qd, qdd)) for m in self._models)
@@ -189,7 +189,7 @@ class _Regressor:
         return np.array(pin.rnea(self._bare, self._data, q, qd, qdd))
 
     def choose(self, candidates: Sequence[Floats], count: int) -> list[Floats]:
-        """Poses that say most of mass and centre together, the best first."""
+        """Choose the poses with most information about mass and centre together, the best first."""
         knowledge = np.diag([1e-2, 1.0, 1.0, 1.0])
         left = {number: self.static(q) / self._friction[:, None] for number, q in enumerate(candidates)}
         chosen: list[Floats] = []
@@ -201,14 +201,14 @@ class _Regressor:
         return chosen
 
     def solve(self, rows: Floats, torques: Floats) -> tuple[Floats, Floats]:
-        """(m, m c) by weighted least squares, and standard deviations from what is left."""
+        """Estimate (m, m c) by weighted least squares, with standard deviations from the residual."""
         weight = np.tile(1.0 / self._friction, len(torques) // len(self._friction))
         return _least_squares(rows * weight[:, None], torques * weight)
 
     def move(self, recording: Recording) -> tuple[float, float]:
-        """Mass by a motion [kg], and its standard deviation.
+        """Estimate the mass from a motion [kg], with its standard deviation.
 
-        Beside it, and the first moment, each joint's friction and rotor inertia are found.
+        The first moment and each joint's friction and rotor inertia are estimated along with it.
         """
         q, qd, qdd = (recording[f"target_{name}"] for name in ("q", "qd", "qdd"))
         moment = recording["actual_moment"]
@@ -224,7 +224,8 @@ class _Regressor:
             torques.append(np.mean(rest, axis=0))
         matrix, right = np.vstack(rows), np.concatenate(torques)
         weight = np.tile(1.0 / self._friction, len(blocks))
-        # Weakly held by how large rotors and friction can be: a short motion does not tell all of them apart.
+        # A weak prior from the largest plausible rotors and friction, since a short motion does not distinguish all
+        # of them.
         largest = np.concatenate([self._friction, self._friction / self._width, np.full(n, ROTOR)])
         prior = np.hstack([np.zeros((3 * n, 4)), np.diag(1.0 / largest)])
         matrix = np.vstack([matrix * weight[:, None], prior])
@@ -233,7 +234,7 @@ class _Regressor:
 
 
 def _least_squares(matrix: Floats, right: Floats) -> tuple[Floats, Floats]:
-    """Solution and standard deviations, from what is left."""
+    """Return the solution and its standard deviations, from the residual."""
     found, *_ = np.linalg.lstsq(matrix, right)
     freedom = max(len(right) - matrix.shape[1], 1)
     variance = max(float(np.sum((right - matrix @ found) ** 2)) / freedom, LEAST_ERROR**2)
@@ -241,7 +242,7 @@ def _least_squares(matrix: Floats, right: Floats) -> tuple[Floats, Floats]:
 
 
 def _free(description: RobotDescription, declared: Payload, seed: int) -> list[Floats]:
-    """Poses with free wrists in which the arm meets nothing, whatever up to the rated payload it carries."""
+    """Return poses with varied wrists in which the arm is clear with any payload up to the rated one."""
     joints = description.joints
     models = [
         CollisionModel(description, body(payload))
@@ -262,7 +263,7 @@ def _free(description: RobotDescription, declared: Payload, seed: int) -> list[F
 
 
 async def _hold(robot: Robot, control: Arm, aside: Floats, q: Floats, period: float) -> tuple[Floats, Floats]:
-    """Angles and torques at rest in a pose, reached from another."""
+    """Return angles and torques at rest in a pose, approached from another one."""
     await reach(control, aside)
     await control.move_j(q, acceleration=1.0)
     await robot.advance(round(REST / period))
@@ -273,7 +274,7 @@ async def _hold(robot: Robot, control: Arm, aside: Floats, q: Floats, period: fl
 
 
 async def _swing(robot: Robot, control: Arm, q: Floats, period: float) -> Recording:
-    """There and back along one way, where it is free."""
+    """Move there and back on a straight line that is clear, and record the motion."""
     shares = (1.0, 0.5, 0.25, -0.25, -0.5)
     swing = np.zeros_like(q)
     swing[1:4] = SWING
@@ -292,7 +293,7 @@ async def _swing(robot: Robot, control: Arm, q: Floats, period: float) -> Record
 
 
 def _ball(mass: float) -> tuple[float, float, float, float, float, float]:
-    """Inertia of a steel ball: what torques cannot tell beside that of the rotors."""
+    """Inertia of a steel ball, since torques do not distinguish the payload's inertia from that of the rotors."""
     radius = (3.0 * mass / (4.0 * math.pi * STEEL)) ** (1.0 / 3.0)
     moment = 0.4 * mass * radius**2
     return (moment, 0.0, 0.0, moment, 0.0, moment)

@@ -1,4 +1,4 @@
-"""Make the arm ring at a configuration and listen."""
+"""Measurement of ring-downs: make the arm vibrate at a configuration and record it."""
 
 from dataclasses import dataclass
 
@@ -12,26 +12,26 @@ from tvist_lab.recordings import Floats, RecordingError
 from tvist_protocol.errors import RefusedError
 
 LISTEN = 0.6
-"""Time the arm is listened to after a jog [s]."""
+"""Time recorded after a jog [s]."""
 PAUSE = 0.3
-"""Time it rests before the next [s]."""
+"""Rest before the next jog [s]."""
 MODES = 2
-"""Modes that are fitted together."""
+"""Number of modes that are fitted together."""
 SKIPPED = 7
-"""Ticks after the stop that a `Ringing` leaves out: the end of the deceleration ramp is no ring-down."""
+"""Ticks after the stop that a `Ringing` leaves out, since the end of the deceleration ramp is not a ring-down."""
 SAMPLES = 200
-"""Ticks that it has."""
+"""Number of ticks in a `Ringing`."""
 QUIET = 75
-"""Last ticks before a jog, in which nothing but noise is felt."""
+"""Number of ticks before a jog from which the noise is determined."""
 LEAST_NOISE = 0.01
-"""Noise that is counted on at least [m/s^2]: no model is better than that."""
+"""Smallest assumed noise [m/s^2], since no model is more accurate than that."""
 SHARE = 0.25
-"""The lowest mode that rings at least this loud beside the loudest is the first one [-]."""
+"""The first mode is the lowest one whose amplitude is at least this share of the largest [-]."""
 
 
 @dataclass(frozen=True)
 class Jog:
-    """A short move that ends where the arm is to ring, with all big joints at once: it stirs every mode there is."""
+    """A short move to the configuration of interest, with all big joints at once, so that it excites every mode."""
 
     length: float = 0.06
     """Length of the jog for the fastest joint [rad]."""
@@ -39,7 +39,7 @@ class Jog:
     """Shares of the joints, from the base on [-]."""
 
     def of(self, joints: int) -> Floats:
-        """Joint displacement, shape (joints,) [rad]."""
+        """Return the displacement of the joints, shape (joints,) [rad]."""
         jog = np.zeros(joints)
         used = min(joints, len(self.shares))
         jog[:used] = self.length * np.array(self.shares[:used])
@@ -48,28 +48,28 @@ class Jog:
 
 @dataclass(frozen=True)
 class Ringing:
-    """What the tool felt at a configuration after a jog."""
+    """Acceleration of the tool at a configuration after a jog."""
 
     q: Floats
     """Configuration, shape (n,) [rad]."""
     payload: int
-    """Number of the payload carried."""
+    """Index of the carried payload."""
     force: Floats
-    """Specific force from shortly after the stop on, shape (T, 3) [m/s^2]."""
+    """Specific force, beginning shortly after the stop, shape (T, 3) [m/s^2]."""
     noise: float
-    """Its noise at rest, rms an axis [m/s^2]."""
+    """Noise of the force at rest, rms per axis [m/s^2]."""
 
     @property
     def rms(self) -> float:
-        """Return the rms of what is not constant, per axis [m/s^2]."""
+        """Return the rms of the force without its mean, per axis [m/s^2]."""
         return float(np.sqrt(np.mean((self.force - self.force.mean(axis=0)) ** 2)))
 
 
 async def reach(arm: Arm, q: Floats) -> None:
-    """Move to a configuration; where something would meet on the straight way, by the upright arm.
+    """Move to a configuration; if there would be a collision on the straight line, via the upright arm.
 
     Raises:
-        RefusedError: It cannot be reached that way either; code `collision`.
+        RefusedError: That way is not clear either; code `collision`.
     """
     try:
         await arm.move_j(q)
@@ -83,16 +83,16 @@ async def reach(arm: Arm, q: Floats) -> None:
 
 
 async def measure(robot: Robot, arm: Arm, q: Floats, jog: Jog, repeats: int) -> RingDown:
-    """(f_d, ζ) of the mode that rings most after a jog to a configuration.
+    """Measure (f_d, ζ) of the strongest mode after a jog to a configuration.
 
-    Equal jogs ring alike, so their accelerations are averaged before the fit.
+    Equal jogs give equal vibrations, so their accelerations are averaged before the fit.
 
     Args:
         robot: The robot.
-        arm: Control of it; its shaper must be `none`.
+        arm: Control of the robot; its shaper must be `none`.
         q: Configuration, shape (n,) [rad].
-        jog: The move that makes it ring.
-        repeats: Jogs to average.
+        jog: The move that excites the arm.
+        repeats: Number of jogs to average.
 
     Raises:
         RefusedError: The configuration cannot be reached; code `collision`.
@@ -116,18 +116,18 @@ async def measure(robot: Robot, arm: Arm, q: Floats, jog: Jog, repeats: int) -> 
 
 
 async def listen(robot: Robot, arm: Arm, q: Floats, payload: int, jog: Jog) -> Ringing:
-    """Jog to a configuration once and listen.
+    """Jog to a configuration once, and record the ring-down.
 
     Args:
         robot: The robot.
-        arm: Control of it; its shaper must be `none`.
+        arm: Control of the robot; its shaper must be `none`.
         q: Configuration, shape (n,) [rad].
-        payload: Number of the payload carried, to be noted.
-        jog: The move that makes it ring.
+        payload: Index of the carried payload, for the result.
+        jog: The move that excites the arm.
 
     Raises:
         RefusedError: The configuration cannot be reached; code `collision`.
-        RecordingError: States were lost on the way.
+        RecordingError: States were lost.
     """
     start = q - jog.of(len(q))
     await reach(arm, start)

@@ -1,4 +1,4 @@
-"""What is not known of an arm's springs and drives before it is measured, and what such arms have."""
+"""Unknown parameters of an arm's springs and drives before a measurement, with typical values."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,32 +14,33 @@ from tvist_protocol.values import Payload
 from tvist_shaping.estimators.drivetrain import Drivetrain
 
 LARGE = 3
-"""Joints from the base on that have the large drives, each with parameters of its own."""
+"""Number of joints with large drives, counted from the base; each has its own parameters."""
 UNSURE = 0.7
-"""Standard deviation of a guess's logarithm: within a factor of four with 95 % [-]."""
+"""Standard deviation of a guess's logarithm: within a factor of four with 95 % probability [-]."""
 NARROWER = 0.5
-"""A parameter is identified where measurements leave less than this share of the guess's deviation [-]."""
+"""A parameter is identified if measurements reduce its deviation below this share of the guess's [-]."""
 SURE = 1.959963984540054
-"""Standard deviations within which a normal variable lies with 95 % [-]."""
+"""Number of standard deviations that contain a normal variable with 95 % probability [-]."""
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """A parameter before it is measured: guessed for robot arms of 5 kg payload in general."""
+    """A parameter before it is measured, with a guess for robot arms of about 5 kg payload."""
 
     quantity: Quantity
     joints: tuple[int, ...]
-    """Joints it is the same for; links for `bending_stiffness`."""
+    """Joints that share the parameter; links for `bending_stiffness`."""
     guess: float
-    """[SI]."""
+    """Guessed value [SI]."""
     deviation: float = UNSURE
-    """Standard deviation of its logarithm; 0: assumed [-]."""
+    """Standard deviation of its logarithm; 0 if it is assumed to be exact [-]."""
 
 
 def unknowns(description: RobotDescription) -> tuple[Unknown, ...]:
-    """Parameters of an arm's linear model: one a large joint, one for all joints of the wrist.
+    """Return the parameters of an arm's linear model: one per large joint, and one for all joints of the wrist.
 
-    Rotors' inertia is assumed: in the frequencies that ring it hardly differs from a little more link inertia.
+    The rotors' inertia is assumed, since in the visible frequencies it has nearly the same effect as more link
+    inertia.
     """
     joints = range(description.joints)
     wrist = tuple(joints[LARGE:])
@@ -57,7 +58,7 @@ def unknowns(description: RobotDescription) -> tuple[Unknown, ...]:
             Unknown("rotor_inertia", wrist, 0.2, 0.0),
         ]
     found += [Unknown("position_gain", tuple(joints), 12.0), Unknown("damping_time", tuple(joints), 2e-4)]
-    # A beam gets stiffer towards the base, where it is thicker.
+    # A beam is stiffer towards the base, where it is thicker.
     links = description.link_flexibility.links
     found += [
         Unknown("bending_stiffness", (link,), 200_000.0 if link == min(links) else 100_000.0)
@@ -67,11 +68,11 @@ def unknowns(description: RobotDescription) -> tuple[Unknown, ...]:
 
 
 class ArmModes:
-    """Modes of an arm as functions of what is unknown of it, with each of several payloads.
+    """Modes of an arm as functions of its unknown parameters, with each of several payloads.
 
     Args:
-        description: The robot; of it only kinematics, masses and which links bend are used.
-        payloads: What it carries.
+        description: The robot; only kinematics, masses and the set of bending links are used.
+        payloads: Carried payloads.
     """
 
     def __init__(self, description: RobotDescription, payloads: Sequence[Payload]) -> None:
@@ -81,14 +82,14 @@ class ArmModes:
         self._flexible: list[FlexibleModel] = [flexible_model(description, body(p)) for p in payloads]
         self._masses = [mass_matrix(flexible) for flexible in self._flexible]
         self.sought = [number for number, unknown in enumerate(self.unknowns) if unknown.deviation > 0.0]
-        """Numbers of the unknowns that are sought, in the order of the parameter vector."""
+        """Indices of the estimated unknowns, in the order of the parameter vector."""
         self.guess: Floats = np.log([self.unknowns[number].guess for number in self.sought])
-        """Logarithms, shape (P,)."""
+        """Logarithms of the guesses, shape (P,)."""
         self.deviation: Floats = np.array([self.unknowns[number].deviation for number in self.sought])
-        """Deviations of the initial guess, shape (P,)."""
+        """Standard deviations of these logarithms, shape (P,)."""
 
     def flexible(self, payload: int) -> FlexibleModel:
-        """Model with one of the payloads."""
+        """Return the model with one of the payloads."""
         return self._flexible[payload]
 
     def mass(self, q: Floats, payload: int) -> Floats:
@@ -96,14 +97,14 @@ class ArmModes:
         return self._masses[payload](q).copy()
 
     def drivetrain(self, logarithms: Floats) -> Drivetrain:
-        """Springs and drives, of the parameters' logarithms, shape (P,)."""
+        """Return springs and drives for the parameters' logarithms, shape (P,)."""
         return drivetrain(self.parameters(logarithms), self.description, self._flexible[0])
 
     def parameters(self, logarithms: Floats, deviations: Floats | None = None) -> tuple[ModalParameter, ...]:
-        """Parameters as a calibration says them.
+        """Convert parameters to the form of a calibration.
 
         Args:
-            logarithms: Logarithms of the sought parameters, shape (P,).
+            logarithms: Logarithms of the estimated parameters, shape (P,).
             deviations: Standard deviations of the logarithms, shape (P,); None if unknown.
         """
         values = {number: float(np.exp(log)) for number, log in zip(self.sought, logarithms, strict=True)}

@@ -1,4 +1,4 @@
-"""What is measured of a recording: the paper's metrics, and those on a common clock."""
+"""Metrics of a recording: those of the paper, and those on a common clock."""
 
 from tvist_lab.metrics.common_clock import (
     CommonClock,

@@ -1,4 +1,4 @@
-"""Metrics on a common clock: every shaper is judged from the start of the reference before shaping."""
+"""Metrics on a common clock: all times count from the start of the reference before shaping."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,26 +12,26 @@ from tvist_lab.metrics.vibration import amplitude, band_pass, best_tool_accelera
 from tvist_lab.recordings import Floats, Recording
 
 STILL = 0.1
-"""An arm whose |α| stays below this is still [m/s²]."""
+"""An arm is still if |α| stays below this [m/s²]."""
 AFTER_STOP = 0.010
-"""From this long after the stop on, `evaluate` takes the peak [s]: the last ramp has passed."""
+"""Time after the stop at which `evaluate` begins to search for the peak [s], when the last ramp has passed."""
 
 Kinematics = Callable[[Floats], tuple[Floats, Floats]]
-"""Joint angles of shape (n,) [rad] to the flange's position, shape (3,) [m], and rotation, shape (3, 3)."""
+"""Converts joint angles, shape (n,) [rad], to the flange's position, shape (3,) [m], and rotation, shape (3, 3)."""
 
 
 @dataclass(frozen=True)
 class CommonClock:
-    """One motion on the common clock."""
+    """Metrics of one motion on the common clock."""
 
     still_after: float
-    """Last time |α| exceeds 0.1 m/s², from the start of the reference before shaping [s]."""
+    """Last time at which |α| exceeds 0.1 m/s², from the start of the reference before shaping [s]."""
     peak: float
-    """Largest |α| after that reference's stop plus the declared delay [m/s²]."""
+    """Largest |α| after the stop of that reference plus the declared delay [m/s²]."""
     envelope: float
     """Largest envelope of α within 3 to 60 Hz after the same moment [m/s²]."""
     in_motion: float
-    """Vibration during the motion: rms of |α - rigid motion| [m/s²]; NaN where no kinematics were given."""
+    """Vibration during the motion: rms of |α - rigid motion| [m/s²]; NaN without kinematics."""
     peak_acceleration: float
     """Largest |q̈*| of any joint [rad/s²]."""
 
@@ -39,10 +39,10 @@ class CommonClock:
 def common_clock(
     recording: Recording, motion: MotionRows, kinematics: Kinematics | None = None
 ) -> CommonClock:
-    """All metrics of a motion on the common clock, from the truth channel where there is one.
+    """Compute all metrics of a motion on the common clock, from the truth channel if there is one.
 
     Raises:
-        NotMeasurableError: The arm was not still when the rest ended.
+        NotMeasurableError: The arm was not still at the end of the recording.
     """
     after = _after_declared_stop(recording, motion)
     alpha = best_tool_acceleration(recording)
@@ -56,12 +56,12 @@ def common_clock(
 
 
 def still_after(recording: Recording, motion: MotionRows, threshold: float = STILL) -> float:
-    """Last time |α| exceeds a threshold [m/s²], from the start of the reference before shaping [s].
+    """Last time at which |α| exceeds a threshold [m/s²], from the start of the reference before shaping [s].
 
-    Taken on the truth channel; where there is none, on the sensor below 60 Hz.
+    The truth channel is used if there is one, otherwise the sensor below 60 Hz.
 
     Raises:
-        NotMeasurableError: |α| still exceeds it when the recording ends or the next motion starts.
+        NotMeasurableError: |α| still exceeds the threshold when the recording ends or the next motion starts.
     """
     alpha = amplitude(best_tool_acceleration(recording)[motion.start : motion.end])
     loud = np.flatnonzero(alpha > threshold)
@@ -73,7 +73,7 @@ def still_after(recording: Recording, motion: MotionRows, threshold: float = STI
 
 
 def peak_after_stop(recording: Recording, motion: MotionRows, after: float = AFTER_STOP) -> float:
-    """`evaluate`'s peak: largest |α| later than 10 ms after the shaped reference stops [m/s²], true.
+    """Largest true |α| later than 10 ms after the shaped reference stops [m/s²], which `evaluate` uses.
 
     Raises:
         RecordingError: Truth was not recorded.
@@ -94,18 +94,18 @@ def peak_velocity(recording: Recording, motion: MotionRows) -> float:
 
 
 def envelope(alpha: Floats, period: float) -> Floats:
-    """Envelope of a ring-down within 3 to 60 Hz [m/s²]: the length of its three axes' analytic signals.
+    """Envelope of a ring-down within 3 to 60 Hz [m/s²]: the norm of its three axes' analytic signals.
 
-    The ring-down is mirrored at both ends before it is filtered, so that nothing of the motion before it
-    leaks in. A filter needs cycles to judge by: at ζ = 0.03 the peak is 90 to 100 % of the amplitude, at ζ =
-    0.34 it is 40 to 85 %, by phase.
+    The ring-down is mirrored at both ends before filtering, so that the motion before it has no influence. The filter
+    needs several cycles: at ζ = 0.03 the peak is 90 to 100 % of the amplitude, at ζ = 0.34 it is 40 to 85 %,
+    depending on phase.
 
     Args:
-        alpha: Acceleration of the tool from the moment in question on, shape (T, 3) [m/s²].
-        period: Between samples [s].
+        alpha: Acceleration of the tool, beginning at the moment of interest, shape (T, 3) [m/s²].
+        period: Time between samples [s].
 
     Returns:
-        Shape (T,).
+        Envelope, shape (T,).
     """
     rows = len(alpha)
     mirrored = np.concatenate([alpha[:0:-1], alpha, alpha[-2::-1]])
@@ -116,13 +116,13 @@ def envelope(alpha: Floats, period: float) -> Floats:
 def rigid_acceleration(recording: Recording, motion: MotionRows, kinematics: Kinematics) -> Floats:
     """Acceleration a rigid arm's flange would have along the shaped reference, in its own frame [m/s²].
 
-    Second central difference of the position at `target_q`.
+    It is the second central difference of the position at `target_q`.
 
     Returns:
-        Shape (N, 3), for the rows from the motion's start to its shaped stop.
+        Acceleration, shape (N, 3), for the rows from the motion's start to its shaped stop.
 
     Raises:
-        NotMeasurableError: Ticks are missing in the motion.
+        NotMeasurableError: Ticks are missing during the motion.
     """
     first, past = max(motion.start, 1), min(motion.shaped_stop + 1, len(recording) - 1)
     ticks = recording["tick"][first - 1 : past + 1]
@@ -139,7 +139,7 @@ def in_motion_rms(recording: Recording, motion: MotionRows, kinematics: Kinemati
     """Vibration during the motion: rms of |α - α of the rigid arm| until the shaped reference stops [m/s²].
 
     Raises:
-        NotMeasurableError: Ticks are missing in the motion.
+        NotMeasurableError: Ticks are missing during the motion.
     """
     rigid = rigid_acceleration(recording, motion, kinematics)
     first = max(motion.start, 1)
@@ -148,14 +148,14 @@ def in_motion_rms(recording: Recording, motion: MotionRows, kinematics: Kinemati
 
 
 def _after_declared_stop(recording: Recording, motion: MotionRows) -> slice:
-    """Rows after the stop of the reference before shaping plus the delay its shaper declares then."""
+    """Rows after the stop of the reference before shaping plus the delay that its shaper declares at that time."""
     delay = float(np.nan_to_num(recording["shaper_delay"][motion.reference_stop]))
     published = DIFFERENTIATOR_TICKS * recording.period
     return _later_than(recording, motion, recording.time[motion.reference_stop] + delay + published)
 
 
 def _later_than(recording: Recording, motion: MotionRows, moment: float) -> slice:
-    """The motion's rows later than a moment."""
+    """The motion's rows later than a given time."""
     first = int(np.searchsorted(recording.time, moment + 1e-9))
     if first >= motion.end:
         raise NotMeasurableError("nothing was recorded after the stop")

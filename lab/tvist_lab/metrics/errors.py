@@ -1,5 +1,5 @@
-"""What a metric says when there is nothing to measure."""
+"""Error for recordings from which a metric cannot be computed."""
 
 
 class NotMeasurableError(ValueError):
-    """A figure cannot be taken from this recording; the message is the reason, in words for a person."""
+    """A metric cannot be computed from this recording; the message gives the reason for people."""

@@ -1,4 +1,4 @@
-"""Find the beginning and end of each motion in a recording."""
+"""Detection of motions in a recording."""
 
 from dataclasses import dataclass, replace
 from itertools import zip_longest
@@ -12,29 +12,29 @@ from tvist_lab.recordings import Floats, Recording
 MOVING = 1e-7
 """A reference that changes by more than this from one tick to the next moves [rad]."""
 JUMP = 0.05
-"""A reference that changes by more than this in a tick was put elsewhere, as by a reset [rad]: 25 rad/s."""
+"""A reference that changes by more than this in a tick was set elsewhere, for example by a reset [rad]; 25 rad/s."""
 REST = 0.02
-"""A reference at rest for less than this, as in a reversal, is still in the same motion [s]."""
+"""A reference that rests for less than this, as in a reversal, is still in the same motion [s]."""
 DIFFERENTIATOR_TICKS = 1
-"""The published target of tick i is the shaped reference of tick i-1: a central difference costs a tick."""
+"""The published target of tick i is the shaped reference of tick i-1, since a central difference costs a tick."""
 
 
 @dataclass(frozen=True)
 class MotionRows:
-    """One motion of the reference, as indices of rows of its recording."""
+    """One motion of the reference, as row indices of its recording."""
 
     start: int
-    """Last row in which the reference is still where it starts."""
+    """Last row in which the reference is still at its start."""
     reference_stop: int
     """Last row in which the reference before shaping moves by more than 1e-7 rad."""
     shaped_stop: int
     """Last row in which the published target, the shaped reference, moves by more than 1e-7 rad."""
     end: int
-    """First row that is no longer this motion's: the next one's start, or the end of the recording."""
+    """First row after this motion: the next one's start, or the end of the recording."""
     id: Any = None
-    """The motion's id, where events told of it."""
+    """Number of the motion, if events contain it."""
     stopped: bool = False
-    """It was stopped before its target."""
+    """Whether it was stopped before its target."""
 
     def duration(self, recording: Recording) -> float:
         """Duration of the reference before shaping [s]."""
@@ -43,8 +43,8 @@ class MotionRows:
     def shaped_duration(self, recording: Recording) -> float:
         """Duration of the shaped reference [s].
 
-        A shaper's first impulse has no delay, so both begin together; the tick between shaper and publication
-        does not belong to the shaper and is subtracted.
+        Since a shaper's first impulse has no delay, both references begin together; the tick between shaper and
+        publication does not belong to the shaper and is subtracted.
         """
         published = recording.time[self.shaped_stop] - recording.time[self.start]
         return float(published - DIFFERENTIATOR_TICKS * recording.period)
@@ -57,8 +57,8 @@ class MotionRows:
 def motions(recording: Recording) -> list[MotionRows]:
     """Find the motions of a recording, in order.
 
-    They come from the events `motion_started`, `motion_done` and `motion_stopped` if there are any, otherwise
-    from the reference itself. A motion without any movement does not count.
+    They are taken from the events `motion_started`, `motion_done` and `motion_stopped` if there are any, otherwise
+    from the reference itself. Motions without any movement are left out.
     """
     if len(recording) < 2:
         return []
@@ -82,19 +82,19 @@ def motions(recording: Recording) -> list[MotionRows]:
 
 
 def _step_per_tick(recording: Recording, name: str) -> Floats:
-    """How far the joint that moves most moves into each row, a tick [rad], shape (T,); zero for the first."""
+    """Movement per tick of the joint that moves most [rad], for each row, shape (T,); zero for the first."""
     step = np.max(np.abs(np.diff(recording[name], axis=0)), axis=1, initial=0.0)
     return np.concatenate([[0.0], step / np.diff(recording["tick"])])
 
 
 def _spans_of_events(recording: Recording) -> list[tuple[int, int, Any, bool]]:
-    """Rows in which each started motion's reference can move, its id and whether it was stopped."""
+    """Rows in which each started motion's reference can move, its number, and whether it was stopped."""
     started = [event for event in recording.events if event.kind == "motion_started"]
     ended = {event.id: event for event in recording.events if event.kind in ("motion_done", "motion_stopped")}
     spans = []
     for event, following in zip_longest(started, started[1:]):
         end = ended.get(event.id)
-        # The first tick that moves may be the event's own or the one after it; so may the last.
+        # The first moving tick may be the event's own or the one after it; the same holds for the last.
         lo = max(recording.index(event.tick), 1)
         hi = len(recording) if end is None else recording.index(end.tick + 2)
         if following is not None:
@@ -104,11 +104,11 @@ def _spans_of_events(recording: Recording) -> list[tuple[int, int, Any, bool]]:
 
 
 def _spans_of_reference(recording: Recording, moving: NDArray[np.bool_]) -> list[tuple[int, int, Any, bool]]:
-    """Runs of rows in which the reference moves, joined where it rests only for a moment."""
+    """Runs of rows in which the reference moves, joined across short rests."""
     rows = np.flatnonzero(moving)
     if not rows.size:
         return []
-    # Between two rows that move, the rows at rest count, not the time: ticks may be missing in a motion.
+    # Between two moving rows, count the rows at rest rather than the time, since ticks may be missing in a motion.
     at_rest = recording.time[rows[1:] - 1] - recording.time[rows[:-1]]
     breaks = np.flatnonzero(at_rest > REST - 0.5 * recording.period)
     firsts = rows[np.concatenate([[0], breaks + 1])]

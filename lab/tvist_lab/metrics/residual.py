@@ -1,4 +1,4 @@
-"""RV, the residual vibration: how much the arm still rings when its reference has stopped."""
+"""RV, the residual vibration of the arm after its reference has stopped."""
 
 from dataclasses import dataclass
 
@@ -12,32 +12,32 @@ from tvist_lab.metrics.vibration import amplitude, tool_acceleration
 from tvist_lab.recordings import Floats, Recording
 
 WINDOW = 0.3
-"""Time after the stop in which peaks are looked for [s]."""
+"""Time after the stop in which peaks are searched [s]."""
 PROMINENCE = 0.1
-"""By which a peak must stand out of its surroundings [m/s²]: three times the sensor's noise."""
+"""Smallest prominence of a peak [m/s²]: three times the sensor's noise."""
 SETTLE = 0.012
-"""Time after the stop before modes are fitted [s]: the end of the deceleration ramp is no ring-down."""
+"""Time after the stop before modes are fitted [s], since the end of the deceleration ramp is not a ring-down."""
 
 
 @dataclass(frozen=True)
 class Residual:
-    """RV the paper's way."""
+    """RV as defined in the paper."""
 
     value: float
-    """RV: the fitted decay at the stop, or the largest |α| where it could not be fitted [m/s²]."""
+    """RV: the fitted decay at the stop, or the largest |α| if it could not be fitted [m/s²]."""
     decay: float
-    """Rate λ of the fitted exponential [1/s]; NaN where there is none."""
+    """Rate λ of the fitted exponential [1/s]; NaN if there is none."""
     stop: float
     """Time t_b at which the shaped reference stops [s]."""
     peak_times: Floats
-    """Times of the peaks that were found [s], shape (P,)."""
+    """Times of the peaks [s], shape (P,)."""
     peaks: Floats
-    """Their |α| [m/s²], shape (P,)."""
+    """|α| at the peaks [m/s²], shape (P,)."""
     fitted: bool
-    """False where fewer than two peaks were found, and the value is the largest |α| in the window."""
+    """False if there were fewer than two peaks, so that the value is the largest |α| in the window."""
 
     def curve(self, time: Floats) -> Floats:
-        """The fitted decay at given times [m/s²]; constant where nothing was fitted."""
+        """The fitted decay at given times [m/s²]; constant if nothing was fitted."""
         rate = self.decay if self.fitted else 0.0
         return np.asarray(self.value * np.exp(-rate * (time - self.stop)), dtype=np.float64)
 
@@ -49,25 +49,25 @@ class ModalResidual:
     value: float
     """Amplitude of the vibration at the stop, all modes together [m/s²]."""
     amplitudes: Floats
-    """Amplitude of each mode at the stop [m/s²], shape (M,). Modes that nearly coincide share theirs arbitrarily."""
+    """Amplitude of each mode at the stop [m/s²], shape (M,). Nearly equal modes divide theirs arbitrarily."""
     rms: float
-    """rms of what the modes do not explain, over all axes [m/s²]."""
+    """rms of the part that the modes do not explain, over all axes [m/s²]."""
 
 
 def residual(recording: Recording, motion: MotionRows) -> Residual:
     """RV as in section 4.2 of the paper.
 
-    Local maxima of |α| (from the sensor, gravity removed) in the 0.3 s after the shaped reference stops, with
-    a prominence of at least 0.1 m/s², are fitted by RV·exp(-λ(t - t_b)), λ ≥ 0, least squares in linear
-    scale. Noise lifts the later peaks and flattens the fit: small values have a floor of about 0.07 m/s² at
-    0.03 m/s² of noise.
+    Local maxima of |α| (from the sensor, without gravity) in the 0.3 s after the shaped reference stops, with a
+    prominence of at least 0.1 m/s², are fitted by RV·exp(-λ(t - t_b)), λ ≥ 0, with least squares on a linear scale.
+    Noise raises the later peaks and flattens the fit: small values have a floor of about 0.07 m/s² at 0.03 m/s² of
+    noise.
 
     Raises:
         NotMeasurableError: The recording ends, or the next motion starts, within the window.
     """
     window = _window(recording, motion, WINDOW)
     stop = float(recording.time[window][0])
-    # In the tick of the stop the reference still decelerates: what is felt then is no ring-down.
+    # In the tick of the stop the reference still decelerates, so the measurement there is not a ring-down.
     time = recording.time[window][1:]
     alpha = amplitude(tool_acceleration(recording)[window])[1:]
     at, _ = find_peaks(alpha, prominence=PROMINENCE)
@@ -78,9 +78,9 @@ def residual(recording: Recording, motion: MotionRows) -> Residual:
 
 
 def _exponential(t: Floats, y: Floats) -> tuple[float, float]:
-    """Value at t = 0 and rate of the decaying exponential nearest to points, in linear scale."""
+    """Value at t = 0 and rate of the decaying exponential closest to the points, on a linear scale."""
     slope, log_value = np.polyfit(t, np.log(y), 1)
-    # A search that starts on its bound is slow to leave it.
+    # A search that starts at its bound is slow to leave it.
     start = [float(np.exp(log_value)), max(-float(slope), 1.0)]
     fit = least_squares(
         lambda p: p[0] * np.exp(-p[1] * t) - y,
@@ -102,16 +102,16 @@ def residual_by_modes(
 ) -> ModalResidual:
     """RV by linear least squares of α's three axes on e^(-σt)(cos ω_d t, sin ω_d t) of known modes.
 
-    It uses every sample from 12 ms after the stop on, and noise does not bias it: use it to rank shapers, and
-    `residual` to compare with the paper. At the stop the modes add up to α = Re z, z = Σ (c - i s) in each
-    axis; the value is the largest |α| of the ellipse that z describes over one turn.
+    It uses every sample from 12 ms after the stop on, and is not biased by noise. Use it to rank shapers, and
+    `residual` to compare with the paper. At the stop the modes add up to α = Re z, z = Σ (c - i s) in each axis; the
+    value is the largest |α| of the ellipse that z describes in one turn.
 
     Args:
         recording: The recording.
         motion: One of its motions.
         f_d: Damped frequency of each mode at the end pose [Hz], shape (M,).
         zeta: Damping ratio of each mode [-], shape (M,).
-        truth: From the truth channel, free of noise.
+        truth: Whether to use the truth channel, which is free of noise.
 
     Raises:
         NotMeasurableError: The recording ends, or the next motion starts, within the window.
@@ -138,12 +138,12 @@ def residual_by_modes(
 
 
 def _major_axis(cosine: Floats, sine: Floats) -> float:
-    """Largest length of c cos φ + s sin φ over φ."""
+    """Largest norm of c cos φ + s sin φ over φ."""
     return float(np.linalg.norm(np.column_stack([cosine, sine]), ord=2))
 
 
 def _window(recording: Recording, motion: MotionRows, length: float) -> slice:
-    """Rows from the shaped stop on, for a time."""
+    """Rows of a given duration, beginning at the shaped stop."""
     past = int(np.searchsorted(recording.time, recording.time[motion.shaped_stop] + length - 1e-9)) + 1
     if past > motion.end:
         seen = recording.time[motion.end - 1] - recording.time[motion.shaped_stop]

@@ -1,4 +1,4 @@
-"""(f_d, ζ) of the mode that rings after a stop, from the three axes of the tool's accelerometer."""
+"""(f_d, ζ) of the mode that vibrates after a stop, from the three axes of the tool's accelerometer."""
 
 import math
 from dataclasses import dataclass
@@ -9,31 +9,31 @@ from scipy.optimize import least_squares
 from tvist_lab.recordings import Floats
 
 FREQUENCIES = (3.0, 45.0)
-"""Damped frequencies a mode is looked for in [Hz]."""
+"""Range of damped frequencies that are searched [Hz]."""
 DAMPING = (0.002, 0.7)
-"""Damping ratios a mode is looked for in [-]."""
+"""Range of damping ratios that are searched [-]."""
 SLOW_POLE = 17.5
-"""Rate of the non-oscillatory tail a position loop adds [1/s]."""
+"""Rate of the non-oscillatory tail that a position loop adds [1/s]."""
 SKIP = 0.006
-"""Time after the stop that is left out [s]: the end of the deceleration ramp is no ring-down."""
+"""Time after the stop that is left out [s], since the end of the deceleration ramp is not a ring-down."""
 WINDOW = 0.5
-"""Time looked at first [s]."""
+"""Duration of the first fit [s]."""
 LEAST_R_SQUARED = 0.2
-"""A fit that explains less of the signal's energy may be one of noise, of which it explains a tenth [-]."""
+"""Smallest share of the signal's energy that a fit must explain; a fit of pure noise explains a tenth [-]."""
 WINDOWS = (0.2, 1.0)
-"""Shortest and longest time looked at in the end [s]."""
+"""Shortest and longest duration of the final fit [s]."""
 
 
 @dataclass(frozen=True)
 class RingDown:
-    """A damped sine fitted to a ring-down; where `ok` is false, its figures are not to be used."""
+    """A damped sine fitted to a ring-down; if `ok` is false, its values must not be used."""
 
     f_d: float
-    """Damped frequency of the mode that counts [Hz]."""
+    """Damped frequency of the selected mode [Hz]."""
     zeta: float
-    """Its damping ratio [-]."""
+    """Damping ratio of the mode [-]."""
     amplitude: float
-    """Its largest |α| at the stop [m/s²]."""
+    """Largest |α| of the mode at the stop [m/s²]."""
     f_d_error: float
     """Standard error of f_d [Hz]."""
     zeta_error: float
@@ -43,13 +43,13 @@ class RingDown:
     r_squared: float
     """Share of the signal's energy that the fit explains [-]."""
     window: float
-    """Time that was fitted [s]."""
+    """Duration that was fitted [s]."""
     modes: int
-    """Modes that were fitted together."""
+    """Number of modes that were fitted together."""
     ok: bool
-    """The mode is measurable."""
+    """Whether the mode is measurable."""
     reason: str = ""
-    """Why it is not, in words for a person."""
+    """Why it is not measurable, for people."""
 
 
 def fit_ring_down(
@@ -67,21 +67,20 @@ def fit_ring_down(
         α(t) = Σ_k e^(-σ_k t) (c_k cos ω_k t + s_k sin ω_k t) + Σ_l e^(-p_l t) d_l,    σ = ω ζ/√(1-ζ²)
 
     with vectors c, s, d of three axes. They enter linearly and are eliminated (variable projection; Golub and
-    Pereyra, 1973); f_d and ζ are searched from the best points of a grid, so that no first guess is needed.
-    The fit is done twice: over 0.5 s, and then over the time that the mode found so takes to sink into the
-    noise.
+    Pereyra, 1973); f_d and ζ are searched from the best points of a grid, so that no initial guess is needed. The fit
+    is done twice: over 0.5 s, and then over the time in which the mode found in this way decays into the noise.
 
     Args:
-        alpha: Acceleration of the tool without gravity from the stop on, shape (T, 3) [m/s²].
-        period: Between samples [s].
-        modes: Most modes to fit; one more is kept only where it explains more than noise would.
-        slow_poles: Rates of non-oscillatory tails to allow for [1/s].
+        alpha: Acceleration of the tool without gravity, beginning at the stop, shape (T, 3) [m/s²].
+        period: Time between samples [s].
+        modes: Largest number of modes; another mode is kept only if it explains more than noise would.
+        slow_poles: Rates of the non-oscillatory tails to include [1/s].
         skip: Time after the stop that is left out [s].
-        window: Time to fit [s]; None chooses.
-        share: The lowest mode counts that has at least this share of the largest amplitude [-]; 1: the strongest.
+        window: Duration of the fit [s]; None to choose it automatically.
+        share: Select the lowest mode with at least this share of the largest amplitude [-]; 1 for the strongest.
 
     Returns:
-        That mode. `ok` is false with a `reason` where none is measurable.
+        The selected mode. `ok` is false, with a `reason`, if no mode is measurable.
     """
     first = round(skip / period)
     ring = _Ring(alpha[first:], period, skip, slow_poles, share)
@@ -114,7 +113,7 @@ class _Ring:
         self._slow = [np.exp(-pole * self.time) for pole in slow_poles]
 
     def cut(self, window: float) -> "_Ring":
-        """The ring-down's first part."""
+        """Return the first part of the ring-down."""
         return _Ring(
             self.alpha[: round(window / self.period)], self.period, self.skip, self.slow_poles, self.share
         )
@@ -129,12 +128,12 @@ class _Ring:
         return np.column_stack(columns + self._slow)
 
     def unexplained(self, parameters: Floats) -> Floats:
-        """What is left of the signal without its projection on the basis, flat."""
+        """Residual of the signal's projection on the basis, flattened."""
         orthonormal, _ = np.linalg.qr(self.basis(parameters))
         return np.asarray((self.alpha - orthonormal @ (orthonormal.T @ self.alpha)).ravel())
 
     def fit(self, modes: int) -> RingDown:
-        """Fit one mode, then one more as long as that pays and is allowed."""
+        """Fit one mode, then further ones as long as they improve the fit and are allowed."""
         parameters = self._add_mode(np.empty(0))
         for _ in range(1, modes):
             more = self._add_mode(parameters)
@@ -144,7 +143,7 @@ class _Ring:
         return self._judge(parameters)
 
     def _add_mode(self, parameters: Floats) -> Floats:
-        """The parameters with one mode more, all of them refined; the new one is searched on a grid."""
+        """Add a mode found by a grid search, and refine all parameters."""
         grid = [
             (float(np.sum(self.unexplained(np.append(parameters, [f_d, zeta])) ** 2)), f_d, zeta)
             for f_d in np.geomspace(1.1 * FREQUENCIES[0], 0.9 * FREQUENCIES[1], 28)
@@ -164,14 +163,14 @@ class _Ring:
         return float(fit.cost), np.asarray(fit.x)
 
     def _pays(self, fewer: Floats, more: Floats) -> bool:
-        """Whether one more mode lowers the Bayesian information criterion."""
+        """Return whether another mode lowers the Bayesian information criterion."""
         samples = self.alpha.size
         added = 2 + 2 * self.alpha.shape[1]
         before, after = (float(np.sum(self.unexplained(p) ** 2)) + 1e-300 for p in (fewer, more))
         return bool(samples * math.log(before / after) > added * math.log(samples))
 
     def _judge(self, parameters: Floats) -> RingDown:
-        """The mode that counts, its standard errors, and whether they are small enough."""
+        """Return the selected mode, its standard errors, and whether they are small enough."""
         weights, *_ = np.linalg.lstsq(self.basis(parameters), self.alpha)
         left = self.unexplained(parameters)
         count = parameters.size // 2
@@ -215,12 +214,12 @@ class _Ring:
 
 
 def _sigma(f_d: float, zeta: float) -> float:
-    """Decay rate [1/s] of a mode."""
+    """Decay rate of a mode [1/s]."""
     return float(2.0 * np.pi * f_d * zeta / np.sqrt(1.0 - zeta * zeta))
 
 
 def _objection(fit: RingDown) -> str:
-    """Why a fit is not to be used; empty where it is."""
+    """Return why a fit must not be used; empty if it may."""
     if fit.amplitude < 3.0 * fit.rms:
         return (
             f"the vibration of {fit.amplitude:.3f} m/s² does not stand out of {fit.rms:.3f} m/s² rms of noise"

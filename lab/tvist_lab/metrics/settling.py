@@ -1,4 +1,4 @@
-"""E, the distance to the attained position, and what the paper reads off it (after ISO 9283)."""
+"""E, the distance to the attained position, and the paper's metrics based on it (after ISO 9283)."""
 
 from dataclasses import dataclass
 
@@ -11,40 +11,40 @@ from tvist_lab.recordings import Floats, Recording
 REPEATABILITY = 3.0e-5
 """Repeatability of the UR5e: half-width of the band around the attained position [m]."""
 TAIL = 0.2
-"""Time at the end of the recorded rest over which the attained position is the mean [s]."""
+"""Time at the end of the recorded rest whose mean is the attained position [s]."""
 
 
 @dataclass(frozen=True)
 class Settling:
-    """How a motion comes to rest. Times count from the start of the reference before shaping."""
+    """Settling of a motion. Times count from the start of the reference before shaping."""
 
     attained: Floats
     """Attained position of the tool [m], shape (3,)."""
     enter: float
-    """t_enter: E falls below the repeatability for the first time [s]."""
+    """t_enter: time at which E first falls below the repeatability [s]."""
     cycle: float
-    """t_cycle: E is above the repeatability for the last time [s]."""
+    """t_cycle: last time at which E is above the repeatability [s]."""
     stabilisation: float
-    """t_stb = t_cycle - t_enter [s]; zero where E never leaves the band again."""
+    """t_stb = t_cycle - t_enter [s]; zero if E never leaves the band again."""
     overshoot: float
-    """e_os: largest E after t_enter, zero where that is within the repeatability [m]."""
+    """e_os: largest E after t_enter, zero if that is within the repeatability [m]."""
 
 
 def attained_position(recording: Recording, motion: MotionRows) -> Floats:
     """Mean position of the tool over the last 0.2 s before the next motion [m], shape (3,).
 
-    The tool's position is the forward kinematics of the joint angles, as in the paper: what the links bend is
-    not in it.
+    The tool's position is the forward kinematics of the joint angles, as in the paper, so it does not include the
+    bending of the links.
 
     Raises:
-        NotMeasurableError: The tool was recorded at rest for less than that.
+        NotMeasurableError: The recorded rest is shorter than that.
     """
     rows = _tail(recording, motion)
     return np.asarray(np.mean(recording["actual_TCP_pose"][rows, :3], axis=0), dtype=np.float64)
 
 
 def distance(recording: Recording, motion: MotionRows) -> Floats:
-    """E: distance of the tool to its attained position [m], for the rows from the motion's start to its end.
+    """E: distance of the tool from its attained position [m], for the rows from the motion's start to its end.
 
     Raises:
         NotMeasurableError: See `attained_position`.
@@ -56,15 +56,15 @@ def distance(recording: Recording, motion: MotionRows) -> Floats:
 
 
 def settling(recording: Recording, motion: MotionRows, band: float = REPEATABILITY) -> Settling:
-    """t_enter, t_stb, t_cycle and e_os of the paper, section 4.2; crossings are interpolated between ticks.
+    """t_enter, t_stb, t_cycle and e_os as in section 4.2 of the paper; crossings are interpolated between ticks.
 
     Args:
         recording: The recording.
-        motion: One of its motions; it should be followed by a second of rest or more, as integrators creep.
-        band: Repeatability [m].
+        motion: One of its motions, which should be followed by at least a second of rest, since integrators creep.
+        band: Half-width of the band [m], by default the repeatability.
 
     Raises:
-        NotMeasurableError: The tool never leaves the band, or had not settled when the rest ended.
+        NotMeasurableError: The tool never leaves the band, or had not settled at the end of the rest.
     """
     E = distance(recording, motion)
     time = recording.time[motion.start : motion.end] - recording.time[motion.start]
@@ -95,7 +95,7 @@ def _crossing(time: Floats, E: Floats, row: int, band: float) -> float:
 
 
 def _tail(recording: Recording, motion: MotionRows) -> slice:
-    """Rows over which the attained position is the mean."""
+    """Rows whose mean is the attained position."""
     first = int(np.searchsorted(recording.time, recording.time[motion.end - 1] - TAIL + 1e-9))
     if first <= motion.shaped_stop:
         raise NotMeasurableError(f"the tool was recorded at rest for less than {TAIL} s")

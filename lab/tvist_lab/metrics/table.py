@@ -1,4 +1,4 @@
-"""Table 2 of the paper: what is measured of a motion, its mean over runs, and the impact of shaping."""
+"""Table 2 of the paper: metrics of each motion, their means over runs, and the impact of shaping."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -23,17 +23,17 @@ IMPACTS = {
     "overshoot": "overshoot_m",
     "residual_vibration": "residual_vibration_m_s2",
 }
-"""The impacts the paper lists, and the columns they are of."""
+"""Impacts listed in the paper, and their columns."""
 
 Row: TypeAlias = dict[str, float | None]
 Table: TypeAlias = dict[str, dict[str, Row]]
-"""Motion to `unshaped`, `shaped` and `impact_percent`, nested and named as `table_2` of the paper's data."""
+"""Motion to `unshaped`, `shaped` and `impact_percent`, in the structure of `table_2` in the paper's data."""
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class MotionResult:
-    """What is measured of one motion; None is not measurable, with the reason in `notes`."""
+    """Metrics of one motion; None is not measurable, with the reason in `notes`."""
 
     start_s: float
     """Time at which the reference starts [s]."""
@@ -48,18 +48,18 @@ class MotionResult:
     overshoot_m: float | None = None
     """e_os [m]."""
     residual_vibration_m_s2: float | None = None
-    """RV [m/s²]; noted where it is the largest |α|, not a fitted decay."""
+    """RV [m/s²]; a note says if it is the largest |α| instead of a fitted decay."""
     still_after_ms: float | None = None
-    """Last time |α| exceeds 0.1 m/s², from the start of the reference [ms]."""
+    """Last time at which |α| exceeds 0.1 m/s², from the start of the reference [ms]."""
     f_d_hz: float | None = None
     """Damped frequency of the ring-down after the stop [Hz]."""
     zeta: float | None = None
     """Damping ratio of the ring-down after the stop [-]."""
     notes: Mapping[str, str] = field(default_factory=dict)
-    """Field to what must be known of its value."""
+    """Field to a note about its value."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Names to plain values, as `tvist analyze` prints them."""
+        """Convert the result to plain values, as `tvist analyze` prints them."""
         return {**asdict(self), "notes": dict(self.notes)}
 
 
@@ -68,18 +68,18 @@ class Runs:
     """Repetitions of one motion."""
 
     unshaped: Sequence[MotionResult]
-    """At least one."""
+    """At least one result."""
     shaped: Sequence[MotionResult]
-    """At least one."""
+    """At least one result."""
 
 
 def analyze(recording: Recording) -> list[MotionResult]:
-    """Measure every motion of a recording."""
+    """Measure all motions of a recording."""
     return [measure(recording, motion) for motion in motions(recording)]
 
 
 def measure(recording: Recording, motion: MotionRows) -> MotionResult:
-    """Measure one motion; what cannot be measured is None with a note."""
+    """Measure one motion; metrics that cannot be computed are None with a note."""
     notes: dict[str, str] = {}
     if motion.stopped:
         notes["stop_s"] = "the motion was stopped before its target"
@@ -113,7 +113,7 @@ def measure(recording: Recording, motion: MotionRows) -> MotionResult:
 
 
 def _ring_down(recording: Recording, motion: MotionRows) -> RingDown:
-    """The mode that rings after the stop."""
+    """Fit the mode that vibrates after the stop."""
     alpha = tool_acceleration(recording)[motion.shaped_stop : motion.end]
     fit = fit_ring_down(alpha, recording.period, modes=2, slow_poles=(SLOW_POLE,))
     if not fit.ok:
@@ -128,8 +128,9 @@ def table_2(runs: Mapping[str, Runs]) -> Table:
         runs: Name of a motion (`Q1-Q2`) to its repetitions.
 
     Returns:
-        Nested and named as in the paper's data. A mean leaves out runs in which the figure was not measurable
-        and is None where that is all of them; an impact is None where its means do not give one.
+        A table with the structure and names of the paper's data. A mean leaves out runs in which the metric was not
+        measurable, and is None if that holds for all of them; an impact is None if one of its means is missing or it
+        is not defined.
     """
     table: Table = {}
     for name, repeated in runs.items():
@@ -140,7 +141,7 @@ def table_2(runs: Mapping[str, Runs]) -> Table:
 
 
 def table_notes(runs: Mapping[str, Runs]) -> list[str]:
-    """What must be known of the means in the table: each note with how many runs it holds for."""
+    """Return the notes about the means in the table, each with the number of runs it applies to."""
     found = []
     for name, repeated in runs.items():
         for kind, results in (("unshaped", repeated.unshaped), ("shaped", repeated.shaped)):

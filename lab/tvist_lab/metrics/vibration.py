@@ -1,4 +1,4 @@
-"""α, the acceleration of the tool as its accelerometer shows it, without gravity."""
+"""α, the acceleration of the tool measured by its accelerometer, without gravity."""
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
@@ -10,7 +10,7 @@ from tvist_lab.recordings import Floats, Recording
 GRAVITY = 9.81
 """Gravity of the simulated world [m/s²]."""
 BAND = (3.0, 60.0)
-"""Frequencies in which an arm vibrates [Hz]."""
+"""Frequency range of an arm's vibrations [Hz]."""
 SENSOR = "actual_tool_accelerometer"
 TRUTH = "truth_tool_acceleration"
 TRUE_POSE = "truth_flange_pose"
@@ -19,19 +19,19 @@ TRUE_POSE = "truth_flange_pose"
 def tool_acceleration(recording: Recording, *, truth: bool = False) -> Floats:
     """Acceleration of the flange in its own frame, α [m/s²].
 
-    The sensor feels the specific force; at rest that is the reaction to gravity, which the orientation of the
-    tool tells: α = f - Rᵀ (0, 0, g).
+    The sensor measures the specific force; at rest this is the reaction to gravity, which follows from the
+    orientation of the tool: α = f - Rᵀ (0, 0, g).
 
     Args:
-        recording: With the sensor's column and `actual_TCP_pose`.
-        truth: From the truth channel, free of noise, with the flexible arm's orientation if recorded.
+        recording: Recording with the sensor's column and `actual_TCP_pose`.
+        truth: Whether to use the truth channel, free of noise, with the flexible arm's orientation if recorded.
 
     Returns:
-        Shape (T, 3).
+        Acceleration, shape (T, 3).
 
     Raises:
         RecordingError: The column is missing.
-        NotMeasurableError: The channel has holes.
+        NotMeasurableError: The channel has gaps.
     """
     name = TRUTH if truth else SENSOR
     force = recording[name]
@@ -44,10 +44,10 @@ def tool_acceleration(recording: Recording, *, truth: bool = False) -> Floats:
 
 
 def best_tool_acceleration(recording: Recording) -> Floats:
-    """α from the truth channel where it was recorded, else from the sensor below 60 Hz [m/s²], shape (T, 3).
+    """α from the truth channel if it was recorded, else from the sensor below 60 Hz [m/s²], shape (T, 3).
 
-    White noise of 0.03 m/s² an axis alone exceeds 0.1 m/s² in one tick of a hundred, so that no last time
-    above a threshold could be told from the raw sensor.
+    White noise of 0.03 m/s² per axis alone exceeds 0.1 m/s² in one tick of a hundred, so the last time above a
+    threshold could not be determined from the raw sensor.
     """
     if TRUTH in recording:
         return tool_acceleration(recording, truth=True)
@@ -60,12 +60,12 @@ def amplitude(alpha: Floats) -> Floats:
 
 
 def low_pass(signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
-    """Signal below a frequency, in phase with itself (Butterworth, forth and back)."""
+    """Low-pass filter a signal with zero phase (Butterworth, forwards and backwards)."""
     return _both_ways(butter(4, cut_off, "lowpass", fs=1.0 / period, output="sos"), signal)
 
 
 def band_pass(signal: Floats, period: float, band: tuple[float, float] = BAND) -> Floats:
-    """Signal within a band of frequencies, in phase with itself (Butterworth, forth and back)."""
+    """Band-pass filter a signal with zero phase (Butterworth, forwards and backwards)."""
     return _both_ways(butter(2, band, "bandpass", fs=1.0 / period, output="sos"), signal)
 
 

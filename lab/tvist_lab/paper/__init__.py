@@ -1,1 +1,1 @@
-"""The paper's experiment: three motions, unshaped and shaped, and its tables and figures."""
+"""The paper's experiment: three motions, unshaped and shaped, with its tables and figures."""

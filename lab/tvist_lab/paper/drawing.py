@@ -1,4 +1,4 @@
-"""The paper's figures from our runs."""
+"""The paper's figures, drawn from our runs."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ NUMBERS = {"Q1-Q2": 12, "Q1-Q3": 13, "Q3-Q1": 14}
 
 
 def draw(done: Experiment, folder: Path, *, all_figures: bool) -> list[Path]:
-    """Write figures 12 to 14 and 16, and 4 and 7 too where all are wanted; the files written."""
+    """Write figures 12 to 14 and 16, and on request also 4 and 7; return the files written."""
     folder.mkdir(parents=True, exist_ok=True)
     pairs = {}
     for motion in MOTIONS:

@@ -1,4 +1,4 @@
-"""The three motions, each by several methods, run after run, as a client."""
+"""The three motions by several methods, with repetitions, as a client."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -33,7 +33,7 @@ from tvist_protocol.info import Info
 BEFORE = 0.1
 """Time recorded before a motion [s]."""
 AFTER = 1.9
-"""Time recorded after its end [s]: the slow part of the drives' loops needs it to settle within 0.03 mm."""
+"""Time recorded after the motion's end [s]; the slow part of the drives' loops needs it to settle within 0.03 mm."""
 
 Progress = Callable[[str], None]
 
@@ -45,31 +45,33 @@ class JudgedRun:
     result: MotionResult
     """The paper's metrics."""
     peak: float | None
-    """Largest true |α| later than 10 ms after the reference stops; None where the robot tells no truth [m/s²]."""
+    """Largest true |α| later than 10 ms after the reference stops [m/s²]; None if the robot does not publish the
+    truth.
+    """
     still_after: float | None
-    """From the start of the unshaped reference; None: never still [s]."""
+    """Time until still, from the start of the unshaped reference [s]; None if never still."""
     acceleration: float
     """Largest |q̈*| [rad/s²]."""
 
 
 @dataclass
 class Experiment:
-    """Everything that was run."""
+    """Results of all runs."""
 
     info: Info
     seed: int
     runs: int
     table_1: dict[str, dict[str, float]]
-    """Pose to its lowest mode: as estimated, and the truth where the robot tells it."""
+    """Pose to its lowest mode: as estimated, and the truth if the robot publishes it."""
     judged: dict[tuple[str, str], list[JudgedRun]] = field(default_factory=dict)
-    """(motion, method) to its runs."""
+    """(motion, method) to the results of its runs."""
     labels: dict[str, str] = field(default_factory=dict)
     """Method to its name for people."""
     first: dict[tuple[str, str], Recording] = field(default_factory=dict)
-    """(motion, method) to the recording of its first run, for figures."""
+    """(motion, method) to the recording of its first run, for the figures."""
 
     def of_table_2(self) -> dict[str, Runs]:
-        """Unshaped and shaped runs of each motion, for Table 2."""
+        """Return the unshaped and shaped runs of each motion, for Table 2."""
         return {
             motion: Runs(
                 [judged.result for judged in self.judged[motion, "unshaped"]],
@@ -79,7 +81,7 @@ class Experiment:
         }
 
     def delay(self, motion: str) -> float:
-        """Mean delay of the shaped motion [s]."""
+        """Return the mean delay of the shaped motion [s]."""
         return 1e-3 * float(np.mean([judged.result.delay_ms for judged in self.judged[motion, "shaped"]]))
 
 
@@ -97,7 +99,7 @@ def judge(recording: Recording) -> JudgedRun:
 
 
 async def table_1(robot: Robot, arm: Arm) -> dict[str, dict[str, float]]:
-    """Frequency and damping of the lowest mode at the paper's three poses."""
+    """Return frequency and damping of the lowest mode at the paper's three poses."""
     table = {}
     await arm.set_estimator("polynomial")
     for name in ("Q1", "Q2", "Q3"):
@@ -113,7 +115,7 @@ async def table_1(robot: Robot, arm: Arm) -> dict[str, dict[str, float]]:
 
 
 async def run(robot: Robot, arm: Arm, motion: str, method: Method, seed: int) -> Recording:
-    """One motion from rest to rest, and what follows."""
+    """Record one motion from rest to rest, and the time after it."""
     start, end = (pose(name) for name in MOTIONS[motion])
     period = 1.0 / (await robot.info()).rate_hz
     await arm.reset(q=start, seed=seed)
@@ -121,7 +123,7 @@ async def run(robot: Robot, arm: Arm, motion: str, method: Method, seed: int) ->
     jerk = await method.prepare(robot, arm, end)
     reset = await arm.reset(q=start, seed=seed) or 0
     await robot.advance(1)
-    await robot.until(reset + 1)  # an answer may overtake states of before
+    await robot.until(reset + 1)  # an answer may overtake earlier states
     with collect(robot) as collected:
         await robot.advance(round(BEFORE / period))
         await arm.move_j(end, jerk=jerk)
@@ -132,15 +134,15 @@ async def run(robot: Robot, arm: Arm, motion: str, method: Method, seed: int) ->
 async def experiment(
     robot: Robot, arm: Arm, *, runs: int, seed: int, baselines: bool, progress: Progress
 ) -> Experiment:
-    """Every motion by every method.
+    """Run every motion with every method.
 
     Args:
         robot: The robot.
-        arm: Control of it.
-        runs: Repetitions, each with noise and gear errors of its own.
+        arm: Control of the robot.
+        runs: Number of repetitions, each with its own noise and gear errors.
         seed: Seed of the first repetition.
-        baselines: Whether to run those too.
-        progress: Told of each run done.
+        baselines: Whether to run the baselines, too.
+        progress: Called after each run.
     """
     done = Experiment(info=await robot.info(), seed=seed, runs=runs, table_1=await table_1(robot, arm))
     for motion in MOTIONS:
@@ -154,7 +156,7 @@ async def experiment(
 
 
 def fixed_baselines(info: Info, delay: float) -> Sequence[Method]:
-    """What the paper's method has to be compared with."""
+    """Return the baselines that the paper's method has to be compared with."""
     if info.calibration is None:
         return [EqualDuration(delay)]
     f_d, zeta = info.calibration.f_d_range, info.calibration.zeta_range
@@ -166,7 +168,7 @@ def fixed_baselines(info: Info, delay: float) -> Sequence[Method]:
 
 
 def count(runs: int, *, baselines: bool) -> int:
-    """Runs in all."""
+    """Return the total number of runs."""
     return len(MOTIONS) * runs * (7 if baselines else 2)
 
 

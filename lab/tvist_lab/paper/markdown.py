@@ -34,7 +34,7 @@ The method that is still first is in bold."""
 
 
 def page(result: dict[str, Any], command: str) -> str:
-    """Tables 1 and 2 beside the paper's, the baselines, and where each figure comes from."""
+    """Return Tables 1 and 2 beside the paper's, the baselines, and the origin of each figure."""
     made = (
         f"This page was made by `{command}`; do not edit it. Each motion was simulated {result['runs']} times, each "
         f"time with other noise and gear errors, with seed {result['seed']} and calibration `{result['calibration']}`. "

@@ -1,4 +1,4 @@
-"""Ways to make a motion: unshaped, the paper's, and the baselines it has to be compared with."""
+"""Methods for a motion: unshaped, the paper's method, and the baselines it has to be compared with."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -11,25 +11,25 @@ ACCELERATION, JERK = 2.0, 100.0
 
 
 class Method(ABC):
-    """A way to make a motion."""
+    """A method for making a motion."""
 
     name: str
-    """In tables and JSON."""
+    """Name in tables and JSON."""
     label: str
-    """For people."""
+    """Name for people."""
 
     @abstractmethod
     async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> float:
-        """Set the robot up at rest for a motion that ends there; the jerk limit to move with [rad/s^3]."""
+        """Set up a robot at rest for a motion that ends at a pose; return the jerk limit to use [rad/s^3]."""
 
 
 class Unshaped(Method):
-    """The reference as it is."""
+    """The unchanged reference."""
 
     name, label = "unshaped", "unshaped"
 
     async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> float:  # noqa: ARG002
-        """No shaper; what the estimator would say is still recorded."""
+        """Select no shaper; the estimate is still recorded."""
         await arm.set_estimator("polynomial")
         await arm.set_shaper("none")
         return JERK
@@ -44,19 +44,19 @@ class TimeVarying(Method):
     label: str = "TVIST-ZV"
 
     async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> float:  # noqa: ARG002
-        """The polynomial estimator of the robot's own calibration."""
+        """Select the polynomial estimator of the robot's own calibration."""
         await arm.set_estimator("polynomial")
         await arm.set_shaper(self.shaper)
         return JERK
 
 
 class FrozenAtEnd(Method):
-    """ZV for the end pose all along: needs the target in advance."""
+    """ZV with the modes of the end pose during the whole motion; requires the target in advance."""
 
     name, label = "zv_frozen_at_end", "ZV for the end pose"
 
     async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> float:
-        """Ask the robot for its estimate at the end, then hold it."""
+        """Request the robot's estimate at the end pose, and then use it as a constant."""
         start = (await robot.state()).target_q
         await arm.set_estimator("polynomial")
         await arm.reset(q=end)
@@ -74,14 +74,14 @@ class FixedShaper(Method):
 
     shaper: str
     f_d: float
-    """Frequency it is designed for [Hz]."""
+    """Design frequency [Hz]."""
     zeta: float
-    """Damping it is designed for [-]."""
+    """Design damping ratio [-]."""
     name: str
     label: str
 
     async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> float:  # noqa: ARG002
-        """The fixed estimator."""
+        """Select the fixed estimator."""
         await arm.set_estimator("fixed", f_d=[self.f_d], zeta=[self.zeta])
         await arm.set_shaper(self.shaper)
         return JERK
@@ -89,7 +89,7 @@ class FixedShaper(Method):
 
 @dataclass(frozen=True)
 class EqualDuration(Method):
-    """No shaper and no model at all: a longer jerk time, so that the motion takes as long as the shaped one."""
+    """No shaper and no model: reduced jerk, so that the motion takes as long as the shaped one."""
 
     delay: float
     """Delay of the shaped motion [s]."""
@@ -97,6 +97,6 @@ class EqualDuration(Method):
     label: str = "longer double S"
 
     async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> float:  # noqa: ARG002
-        """A double S that reaches its limits lasts way/v + v/a + a/j: what a/j gains the motion lasts longer."""
+        """A double S that reaches its limits lasts way/v + v/a + a/j, so an increase of a/j lengthens it equally."""
         await arm.set_shaper("none")
         return ACCELERATION / (ACCELERATION / JERK + self.delay)

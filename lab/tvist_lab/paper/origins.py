@@ -18,7 +18,7 @@ MEANINGS = {
 
 
 def origins(result: dict[str, Any]) -> list[tuple[str, str, str, str, str]]:
-    """Rows of figure, the paper's value, ours, where ours comes from, and why.
+    """Return rows of the figure, the paper's value, ours, the origin of ours, and the reason.
 
     Args:
         result: Result of `report.as_dict`, with the truth.

@@ -1,4 +1,4 @@
-"""What the paper reports: Thomsen, Søe-Knudsen, Brandt, Zhang, ICINCO 2019, doi 10.5220/0007834504880498."""
+"""Results in the paper: Thomsen, Søe-Knudsen, Brandt, Zhang, ICINCO 2019, doi 10.5220/0007834504880498."""
 
 import json
 from functools import cache
@@ -8,12 +8,12 @@ from typing import Any
 
 @cache
 def published() -> dict[str, Any]:
-    """Tables, configurations and figures' captions, as numbers."""
+    """Return tables, configurations and figures' captions, as numbers."""
     return dict(json.loads((resources.files(__package__) / "published.json").read_text(encoding="utf-8")))
 
 
 def pose(name: str) -> tuple[float, ...]:
-    """Joint angles of Q1, Q2 or Q3 [rad]."""
+    """Return the joint angles of Q1, Q2 or Q3 [rad]."""
     return tuple(published()["configurations"][name]["q"])
 
 

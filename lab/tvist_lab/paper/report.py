@@ -1,4 +1,4 @@
-"""The experiment's results as plain values, beside the paper's."""
+"""The experiment's results as plain values, together with the paper's."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from tvist_lab.paper.published import MOTIONS
 
 
 def as_dict(done: Experiment) -> dict[str, Any]:
-    """What `tvist paper --json` prints."""
+    """Return the content of `tvist paper --json`."""
     runs = done.of_table_2()
     return {
         "seed": done.seed,
@@ -29,7 +29,7 @@ def as_dict(done: Experiment) -> dict[str, Any]:
 
 
 def _methods(done: Experiment, motion: str) -> dict[str, dict[str, float | None]]:
-    """Every method that ran, the unshaped one first: who only waits is measured by it too."""
+    """Return the results of each method, the unshaped one first, which is what a robot that only waits achieves."""
     unshaped = done.judged[motion, "unshaped"]
     return {method: _row(judged, unshaped) for (ran, method), judged in done.judged.items() if ran == motion}
 
@@ -39,7 +39,7 @@ def _row(judged: list[JudgedRun], unshaped: list[JudgedRun]) -> dict[str, float 
     before = _mean([one.result.residual_vibration_m_s2 for one in unshaped])
     peak, peak_before = _mean([one.peak for one in judged]), _mean([one.peak for one in unshaped])
     still = _mean([one.still_after for one in judged])
-    # The unshaped references of a motion start alike, so a later stop of the shaped one is its delay.
+    # The unshaped references of a motion start alike, so the later stop of the shaped one is its delay.
     started = [one.result.stop_s - one.result.start_s for one in judged]
     started_before = [one.result.stop_s - one.result.start_s for one in unshaped]
     return {
@@ -54,7 +54,7 @@ def _row(judged: list[JudgedRun], unshaped: list[JudgedRun]) -> dict[str, float 
 
 
 def _mean(values: list[float | None]) -> float | None:
-    """Mean; None where one is not measurable, since the rest would be a selection."""
+    """Mean; None if one value is not measurable, since the mean of the rest would be biased."""
     known = [value for value in values if value is not None]
     return float(np.mean(known)) if known and len(known) == len(values) else None
 

@@ -1,1 +1,1 @@
-"""Searches for ways to make a robot break what it promises: stops, streams, changes in motion, whole sequences."""
+"""Searches for violations of a robot's guarantees: in stops, streams, changes during motion, and whole sequences."""

@@ -1,4 +1,4 @@
-"""Changes while the arm moves: payload, shaper, estimator, speed, reduced speed, in moves and streams."""
+"""Changes during motion: payload, shaper, estimator, speed and reduced speed, in moves and streams."""
 
 from dataclasses import dataclass
 
@@ -21,24 +21,24 @@ Change = tuple[type, dict[str, object]]
 
 @dataclass(frozen=True)
 class ChangeOutcome:
-    """What came of it."""
+    """Outcome of a change."""
 
     seed: int
     what: str
-    """The command and how it was answered."""
+    """The command and its reply."""
     near: float
-    """How much nearer than the clearance two bodies came after it, by the reference; to be 0 or less [m]."""
+    """How much the reference violated the clearance between two bodies afterwards; must be 0 or less [m]."""
     refused: bool
-    """True when the robot refused the change with `collision`."""
+    """Whether the robot refused the change with `collision`."""
 
     @property
     def kept(self) -> bool:
-        """True when nothing came nearer than the clearance."""
+        """Whether the clearance was kept."""
         return self.near <= 0.0
 
 
 def judge(description: RobotDescription, seed: int) -> ChangeOutcome:
-    """Change something at a random moment of a motion, now and then stop it afterwards, and watch."""
+    """Change something at a random moment of a motion, sometimes stop it afterwards, and check the result."""
     random = np.random.default_rng([seed, 14])
     robot = _under_way(description, seed, random)
     before = len(robot.references)
@@ -61,14 +61,14 @@ def judge(description: RobotDescription, seed: int) -> ChangeOutcome:
     return ChangeOutcome(
         seed=seed,
         what=f"{kind.__name__}: {said}",
-        # At rest any payload may be declared: nothing travels along with it.
+        # At rest any payload may be declared, since it does not move.
         near=-1.0 if resting else CLEARANCE - collisions.nearest(np.array(robot.references[before:])),
         refused=isinstance(reply, Refused) and reply.code == "collision",
     )
 
 
 def far_payload(random: np.random.Generator, rated: float) -> Payload:
-    """A payload within the rating, its centre of mass up to .3 m out."""
+    """Return a payload within the rating, with its centre of mass up to 0.3 m out."""
     mass = float(random.uniform(0.1, rated))
     direction = random.normal(size=3)
     com: Floats = direction / np.linalg.norm(direction) * random.uniform(0.0, 0.3)
@@ -90,7 +90,7 @@ def _draw(description: RobotDescription, random: np.random.Generator) -> Change:
 
 
 def _under_way(description: RobotDescription, seed: int, random: np.random.Generator) -> Subject:
-    """A robot in a move, in a stream, or in what follows one of them."""
+    """Return a robot during a move, during a stream, or shortly after one of them."""
     if random.random() < 0.6:
         case = stops.draw(description, seed)
         robot = stops.moving(description, case)

@@ -1,4 +1,4 @@
-"""What a search found, as a page."""
+"""Results of a search as a page of the documentation."""
 
 from typing import Any
 
@@ -7,11 +7,11 @@ from tvist_plant.description import load
 
 
 def page(result: dict[str, Any], command: str) -> str:
-    """Markdown of a search's result.
+    """Format a search's result as Markdown.
 
     Args:
         result: Result of `tvist_lab.safety.report.search`.
-        command: That made it, for whoever wants to make it again.
+        command: Command line that produces it.
     """
     lines = [
         "# Stops",
@@ -97,7 +97,7 @@ def _streams(part: dict[str, Any]) -> list[str]:
 
 
 def _depth(below: float) -> str:
-    """How near two bodies came, from how much nearer than the clearance [m]."""
+    """Format the smallest distance between two bodies, from the violation of the clearance [m]."""
     distance = 1e3 * (CLEARANCE - below)
     if distance > 1e3 * FAR - 0.1:
         return f"{1e3 * FAR:.0f} mm or more from the nearest other body"

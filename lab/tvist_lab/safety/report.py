@@ -1,4 +1,4 @@
-"""All searches on all cores, and what they found."""
+"""All searches, on all cores, and their results."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from tvist_plant.description import RobotDescription, load
 T = TypeVar("T")
 
 APART = 1_000_000
-"""Numbers of cases of two seeds are so far apart."""
+"""Difference between the case numbers of two consecutive seeds."""
 
 
 @dataclass(frozen=True)
 class Counts:
-    """How many of each to try."""
+    """Number of cases of each search."""
 
     stops: int = 0
     streams: int = 0
@@ -28,7 +28,7 @@ class Counts:
 
     @property
     def all(self) -> int:
-        """In all."""
+        """Total number of cases."""
         return self.stops + self.streams + self.changes + self.sequences
 
 
@@ -40,18 +40,18 @@ def search(
     flexible: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
-    """Try it all.
+    """Run all searches.
 
     Args:
-        counts: How many of each.
-        seed: Seed of the cases; another seed gives other cases.
-        robot: Robot file, or the name of one that comes with the package.
-        flexible: Whether the flexible arm is simulated in stops and streams, too, to see how far it goes into what the
-            reference stays clear of.
-        progress: Told what has been tried, after each case.
+        counts: Number of cases of each search.
+        seed: Seed of the cases.
+        robot: Robot file, or name of a robot that comes with the package.
+        flexible: Whether to simulate the flexible arm in stops and streams as well, to see how far it enters the
+            clearance that the reference keeps.
+        progress: Called after each case with the search it belongs to.
 
     Returns:
-        For each search that was asked for: count, `broken` with a sentence for each promise that was, and figures.
+        For each requested search: count, `broken` with a sentence for each violated guarantee, and figures.
     """
     description = load(robot)
     result: dict[str, Any] = {"seed": seed, "robot": robot, "flexible": flexible}
@@ -79,7 +79,7 @@ def search(
 
 
 def broken(result: dict[str, Any]) -> list[str]:
-    """Every promise that a search has found broken, in a sentence each."""
+    """Return a sentence for each guarantee that a search found violated."""
     return [one for part in result.values() if isinstance(part, dict) for one in part["broken"]]
 
 
@@ -134,12 +134,12 @@ def _streams(outcomes: Sequence[streams.StreamOutcome]) -> dict[str, Any]:
 def _judged(
     outcomes: Sequence[stops.Outcome | streams.StreamOutcome | changes.ChangeOutcome],
 ) -> dict[str, Any]:
-    """How many there were, and each that broke a promise."""
+    """Return the number of cases, and those that violated a guarantee."""
     return {"count": len(outcomes), "broken": [repr(one) for one in outcomes if not one.kept]}
 
 
 def _nearest(outcomes: Sequence[stops.Outcome | streams.StreamOutcome]) -> dict[str, Any]:
-    """How near two bodies came at worst, by the reference and by the flexible arm where it was simulated."""
+    """Return the smallest distance between two bodies, for the reference and, if simulated, the flexible arm."""
     arm = [one.penetration for one in outcomes if not np.isnan(one.penetration)]
     return {
         "worst_below_clearance_m": max(one.near for one in outcomes),

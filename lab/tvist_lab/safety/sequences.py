@@ -1,4 +1,4 @@
-"""Whole random sequences of commands, whatever they are, and what must hold throughout."""
+"""Random sequences of arbitrary commands, and guarantees that must hold throughout."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -21,44 +21,44 @@ from tvist_protocol.simulation import SimulationInject, SimulationReset
 from tvist_protocol.transitions import Activity
 
 COMMANDS = 40
-"""In a sequence."""
+"""Number of commands in a sequence."""
 PAUSES = (0, 1, 2, 5, 20, 60, 150, 400)
-"""Ticks between two of them."""
+"""Possible numbers of ticks between two commands."""
 ROUNDING = 1e-9
-"""Difference of two positions that counts as none [rad]."""
+"""Differences between positions below this are rounding errors [rad]."""
 VELOCITY, ACCELERATION = 1.003, 1.01
-"""Shares of the joints' limits up to which a shaped reference may go [-]."""
+"""Largest shaped velocity and acceleration, relative to the joints' limits [-]."""
 FAULTS = (
     "protective_stop", "safeguard_stop", "emergency_stop", "system_emergency_stop", "power_loss", "violation",
     "fault", "reduced", *("normal",) * 3, "nan",
 )  # fmt: skip
 STOPS_ON_WAY = frozenset({"protective_stop", "safeguard_stop", "emergency_stop", "system_emergency_stop"})
-"""Faults that stop a motion on its way."""
+"""Faults that stop a motion on its path."""
 HALTS = frozenset({"stop", "pause", "power_off", "inject", "lose", "release"})
-"""After these the reference may not get ahead of what it would have been."""
+"""Commands after which the reference must not get ahead of the uninterrupted motion."""
 
 
 class BrokenError(AssertionError):
-    """A promise was broken; the text says by which command of which sequence."""
+    """A guarantee was violated; the text names the command and the sequence."""
 
 
 @dataclass
 class Undisturbed:
-    """What the reference would do if nothing were commanded."""
+    """Future references if no command comes."""
 
     references: Floats
-    """One a tick from the moment on, shape (k, n) [rad]."""
+    """References from that moment on, one per tick, shape (k, n) [rad]."""
     since: int
     """Tick of that moment."""
 
 
 class Sequence:
-    """One sequence, and the watch over it.
+    """One sequence with its checks.
 
     Args:
         description: The robot.
-        seed: Its number.
-        flexible: Whether the flexible arm is simulated.
+        seed: Number of the sequence.
+        flexible: Whether to simulate the flexible arm.
     """
 
     def __init__(self, description: RobotDescription, seed: int, *, flexible: bool = False) -> None:
@@ -72,7 +72,7 @@ class Sequence:
             shaper=str(self._random.choice(SHAPERS)), flexible=flexible,
         )  # fmt: skip
         self.done: list[str] = []
-        """What was sent, and how it was answered."""
+        """Commands that were sent, with their replies."""
         self._ahead: Undisturbed | None = None
         self._excused = False
         self._sequence = 0
@@ -81,10 +81,10 @@ class Sequence:
         self._injected = ""
 
     def run(self, count: int = COMMANDS) -> None:
-        """Send the commands, and see that the arm can be moved again afterwards.
+        """Send the commands, and check that the arm can be moved again afterwards.
 
         Raises:
-            BrokenError: A promise was broken.
+            BrokenError: A guarantee was violated.
         """
         names = list(_SENT)
         weights = np.array([weight for weight, _ in _SENT.values()], dtype=float)
@@ -107,7 +107,7 @@ class Sequence:
                 return q
 
     def _foresee(self) -> Undisturbed | None:
-        """What comes if nothing is commanded, where it goes along a line."""
+        """Return the future references if no command comes, provided that the motion follows a line."""
         motion, cycle = self.robot.controller.motion, self.robot.controller.cycle
         if cycle.at_rest or cycle.trajectory.path is None:
             return None
@@ -126,7 +126,7 @@ class Sequence:
             self._watch()
 
     def _stream(self) -> None:
-        """A set-point on the way to somewhere."""
+        """Send a set-point on the way to a random target."""
         way = self._towards - self._at
         step = 0.004 * np.clip(way, -1.0, 1.0)
         if self._random.random() < 0.005:
@@ -141,7 +141,7 @@ class Sequence:
         activity = robot.controller.motion.activity
         self._braked = activity is Activity.BRAKING or (self._braked and not robot.controller.cycle.at_rest)
         if self._braked:
-            self._ahead, self._excused = None, True  # brakes know no path
+            self._ahead, self._excused = None, True  # brakes do not follow a path
         if not np.isfinite(q).all():
             raise self._broken("a reference is not finite")
         if len(q) == 3 and not self._braked:
@@ -166,7 +166,7 @@ class Sequence:
             raise self._broken(f"by the reference {meeting}, nearer than {CLEARANCE} m")
 
     def _watch_way(self, ahead: Undisturbed, q: Floats) -> None:
-        """On the line, not ahead, and at rest no later."""
+        """Check that the reference is on the line, not ahead, and at rest no later."""
         references = ahead.references
         tick = self.robot.controller.tick_number - ahead.since
         way = references[-1] - references[0]
@@ -175,7 +175,7 @@ class Sequence:
             return
         along = way / length
         reached, there = (q - references[0]) @ along, references[min(tick, len(references) - 1)]
-        # At rest counts from 1e-7 rad a tick: what is left of the filter still creeps.
+        # Changes below 1e-7 rad per tick count as rest, so the filter's tail still creeps.
         creeps = 10.0 * STILL if tick >= len(references) else 0.0
         if reached > (there - references[0]) @ along + ROUNDING + creeps:
             raise self._broken("a stop is ahead of what the motion would have done")
@@ -185,7 +185,7 @@ class Sequence:
             raise self._broken("a stop lasts longer than the motion would have")
 
     def _come_back(self) -> None:
-        """From everywhere there is a way back to motion."""
+        """Check that the robot can be moved again from its present state."""
         robot = self.robot
         self._ahead = None
         robot.send(SimulationInject, fault="normal")
@@ -228,14 +228,14 @@ class Sequence:
     def _limits(self) -> dict[str, float]:
         random = self._random
         return {
-            # Below the joints' own: a filter that varies exceeds its reference's by itself, by up to a tenth.
+            # Below the joints' own limits, since a varying filter by itself exceeds its reference's by up to a tenth.
             "velocity": float(random.uniform(0.2, 2.8)),
             "acceleration": float(random.choice([random.uniform(0.5, 8.0), random.uniform(8.0, 35.0)])),
             "jerk": float(random.choice([50.0, 100.0, 500.0, 2000.0])),
         }
 
     def move(self) -> object:
-        """A move to somewhere."""
+        """Move to a random posture."""
         target = self._posture()
         if self._random.random() < 0.3:
             here = self.robot.references[-1]
@@ -243,42 +243,42 @@ class Sequence:
         return self.robot.send(c.MoveJ, q=tuple(target.tolist()), **self._limits())
 
     def stream(self) -> object:
-        """The start of a stream."""
+        """Start a stream."""
         self._sequence, self._at = 0, self.robot.controller.cycle.reference
         self._towards = self._random.uniform(-3, 3, self.description.joints)
         return self.robot.send(c.ServoStart, **self._limits())
 
     def halt(self) -> object:
-        """A stop by anybody."""
+        """Stop, with or without a token."""
         token = self.robot.token if self._random.random() < 0.5 else None
         wanted = None if self._random.random() < 0.4 else float(10 ** self._random.uniform(-2, 1.6))
         return self.robot.send(c.Stop, token=token, deceleration=wanted)
 
     def payload(self) -> object:
-        """Another payload."""
+        """Declare another payload."""
         payload = far_payload(self._random, self.description.limits.payload)
         resting = self.robot.controller.cycle.at_rest
         reply = self.robot.send(c.SetPayload, mass=payload.mass, com=payload.com, inertia=payload.inertia)
-        if resting:  # at rest any payload may be declared, also one that meets something there
+        if resting:  # at rest any payload may be declared, even one that leads to a meeting
             collisions = self.robot.controller.motion.collisions
             self._excused = collisions.meeting(self.robot.references[-1]) is not None
         return reply
 
     def speed(self) -> object:
-        """Another speed."""
+        """Change the speed."""
         return self.robot.send(c.SetSpeed, fraction=float(self._random.uniform(0.05, 1.0)))
 
     def shaper(self) -> object:
-        """Another shaper."""
+        """Change the shaper."""
         return self.robot.send(c.SetShaper, name=str(self._random.choice(SHAPERS)))
 
     def estimator(self) -> object:
-        """Other modes."""
+        """Change the estimator."""
         f_d, zeta = self._random.uniform(4, 20), self._random.uniform(0.0, 0.3)
         return self.robot.send(c.SetEstimator, name="fixed", f_d=(float(f_d),), zeta=(float(zeta),))
 
     def reset(self) -> object:
-        """The arm put elsewhere, where nothing meets."""
+        """Place the arm somewhere clear."""
         collisions = self.robot.controller.motion.collisions
         for _ in range(100):
             q = self._posture()
@@ -293,13 +293,13 @@ class Sequence:
         return reply
 
     def inject(self) -> object:
-        """A fault."""
+        """Inject a fault."""
         fault = str(self._random.choice(FAULTS))
         self.done.append(f"  fault {fault}")
         self._injected = fault
         lasts = self._random.random() < 0.3 and "seconds" in FAULT_FIELDS[fault].may
         fields = {}
-        if lasts:  # then what it stopped goes on by itself
+        if lasts:  # then the motion that it stopped resumes by itself
             fields, self._injected = {"seconds": float(self._random.uniform(0.0, 1.0))}, "for a while"
         reply = self.robot.send(SimulationInject, fault=fault, **fields)
         system, activity = self.robot.controller.motion.safety, self.robot.controller.motion.activity
@@ -308,13 +308,13 @@ class Sequence:
         return reply
 
     def lose(self) -> object:
-        """The client's liveliness token goes, and it takes control anew."""
+        """Lose the client's liveliness token, and take control again."""
         self.robot.controller.client_gone(CLIENT, SESSION)
         self.robot.token = self.robot.take_control()
         return "gone"
 
     def release(self) -> object:
-        """Control is released, and taken anew."""
+        """Release control, and take it again."""
         reply = self.robot.send(c.ReleaseControl)
         self.robot.token = self.robot.take_control()
         return reply
@@ -341,4 +341,4 @@ _SENT: dict[str, tuple[float, Callable[[Sequence], object]]] = {
     "reset": (1.0, Sequence.reset),
     "wait": (3.0, lambda it: it.robot.send(c.KeepAlive)),
 }
-"""What may be sent, and how often."""
+"""Commands and their relative frequencies."""

@@ -1,4 +1,4 @@
-"""Stops of every kind at random moments of accepted moves, against the same moves left alone."""
+"""Stops of every kind at random moments of accepted moves, compared with the same moves without a stop."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,15 +23,15 @@ from tvist_protocol import commands as c
 from tvist_protocol.simulation import SimulationInject
 
 EARLY = 17
-"""Tick before which some moves are stopped: those that have barely begun."""
+"""Tick before which some moves are stopped, to test moves that have barely begun."""
 BARELY, BARELY_WAY = 3e-3, 1e-3
-"""What moves no faster [rad/s] goes no farther [rad] when it is stopped."""
+"""A joint that moves no faster than this [rad/s] moves no farther than this when it is stopped [rad]."""
 PAUSES = {"pause", "safeguard"}
-"""Kinds that slow the motion's own time down, through the filter."""
+"""Kinds of stops that slow down the motion's own time, through the filter."""
 ROUNDING = 1e-9
-"""Difference of two positions that counts as none [rad]."""
+"""Differences between positions below this are rounding errors [rad]."""
 TORQUE_ROUNDING = 1e-3
-"""Share by which a torque may be beyond its bound, between the moments that a plan looks at [-]."""
+"""Share by which a torque may exceed its bound between the moments that are checked in planning [-]."""
 SHAPERS = ("none", "zv", "mzv", "zvd", "zvddd", "ei3", "um_zv", "um_zvd", "auto", "auto-target", "short")
 
 Halt = Callable[[Subject, np.random.Generator], object]
@@ -52,7 +52,7 @@ KINDS: dict[str, Halt] = {
 
 @dataclass(frozen=True)
 class Case:
-    """One stop."""
+    """One stop of one move."""
 
     seed: int
     kind: str
@@ -70,35 +70,37 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of it; everything but the penetration is to be 0 or less."""
+    """Outcome of a stop; all deviations except the penetration must be 0 or less."""
 
     case: Case
     ahead: float
-    """Farthest that the stop was along the way beyond the move left alone [rad]."""
+    """Largest lead of the stop over the uninterrupted move [rad]."""
     off: float
-    """Farthest off the line [rad]."""
+    """Largest distance from the line [rad]."""
     late: int
-    """Ticks that it rested later."""
+    """Ticks by which it came to rest later."""
     torque: float
-    """Share by which the rigid torque was beyond the larger of its 90 % and what the move would have asked [-]."""
+    """Share by which the rigid torque exceeded the larger of 90 % of the limit and the uninterrupted move's torque
+    [-].
+    """
     near: float
-    """How much nearer than the clearance two bodies came, by the reference [m]."""
+    """How much the reference violated the clearance between two bodies [m]."""
     penetration: float
-    """Penetration by the flexible arm [m]; nan if it was not simulated."""
+    """Penetration of the flexible arm [m]; nan if it was not simulated."""
     duration: float
-    """From the stop until it rested [s]."""
+    """Time from the stop until rest [s]."""
     left: float
-    """Time that the move left alone still took at the moment of the stop [s]."""
+    """Time that the uninterrupted move still took from the stop on [s]."""
     told: tuple[float | None, float | None]
-    """Duration [s] and way [rad] that the event told."""
+    """Duration [s] and way [rad] in the stop's event."""
     way: float
     """Angle that the leading joint turned after the stop [rad]."""
     speed: float
-    """Velocity of that joint at the stop [rad/s]."""
+    """Velocity of the leading joint at the stop [rad/s]."""
 
     @property
     def kept(self) -> bool:
-        """True when every figure is within its bound."""
+        """Whether every figure is within its bound."""
         return (
             self.ahead <= ROUNDING
             and self.off <= ROUNDING
@@ -110,7 +112,7 @@ class Outcome:
 
 
 def draw(description: RobotDescription, seed: int, kinds: tuple[str, ...] = tuple(KINDS)) -> Case:
-    """A case by its number; its move is accepted."""
+    """Return a case by its number; its move is one that the robot accepts."""
     random = np.random.default_rng([seed, 11])
     collisions = CollisionModel(description, body(paper_payload(description, 0.0)))
     n = description.joints
@@ -118,7 +120,7 @@ def draw(description: RobotDescription, seed: int, kinds: tuple[str, ...] = tupl
         mass = float(random.choice([0.0, 5.0, random.uniform(0.0, 5.0)]))
         collisions.carry(body(paper_payload(description, mass)))
         start, target = two_postures(random, n)
-        if random.random() < 0.3:  # short moves have no cruise
+        if random.random() < 0.3:  # short moves without a cruise phase
             target = start + random.uniform(0.02, 0.3) * (target - start)
         if collisions.meeting(start) is None and collisions.on_way(JointLine(start, target).whole) is None:
             break
@@ -141,7 +143,7 @@ def draw(description: RobotDescription, seed: int, kinds: tuple[str, ...] = tupl
 
 
 def two_postures(random: np.random.Generator, joints: int) -> Floats:
-    """Two random postures of the workspace with turned wrists, shape (2, joints) [rad]."""
+    """Return two random postures of the workspace with turned wrists, shape (2, joints) [rad]."""
     pair = WORKSPACE.random(2, joints, int(random.integers(2**31)))
     for posture in pair:
         posture[4:] = random.uniform(-2, 2, joints - 4)
@@ -149,7 +151,7 @@ def two_postures(random: np.random.Generator, joints: int) -> Floats:
 
 
 def judge(description: RobotDescription, case: Case, *, flexible: bool = False) -> Outcome:
-    """Stop the move, and compare with the one left alone."""
+    """Stop the move, and compare it with the uninterrupted one."""
     payload = paper_payload(description, case.mass)
     alone = _left_alone(description, case)
     robot = moving(description, case, flexible=flexible)
@@ -164,7 +166,7 @@ def judge(description: RobotDescription, case: Case, *, flexible: bool = False) 
     along = way / np.linalg.norm(way)
     shares = [(path - case.start) @ along for path in (stopped, alone)]
     off = np.abs(stopped - case.start - shares[0][:, None] * along).max()
-    after = slice(case.moment, None)  # from the newest reference at the stop
+    after = slice(case.moment, None)  # from the newest reference at the stop on
     limits = TORQUE_SHARE * np.array(description.limits.torque)
     asked = np.abs(torques(description, payload, alone[case.moment - 1 :])).max(axis=0)
     taken = np.abs(torques(description, payload, stopped[case.moment - 1 :])).max(axis=0)
@@ -191,7 +193,7 @@ def judge(description: RobotDescription, case: Case, *, flexible: bool = False) 
 
 
 def moving(description: RobotDescription, case: Case, *, flexible: bool = False) -> Subject:
-    """A robot that has just accepted the case's move."""
+    """Return a robot that has just accepted the case's move."""
     robot = Subject(
         description, case.start, paper_payload(description, case.mass), shaper=case.shaper, flexible=flexible
     )
@@ -207,5 +209,5 @@ def moving(description: RobotDescription, case: Case, *, flexible: bool = False)
 def _left_alone(description: RobotDescription, case: Case) -> Floats:
     robot = moving(description, case, flexible=False)
     robot.until_rest()
-    robot.tick(200)  # at rest counts from 1e-7 rad a tick: what is left of the filter still creeps
+    robot.tick(200)  # changes below 1e-7 rad per tick count as rest, so the filter's tail still creeps
     return np.array(robot.references)

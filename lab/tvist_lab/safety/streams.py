@@ -1,4 +1,4 @@
-"""Streams of set-points at the floor, at the arm itself and at limits, cut or ended at random."""
+"""Streams of set-points to the floor, to the arm itself and to limits, ended at random."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.simulation import SimulationInject
 
 LENGTH = 3.0
-"""How long a stream lasts unless something ends it [s]."""
+"""Duration of a stream unless something ends it [s]."""
 
 ENDS: dict[str, Callable[[Subject], object]] = {
     "silence": lambda _: None,
@@ -28,7 +28,7 @@ ENDS: dict[str, Callable[[Subject], object]] = {
     "emergency stop": lambda robot: robot.send(SimulationInject, fault="emergency_stop"),
     "safeguard stop": lambda robot: robot.send(SimulationInject, fault="safeguard_stop"),
 }
-"""How a stream is ended."""
+"""Ways to end a stream."""
 
 
 @dataclass(frozen=True)
@@ -45,35 +45,35 @@ class StreamCase:
     acceleration: float
     end: str
     ends_at: float
-    """When it is ended [s]."""
+    """Time at which it is ended [s]."""
     lost: float
-    """Share of the set-points that are never sent [-]."""
+    """Share of the set-points that are not sent [-]."""
     wave: float
-    """Amplitude of a sine on top [rad]."""
+    """Amplitude of a superimposed sine [rad]."""
 
 
 @dataclass(frozen=True)
 class StreamOutcome:
-    """What came of it."""
+    """Outcome of a stream."""
 
     case: StreamCase
     near: float
-    """How much nearer than the clearance two bodies came, by the reference; to be 0 or less [m]."""
+    """How much the reference violated the clearance between two bodies; must be 0 or less [m]."""
     penetration: float
-    """Penetration by the flexible arm [m]; nan if it was not simulated."""
+    """Penetration of the flexible arm [m]; nan if it was not simulated."""
     stopped: bool
-    """True when the robot ended the stream because two bodies would have met."""
+    """Whether the robot ended the stream because two bodies would have met."""
     beyond: float
-    """Farthest beyond a joint's range; to be 0 or less [rad]."""
+    """Largest excess over a joint's range; must be 0 or less [rad]."""
 
     @property
     def kept(self) -> bool:
-        """True when every figure is within its bound."""
+        """Whether every figure is within its bound."""
         return self.near <= 0.0 and self.beyond <= 0.0
 
 
 def draw(description: RobotDescription, seed: int) -> StreamCase:
-    """A case by its number: most of them lead to where something meets."""
+    """Return a case by its number; most cases lead to a meeting."""
     random = np.random.default_rng([seed, 12])
     collisions = CollisionModel(description, body(paper_payload(description, 0.0)))
     n = description.joints
@@ -81,7 +81,7 @@ def draw(description: RobotDescription, seed: int) -> StreamCase:
     collisions.carry(body(paper_payload(description, mass)))
     while True:
         start, towards = two_postures(random, n)
-        if random.random() < 0.5:  # at the floor, past it
+        if random.random() < 0.5:  # through the floor
             towards[1] = start[1] + random.choice([-1.0, 1.0]) * random.uniform(1.0, 3.0)
         if collisions.meeting(start) is not None:
             continue
@@ -104,13 +104,13 @@ def draw(description: RobotDescription, seed: int) -> StreamCase:
 
 
 def eased(share: float) -> float:
-    """Share of a way, from rest to rest, after a share of its time [-]."""
+    """Share of a way from rest to rest that is covered after a share of its time [-]."""
     share = min(share, 1.0)
     return share * share * (3.0 - 2.0 * share)
 
 
 def judge(description: RobotDescription, case: StreamCase, *, flexible: bool = False) -> StreamOutcome:
-    """Send it and watch."""
+    """Send the stream, and check the result."""
     random = np.random.default_rng([case.seed, 13])
     robot = Subject(
         description, case.start, paper_payload(description, case.mass), shaper=case.shaper, flexible=flexible,

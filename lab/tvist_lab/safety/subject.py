@@ -1,4 +1,4 @@
-"""The robot that is searched: a controller in this process, driven a tick at a time, and what it did."""
+"""The robot under test: a controller in this process, driven tick by tick, with a record of its motion."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -25,14 +25,14 @@ from tvist_protocol.stream import Event
 from tvist_protocol.values import Payload as Declared
 
 CLIENT, SESSION = "searcher", "5e55"
-"""Name and session of who has control."""
+"""Name and session of the client in control."""
 
 
 class RigidArm:
-    """A plant for searches where only references matter: it is where it is told to be, and feels nothing.
+    """A plant for tests of references only: it is always exactly at its target, and measures no forces.
 
     Args:
-        payload: What it carries.
+        payload: Carried payload.
     """
 
     def __init__(self, payload: Payload) -> None:
@@ -40,32 +40,32 @@ class RigidArm:
 
     @property
     def payload(self) -> Payload:
-        """What it carries."""
+        """Carried payload."""
         return self._payload
 
     def step(self, command: DriveCommand) -> Measurement:
-        """Be there."""
+        """Move to the target at once."""
         return Measurement(command.q, command.qd, np.zeros_like(command.q), np.zeros(3))
 
     def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:  # noqa: ARG002
-        """Be there."""
+        """Move to the target at once."""
         self._payload = self._payload if payload is None else payload
         return self.step(command)
 
     def truth(self) -> None:
-        """Nothing gives way, and nobody asks."""
+        """Return None: there is no truth beyond the references."""
 
 
 @dataclass
 class Subject:
-    """A robot under search.
+    """A robot under test.
 
     Args:
         description: The robot.
-        q: Joint angles at which it rests [rad].
-        payload: Declared and carried.
-        shaper: Its shaper.
-        flexible: Whether the flexible arm is simulated, or only the references.
+        q: Joint angles at which it is at rest initially [rad].
+        payload: Payload, both declared and carried.
+        shaper: Name of its shaper.
+        flexible: Whether to simulate the flexible arm, or only the references.
         clock: Clock of the robot: leases expire only in real time.
         lease_s: Length of the lease [s].
     """
@@ -79,13 +79,13 @@ class Subject:
     lease_s: float = 3600.0
     events: list[Event] = field(default_factory=list)
     references: list[Floats] = field(default_factory=list)
-    """Shaped references played, one array a tick; the first is the start [rad]."""
+    """Shaped references played, one array per tick; the first is the start [rad]."""
     actual: list[Floats] = field(default_factory=list)
-    """Measured joint angles, one array a tick [rad]."""
+    """Measured joint angles, one array per tick [rad]."""
 
     def __post_init__(self) -> None:
-        """Build it and take control."""
-        undamped = self.shaper.startswith("um_")  # for less damping than the calibration has somewhere
+        """Create the robot and take control."""
+        undamped = self.shaper.startswith("um_")  # for less damping than some postures have
         setup = Setup(
             description=self.description,
             q=tuple(self.q.tolist()),
@@ -102,13 +102,13 @@ class Subject:
             self.send(c.SetShaper, name=self.shaper)
 
     def take_control(self) -> str:
-        """Take the lease; its token."""
+        """Take control and return the token."""
         reply = self.controller.receive(c.TakeControl(client=CLIENT, lease_s=self.lease_s), session=SESSION)
         assert isinstance(reply, Accepted), reply
         return str(reply.token)
 
     def send(self, kind: type[Any], **fields: Any) -> Reply:
-        """Send a command with the token, unless it is given."""
+        """Send a command with the token of the lease, unless another one is given."""
         if "token" in kind.__struct_fields__:
             fields.setdefault("token", self.token)
         return self.controller.receive(kind(**fields))
@@ -118,7 +118,7 @@ class Subject:
         self.controller.receive_setpoint(c.Setpoint(token=self.token, sequence=sequence, q=tuple(q.tolist())))
 
     def tick(self, count: int = 1) -> None:
-        """Let time pass."""
+        """Advance time by a number of ticks."""
         for _ in range(count):
             state, events = self.controller.tick()
             self.references.append(self.controller.cycle.position)
@@ -126,7 +126,7 @@ class Subject:
             self.events += events
 
     def until_rest(self, most: int = 20_000) -> bool:
-        """Let time pass until the shaped reference has rested for a tick; whether it came to that."""
+        """Advance time until the shaped reference has rested for a tick; return whether it did."""
         for _ in range(most):
             if self.resting:
                 return True
@@ -135,7 +135,7 @@ class Subject:
 
     @property
     def resting(self) -> bool:
-        """True when the shaped reference stands still, at rest or paused."""
+        """Whether the shaped reference stands still, at rest or paused."""
         q = self.references
         cycle = self.controller.cycle
         still = len(q) > 2 and max(np.abs(q[-1] - q[-2]).max(), np.abs(q[-2] - q[-3]).max()) <= STILL
@@ -143,12 +143,12 @@ class Subject:
 
 
 def torques(description: RobotDescription, payload: Declared, references: Floats) -> Floats:
-    """Torques of the rigid arm for references, one a tick, by central differences, shape (k - 2, n) [N m]."""
+    """Torques of the rigid arm along references, one per tick, by central differences, shape (k - 2, n) [N m]."""
     dynamics = InverseDynamics(description, body(payload))
     states = zip(*central_differences(references, PERIOD), strict=True)
     return np.array([dynamics.torque(*state) for state in states])
 
 
 def refused(reply: Reply) -> bool:
-    """Tell whether a reply is a refusal."""
+    """Return whether a reply is a refusal."""
     return isinstance(reply, Refused)

@@ -1,4 +1,4 @@
-"""Estimators of the modes: different models of f_d(q) and ζ(q)."""
+"""Estimators of the modes, with different models of f_d(q) and ζ(q)."""
 
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.basis import terms

@@ -1,4 +1,4 @@
-"""What an estimator is: where the filter learns the modes of the arm from."""
+"""Base of all estimators, which provide a filter with the modes of the arm."""
 
 import copy
 from abc import ABC, abstractmethod
@@ -11,8 +11,8 @@ class Estimator(ABC):
     """Damped frequency and damping ratio of each mode as functions of q, sec. 3.3 of the paper.
 
     Attributes:
-        clipped: Whether a mode of the last estimate was beyond `f_d_min` or `zeta_max`, and held there: then the arm
-            has another one. An estimator whose bounds are those of its modes never is.
+        clipped: Whether a mode of the last estimate was outside `f_d_min` or `zeta_max` and was clamped to it, so
+            that the arm's mode differs. It is always False for an estimator whose bounds are those of its modes.
     """
 
     clipped: bool = False
@@ -27,7 +27,7 @@ class Estimator(ABC):
     def f_d_min(self) -> float:
         """Lower bound of every mode's damped frequency over every q [Hz], > 0.
 
-        It says how long a delay can get.
+        It determines the longest possible delay.
         """
 
     @property
@@ -43,32 +43,32 @@ class Estimator(ABC):
             q: Joint angles [rad], shape (joints,), finite.
 
         Returns:
-            f_d [Hz] and ζ [-], each of shape (modes,). The estimator will not change them afterwards.
+            f_d [Hz] and ζ [-], each of shape (modes,). The estimator does not modify these arrays later.
         """
 
     def settle(self, q: Floats) -> tuple[Floats, Floats]:
-        """Estimate the modes anew, where no other estimate can move anything: the arm rests, or a filter begins.
+        """Estimate the modes anew, where a jump of the estimate has no effect: at rest, or when a filter begins.
 
-        An estimator that follows its modes from one configuration to the next may take other modes here, and only
-        here: a jump would shake an arm that moves. Others estimate as ever.
+        An estimator that follows its modes from one configuration to the next may switch to other modes only here,
+        since a jump would shake a moving arm. Other estimators return their usual estimate.
 
         Args:
             q: Joint angles, see `estimate`.
 
         Returns:
-            As of `estimate`.
+            Modes, see `estimate`.
         """
         return self.estimate(q)
 
     def fork(self) -> Self:
-        """An independent copy that goes on from here: the same estimates for the same configurations.
+        """Return an independent copy of the present state: equal configurations give equal estimates.
 
         Returns:
-            The copy. It shares what nobody changes; use it in the thread of the original.
+            The copy. It shares constant data with the original; use both in the same thread.
         """
         other = copy.copy(self)
         other._part()  # noqa: SLF001  one of its own kind
         return other
 
-    def _part(self) -> None:  # noqa: B027  most estimators share nothing that changes
-        """Replace what is changed in place, arrays and other objects, by copies: a new copy shares it still."""
+    def _part(self) -> None:  # noqa: B027  most estimators share only constant data
+        """Replace everything that is modified in place by copies, since a new copy still shares it."""

@@ -1,10 +1,11 @@
-"""The functions of the joint angles a polynomial estimator is a sum of.
+"""Basis functions of the joint angles for polynomial estimators.
 
 `angles`: monomials Π u_k^{p_k} of total degree Σ p_k <= degree.
-`trigonometric`: 1, and cos(m·u), sin(m·u) for whole m ≠ 0 with Σ |m_k| <= degree; of m and -m only the one
-whose first entry other than 0 is positive. Periodic in every joint, as the arm is.
+`trigonometric`: 1, and cos(m·u), sin(m·u) for integer m ≠ 0 with Σ |m_k| <= degree; of each pair m and -m, only the
+one whose first non-zero entry is positive. It is periodic in every joint, as the arm is.
 
-Both in u = (q - centre)/scale of the joints used. The order is by degree and fixed: coefficients go by it.
+Both use u = (q - centre)/scale of the selected joints. The order is by degree and fixed, since coefficients refer to
+it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,18 +22,18 @@ Kind = Literal["trigonometric", "angles"]
 
 MAX_JOINTS = 7
 MAX_TERMS = 1000
-"""More would cost more than a tick's share, and no ring-down campaign could determine them."""
+"""Largest number of terms; more would take too much of a tick, and could not be identified from ring-downs."""
 
 
 class BasisFunctions:
     """A set of basis functions.
 
     Attributes:
-        joints: Indices of the joints used, from 0.
+        joints: Indices of the selected joints, from 0.
         kind: `trigonometric` or `angles`.
         degree: Highest total degree.
-        centre: Subtracted from the angles [rad], shape (len(joints),), read-only.
-        scale: Divides them [rad], shape (len(joints),), read-only.
+        centre: Angles that are subtracted [rad], shape (len(joints),), read-only.
+        scale: Divisor of the differences [rad], shape (len(joints),), read-only.
     """
 
     joints: tuple[int, ...]
@@ -49,17 +50,17 @@ class BasisFunctions:
         centre: npt.ArrayLike | None = None,
         scale: npt.ArrayLike | None = None,
     ) -> None:
-        """Set the basis.
+        """Create the basis.
 
         Args:
             joints: Different indices from 0, at most 7.
             kind: `trigonometric` or `angles`.
-            degree: A whole number, >= 0.
+            degree: Highest total degree, an integer >= 0.
             centre: Centre of the angles, see above; None for zeros.
-            scale: Scale of the angles, see above, > 0; None for ones, which `trigonometric` needs to be periodic in 2π.
+            scale: Scale of the angles, see above, > 0; None for ones, which makes `trigonometric` periodic in 2π.
 
         Raises:
-            EstimatorError: A parameter is wrong, or the terms are more than MAX_TERMS.
+            EstimatorError: A parameter is invalid, or there are more than MAX_TERMS terms.
         """
         n = len(joints)
         if not 1 <= n <= MAX_JOINTS or len(set(joints)) != n or not set(joints) <= set(range(MAX_JOINTS)):
@@ -92,7 +93,7 @@ class BasisFunctions:
         return sum(2**i * comb(n, i) * comb(degree, i) for i in range(n + 1))
 
     def multiples(self) -> npt.NDArray[np.int64]:
-        """Powers p (angles) or combinations m ≠ 0 (trigonometric), one a row, shape (rows, len(joints))."""
+        """Powers p (angles) or combinations m ≠ 0 (trigonometric), one per row, shape (rows, len(joints))."""
         n = len(self.joints)
         signed = self.kind == "trigonometric"
         rows = [
@@ -104,10 +105,10 @@ class BasisFunctions:
         return np.array(rows, dtype=np.int64).reshape(len(rows), n)
 
     def terms(self, q: npt.ArrayLike) -> Floats:
-        """Evaluate every basis function: the design matrix of a least-squares fit.
+        """Evaluate every basis function, which gives the design matrix of a least-squares fit.
 
         Args:
-            q: Configurations [rad], shape (N, n), n more than the largest index used.
+            q: Configurations [rad], shape (N, n), with n above the largest index used.
 
         Returns:
             Values [-], shape (N, len(self)); trigonometric: 1, then cos and sin of each combination in turn.
@@ -127,7 +128,7 @@ class BasisFunctions:
 
 
 def _rows(n: int, total: int, *, signed: bool) -> Iterator[tuple[int, ...]]:
-    """Yield the whole vectors of length n with Σ|m| = total, without negative entries unless `signed`."""
+    """Yield the integer vectors of length n with Σ|m| = total, without negative entries unless `signed`."""
     if n == 1:
         yield (total,)
         if signed and total:
@@ -149,11 +150,11 @@ def terms(
     centre: npt.ArrayLike | None = None,
     scale: npt.ArrayLike | None = None,
 ) -> Floats:
-    """Design matrix of a `Polynomial` with these parameters: what its coefficients are fitted with.
+    """Return the design matrix for fitting the coefficients of a `Polynomial` with these parameters.
 
     Args:
         q: Configurations [rad], shape (N, n).
-        joints: Joints, as in `Polynomial`; the other arguments are also those of `Polynomial`.
+        joints: Selected joints; all further arguments are as in `Polynomial`.
         basis: `trigonometric` or `angles`.
         degree: Highest total degree.
         centre: Centre of the angles [rad], shape (len(joints),).
@@ -163,6 +164,6 @@ def terms(
         Values [-], shape (N, terms), in the order of the coefficients.
 
     Raises:
-        EstimatorError: A parameter is wrong.
+        EstimatorError: A parameter is invalid.
     """
     return BasisFunctions(tuple(joints), basis, degree, centre, scale).terms(q)

@@ -1,4 +1,4 @@
-"""Springs and motors of an arm, and with its mass matrix all its poles, by eigenvalues of the linearised equations.
+"""Springs and motors of an arm; with its mass matrix, all its poles follow from the linearised equations.
 
 A flexible joint is a motor under P control of position and velocity in series with its gear, the textbook model.
 """
@@ -14,22 +14,22 @@ from tvist_shaping.estimators.poles import DAMPED, LOWEST, Complex
 
 @dataclass(frozen=True)
 class Drivetrain:
-    """Springs and motors, one entry a coordinate of the mass matrix.
+    """Springs and motors, with one entry for each coordinate of the mass matrix.
 
     Raises:
-        EstimatorError: A value is not positive and finite, or lengths differ.
+        EstimatorError: A value is not positive and finite, or the lengths differ.
     """
 
     stiffness: tuple[float, ...]
-    """K of gears and bends [N m/rad]."""
+    """Stiffness K of gears and bends [N m/rad]."""
     rotor_inertia: tuple[float, ...]
-    """B of the motor behind it; 0 at a bend, which has none [kg m^2]."""
+    """Inertia B of the motor behind the gear; 0 at a bend, which has no motor [kg m^2]."""
     velocity_gain: tuple[float, ...]
-    """K_d [N m s/rad]; not used at a bend."""
+    """Gain K_d [N m s/rad]; not used at a bend."""
     position_gain: tuple[float, ...]
-    """K_p [1/s]; not used at a bend."""
+    """Gain K_p [1/s]; not used at a bend."""
     damping: tuple[float, ...] = ()
-    """D of gears and bends [N m s/rad]; empty: none."""
+    """Damping D of gears and bends [N m s/rad]; empty for none."""
 
     def __post_init__(self) -> None:
         size = len(self.stiffness)
@@ -47,13 +47,13 @@ class Drivetrain:
 
     @property
     def rows(self) -> Floats:
-        """The five, shape (5, L)."""
+        """The five properties as rows, shape (5, L)."""
         return np.array(
             [self.stiffness, self.rotor_inertia, self.velocity_gain, self.position_gain, self.damping]
         )
 
     def system(self, mass: Floats) -> tuple[Floats, Floats, Floats]:
-        """Inertia, damping and stiffness of the L coordinates and, behind them, of the n motors that drive some.
+        """Inertia, damping and stiffness of the L coordinates followed by the n motors that drive some of them.
 
         Args:
             mass: M(q), shape (L, L) [kg m^2].
@@ -76,13 +76,13 @@ class Drivetrain:
         return inertia, damping, stiffness
 
     def poles(self, mass: Floats) -> tuple[Complex, Complex]:
-        """All poles that vibrate, by eigenvalues of the whole linear system.
+        """Compute all vibrating poles, as eigenvalues of the whole linear system.
 
         Args:
             mass: M(q), shape (L, L) [kg m^2].
 
         Returns:
-            Poles in the order of their frequency, shape (k,) [1/s], and their shapes, (k, L), of largest entry 1.
+            Poles in the order of their frequency, shape (k,) [1/s], and their shapes, (k, L), with largest entry 1.
         """
         inertia, damping, stiffness = self.system(mass)
         L, N = len(self.stiffness), len(inertia)

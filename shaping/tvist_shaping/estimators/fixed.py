@@ -1,4 +1,4 @@
-"""Modes that do not depend on the configuration: classic, time-invariant input shaping."""
+"""Modes that do not depend on the configuration, for classic time-invariant input shaping."""
 
 from collections.abc import Sequence
 from typing import Self
@@ -12,14 +12,14 @@ from tvist_shaping.impulses import F_D_RANGE
 
 
 class Fixed(Estimator):
-    """Estimator that gives the same modes at every configuration."""
+    """Estimator with the same modes at every configuration."""
 
     def __init__(self, f_d: Sequence[float], zeta: Sequence[float]) -> None:
         """Set the modes.
 
         Args:
-            f_d: Damped frequencies [Hz], one a mode, 1e-6 to 1e6.
-            zeta: Damping ratios [-], one a mode, 0 <= ζ < 1.
+            f_d: Damped frequencies [Hz], one for each mode, 1e-6 to 1e6.
+            zeta: Damping ratios [-], one for each mode, 0 <= ζ < 1.
 
         Raises:
             EstimatorError: A value is out of range, or the lengths differ.
@@ -60,5 +60,5 @@ class Fixed(Estimator):
         return self._f_d, self._zeta
 
     def fork(self) -> Self:
-        """Itself: nothing of it ever changes."""
+        """Return this estimator itself, since it has no state."""
         return self

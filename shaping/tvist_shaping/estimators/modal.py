@@ -1,15 +1,15 @@
-"""Modes from the mass matrix: the arm's equations, linearised, solved anew at every configuration.
+"""Modes from the mass matrix: the linearised equations of the arm, solved at every configuration.
 
-Each of the L coordinates is a joint, whose gear k stands in series with a motor under P control of position and
-velocity, or the bending of a link, a spring with its damper alone:
+Each of the L coordinates is a joint, whose gear k is in series with a motor under P control of position and velocity,
+or the bending of a link, which is a spring with a damper:
 
     F(s) v = [M(q) s² + diag κ(s)] v = 0,     κ(s) = k z/(k + z) at a joint,  z(s) = B s² + K_d (s + K_p)
                                               κ(s) = k           at a bend,   k(s) = K + D s
 
-A pole s = -σ ± iω is a mode with f_d = ω/2π and ζ = σ/|s|. Poles move little in a tick: Newton's method for the
-nonlinear eigenvalue problem goes on from the last ones, so each mode is followed by continuity, also where two
-cross. (Motor impedance in series with the gear is the textbook model of a flexible joint under drive control; Newton's
-method for eigenvalues that enter nonlinearly: Ruhe 1973.)
+A pole s = -σ ± iω is a mode with f_d = ω/2π and ζ = σ/|s|. Poles change little within a tick, so Newton's method for
+the nonlinear eigenvalue problem continues from the last ones. Each mode is thus followed by continuity, even if two
+modes cross. (A motor impedance in series with the gear is the textbook model of a flexible joint under drive control;
+Newton's method for eigenvalues that enter nonlinearly: Ruhe 1973.)
 """
 
 from collections.abc import Callable
@@ -24,14 +24,14 @@ from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.poles import Complex, follow
 
 JUMP = 0.1
-"""Change of a joint from one estimate to the next that no motion makes [rad]."""
+"""Change of a joint from one estimate to the next that is too large for a motion [rad]."""
 RESTING, MOVING, JUMPED = range(3)
-"""How a configuration lies to the last."""
+"""Relation of a configuration to the previous one."""
 
 
 @compiled
 def compare(q: Floats, last: Floats) -> int:
-    """How a configuration lies to the last one, which it replaces."""
+    """Compare a configuration with the previous one, which it then replaces."""
     how = RESTING
     for joint in range(q.shape[0]):
         change = abs(q[joint] - last[joint])
@@ -45,7 +45,7 @@ def compare(q: Floats, last: Floats) -> int:
 
 @compiled
 def describe(poles: Complex, f_d_min: float, zeta_max: float, f_d: Floats, zeta: Floats) -> bool:
-    """Frequencies and damping ratios of poles, held where they are believed; whether one had to be."""
+    """Compute frequencies and damping ratios of poles, clamped to their bounds; return whether one was clamped."""
     clipped = False
     for k in range(poles.shape[0]):
         f_d[k] = poles[k].imag / (2.0 * np.pi)
@@ -57,16 +57,16 @@ def describe(poles: Complex, f_d_min: float, zeta_max: float, f_d: Floats, zeta:
 
 
 class Modal(Estimator):
-    """Lowest modes of an arm whose mass matrix is known at every configuration, followed by continuity.
+    """Lowest modes of an arm with a known mass matrix, followed by continuity.
 
-    A mode that was among the lowest may end above one that was not. So `settle` takes the lowest anew, from all
-    poles. `estimate` does so only where q jumps as no motion does. Where a pole is lost, because it vibrates no longer
-    or meets another, `estimate` leaves all modes as they were until every one is found again.
+    A mode that was among the lowest may move above one that was not. `settle` therefore selects the lowest modes anew
+    from all poles; `estimate` does so only if q jumps by more than any motion. If a pole is lost, because it no
+    longer vibrates or coincides with another, `estimate` keeps all modes unchanged until every one is found again.
 
     Attributes:
         drivetrain: Springs and motors.
-        clipped: Whether a mode of the last estimate was beyond `f_d_min` or `zeta_max`, and held there; or one was
-            lost.
+        clipped: Whether a mode of the last estimate was outside `f_d_min` or `zeta_max` and was clamped to it, or a
+            mode was lost.
     """
 
     drivetrain: Drivetrain
@@ -80,15 +80,15 @@ class Modal(Estimator):
         f_d_min: float = 2.0,
         zeta_max: float = 0.9,
     ) -> None:
-        """An estimator for one arm with one payload.
+        """Create an estimator for one arm with one payload.
 
         Args:
-            mass_matrix: M(q) for joint angles of shape (joints,) [rad], symmetric, shape (L, L) [kg m^2]; a new
-                array or always the same one.
+            mass_matrix: Function from joint angles, shape (joints,) [rad], to M(q), symmetric, shape (L, L) [kg m^2];
+                it may return the same array each time.
             drivetrain: Springs and motors of the L coordinates.
-            modes: Number of modes to estimate, the lowest, 1 to L.
-            f_d_min: Lowest damped frequency that is believed [Hz], > 0: says how long a filter can get.
-            zeta_max: Highest damping ratio that is believed [-], 0 to 1.
+            modes: Number of lowest modes to estimate, 1 to L.
+            f_d_min: Lower bound of the damped frequency [Hz], > 0; it determines the longest delay of a filter.
+            zeta_max: Upper bound of the damping ratio [-], 0 to 1.
 
         Raises:
             EstimatorError: A value is out of range.
@@ -121,37 +121,37 @@ class Modal(Estimator):
 
     @property
     def f_d_min(self) -> float:
-        """Lowest damped frequency that is believed [Hz]."""
+        """Lower bound of the damped frequency [Hz]."""
         return self._f_d_min
 
     @property
     def zeta_max(self) -> float:
-        """Highest damping ratio that is believed [-]."""
+        """Upper bound of the damping ratio [-]."""
         return self._zeta_max
 
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
-        """Modes at a configuration, each the continuation of the last estimate's.
+        """Estimate the modes at a configuration, each as the continuation of the last estimate's.
 
         Args:
             q: Joint angles [rad], shape (joints,).
 
         Returns:
-            f_d [Hz] and ζ [-], each of shape (modes,), held inside `f_d_min` and `zeta_max`.
+            f_d [Hz] and ζ [-], each of shape (modes,), clamped to `f_d_min` and `zeta_max`.
 
         Raises:
-            EstimatorError: q or the mass matrix does not fit, or the arm has fewer modes that vibrate at q.
+            EstimatorError: q or the mass matrix has the wrong shape, or the arm has fewer vibrating modes at q.
         """
         self._go_to(q)
         return self._describe()
 
     def settle(self, q: Floats) -> tuple[Floats, Floats]:
-        """The lowest modes at a configuration, whatever the last estimate was.
+        """Estimate the lowest modes at a configuration, regardless of the last estimate.
 
         Args:
             q: Joint angles, see `estimate`.
 
         Returns:
-            As of `estimate`.
+            Modes, see `estimate`.
 
         Raises:
             EstimatorError: See `estimate`.
@@ -161,7 +161,7 @@ class Modal(Estimator):
         return self._describe()
 
     def poles(self, q: Floats) -> Complex:
-        """Poles at a configuration [1/s], shape (modes,); as `estimate`, not held inside any range."""
+        """Poles at a configuration [1/s], shape (modes,); as in `estimate`, but not clamped."""
         self._go_to(q)
         return self._poles.copy()
 
@@ -212,7 +212,7 @@ class Modal(Estimator):
             raise EstimatorError("mass_matrix(q)", mass.tolist(), f"finite, at q = {q.tolist()}")
 
     def _begin(self, q: Floats) -> None:
-        """Check once what stays as it is, and know no last configuration."""
+        """Check once what does not change later, and discard the last configuration."""
         if q.ndim != 1:
             raise EstimatorError("q", q.shape, "of shape (joints,)")
         size = len(self.drivetrain.stiffness)

@@ -1,6 +1,6 @@
 """Poles followed from one configuration to the next, by Newton's method for the nonlinear eigenvalue problem.
 
-The equations are in `tvist_shaping.estimators.modal`; eigenvalues that enter nonlinearly: Ruhe 1973.
+The equations are in `tvist_shaping.estimators.modal`; for eigenvalues that enter nonlinearly, see Ruhe 1973.
 """
 
 import numpy as np
@@ -12,32 +12,32 @@ from tvist_shaping._types import Floats
 Complex = npt.NDArray[np.complex128]
 
 LOWEST = 0.5
-"""Frequency below which a pole is no vibration [Hz]."""
+"""Frequency below which a pole does not count as a vibration [Hz]."""
 DAMPED = 0.9
-"""Damping ratio above which a pole is no vibration [-]."""
+"""Damping ratio above which a pole does not count as a vibration [-]."""
 STEPS = 12
-"""Newton steps for a mode; two or three do from one tick to the next."""
+"""Largest number of Newton steps for a mode; two or three are enough from one tick to the next."""
 TURNED = 0.01
-"""Square of the change of a shape, of largest entry 1, above which a step is not the last [-]."""
+"""Squared change of a shape with largest entry 1, above which another step is needed [-]."""
 CONVERGED = 1e-5
-"""Newton step of a pole against its size that is the last: what is left is that squared [-]."""
+"""Relative size of the last Newton step of a pole; the remaining error is its square [-]."""
 APART = 1e-7
-"""Distance against their size below which two poles followed are suspected of being one [-]."""
+"""Relative distance below which two poles may be the same one [-]."""
 
 
 @compiled
 def follow(mass: Floats, rows: Floats, poles: Complex, shapes: Complex, scratch: Complex) -> bool:
-    """Newton's method for every pole, from where it was; poles and shapes are changed in place.
+    """Follow every pole by Newton's method from its last value; poles and shapes are changed in place.
 
     Args:
         mass: M, shape (L, L).
         rows: `Drivetrain.rows`.
         poles: Shape (k,).
-        shapes: Shape (k, L), largest entry 1.
+        shapes: Shape (k, L), with largest entry 1.
         scratch: Shape (L + k, L + 1).
 
     Returns:
-        Whether all converged, to poles of their own; where not, all are left as they were.
+        Whether all converged to different poles; otherwise poles and shapes are not changed.
     """
     L = mass.shape[0]
     before = scratch[L:]
@@ -54,14 +54,14 @@ def follow(mass: Floats, rows: Floats, poles: Complex, shapes: Complex, scratch:
 def _converge(  # noqa: C901, PLR0912 - one kernel: its branches are loops over coordinates
     mass: Floats, rows: Floats, poles: Complex, shapes: Complex, matrix: Complex
 ) -> bool:
-    """Do the same as `follow`; if it fails, poles and shapes are not usable."""
+    """Do the same as `follow`; after a failure, poles and shapes are invalid."""
     L = mass.shape[0]
     for k in range(poles.shape[0]):
         s = poles[k]
         found = False
         for _ in range(STEPS):
-            # F is symmetric, so the pole that belongs to a shape v solves vᵀ F(s) v = 0: the error of v enters
-            # squared.
+            # F is symmetric, so the pole for a shape v solves vᵀ F(s) v = 0, and its error is of second order in the
+            # error of v.
             for _ in range(STEPS):
                 residual, slope = 0.0j, 0.0j
                 for i in range(L):
@@ -80,7 +80,7 @@ def _converge(  # noqa: C901, PLR0912 - one kernel: its branches are loops over 
                     break
             if not abs(s) < 1e9:
                 return False
-            # The shape that belongs to the pole, by inverse iteration: F(s) x = F'(s) v.
+            # Compute the shape for this pole by inverse iteration: F(s) x = F'(s) v.
             for i in range(L):
                 right = 0.0j
                 for j in range(L):
@@ -91,14 +91,14 @@ def _converge(  # noqa: C901, PLR0912 - one kernel: its branches are loops over 
                 matrix[i, i] += spring
                 matrix[i, L] = 2.0 * right + change * shapes[k, i]
             if not _solve(matrix):
-                found = True  # s is the pole to the last bit
+                found = True  # s is exactly the pole
                 break
             largest = 0
             for i in range(1, L):
                 if abs(matrix[i, L]) > abs(matrix[largest, L]):
                     largest = i
             scale = matrix[largest, L]
-            # Newton's next step of the pole itself.
+            # Newton's next step for the pole itself.
             step = shapes[k, largest] / scale
             s -= step
             turn = 1.0 / scale
@@ -107,7 +107,7 @@ def _converge(  # noqa: C901, PLR0912 - one kernel: its branches are loops over 
                 v = matrix[i, L] * turn
                 turned += abs(v - shapes[k, i]) ** 2
                 shapes[k, i] = v
-            # The step says nothing where the shape is another one than it was: two modes that are almost one.
+            # If the shape has changed, a small step proves nothing, since two modes may be nearly equal.
             if abs(step) <= CONVERGED * abs(s) and turned <= TURNED:
                 found = True
                 break
@@ -117,7 +117,7 @@ def _converge(  # noqa: C901, PLR0912 - one kernel: its branches are loops over 
     for k in range(poles.shape[0]):
         for m in range(k):
             if abs(poles[k] - poles[m]) < APART * abs(poles[k]):
-                # One pole twice has one shape; two that cross have two.
+                # The same pole found twice has one shape; two poles that cross have two.
                 along = 0.0j
                 first, second = 0.0, 0.0
                 for i in range(L):
@@ -131,7 +131,7 @@ def _converge(  # noqa: C901, PLR0912 - one kernel: its branches are loops over 
 
 @compiled
 def _spring(rows: Floats, i: int, s: complex) -> tuple[complex, complex]:
-    """κ(s) of a coordinate, and its derivative."""
+    """Return κ(s) of a coordinate, and its derivative."""
     D = rows[4, i]
     k = rows[0, i] + D * s
     if rows[1, i] == 0.0:
@@ -143,7 +143,7 @@ def _spring(rows: Floats, i: int, s: complex) -> tuple[complex, complex]:
 
 @compiled
 def _solve(matrix: Complex) -> bool:  # noqa: C901 - likewise
-    """Gaussian elimination with pivots; the solution takes the place of the last column."""
+    """Solve by Gaussian elimination with pivoting; the solution replaces the last column."""
     L = matrix.shape[0]
     for i in range(L):
         pivot = i

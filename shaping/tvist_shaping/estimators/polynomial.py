@@ -14,19 +14,19 @@ from tvist_shaping.estimators.basis import BasisFunctions, Kind
 from tvist_shaping.impulses import F_D_RANGE
 
 MARGIN = 0.1
-"""Part of a range at either end in which the saturation bends [-]."""
+"""Share of a range, at both ends, in which the saturation is curved [-]."""
 
 
 @compiled
 def saturate(x: float, low: float, high: float) -> float:
-    """Hold x in [low, high] with three continuous derivatives.
+    """Clamp x to [low, high] with three continuous derivatives.
 
         y = low + w r((x - low)/w)        near low, w = MARGIN (high - low), and mirrored near high
         r(t) = 2 (p⁶ - 3p⁵ + 5/2 p⁴),     p = (t + 1)/2,    -1 < t < 1
 
-    r is the integral of the quintic smooth step: r(t) = 0 below -1, t above 1. So y is x itself from low + w
-    to high - w, the bound itself from w beyond it, and its slope falls from 1 to 0 in between without a kink:
-    a kink in f_d(q) would be a jump in the velocity of the delay, and of the arm.
+    r is the integral of the quintic smooth step: r(t) = 0 below -1, t above 1. So y is x itself between low + w and
+    high - w, and it is the bound itself at more than w outside the range. In between, its slope changes smoothly from
+    1 to 0: a kink in f_d(q) would be a jump in the velocity of the delay, and of the arm.
     """
     w = MARGIN * (high - low)
     if x < low + w:
@@ -49,20 +49,20 @@ def evaluate(
     coefficients: Floats,
     ranges: Floats,
 ) -> tuple[float, float, bool]:
-    """Both polynomials at one configuration.
+    """Evaluate both polynomials at one configuration.
 
     Args:
         q: Joint angles [rad], shape (n,).
-        joints: Indices of the joints used, shape (k,).
+        joints: Indices of the selected joints, shape (k,).
         trigonometric: Whether the basis is trigonometric.
         centre: Centre [rad], shape (k,).
         scale: Scale [rad], shape (k,).
         multiples: `BasisFunctions.multiples`, shape (rows, k).
         coefficients: Coefficients of f_d and ζ, shape (2, terms).
-        ranges: Lowest and highest f_d and ζ, shape (2, 2).
+        ranges: Range of f_d and range of ζ, shape (2, 2).
 
     Returns:
-        f_d [Hz], ζ [-], and whether one of them had to be held in its range.
+        f_d [Hz], ζ [-], and whether one of them was clamped to its range.
     """
     f_d = 0.0
     zeta = 0.0
@@ -95,13 +95,13 @@ def evaluate(
 
 
 class Polynomial(Estimator):
-    """One mode, whose f_d and ζ are polynomials in the joint angles, held in the range they were measured in.
+    """One mode, whose f_d and ζ are polynomials in the joint angles, clamped to the range of the measurements.
 
-    f_d(q) = saturate(Σ_i a_i φ_i(q)), ζ(q) = saturate(Σ_i b_i φ_i(q)), the φ_i those of `basis.py`.
+    f_d(q) = saturate(Σ_i a_i φ_i(q)), ζ(q) = saturate(Σ_i b_i φ_i(q)), with the φ_i of `basis.py`.
 
     Attributes:
         basis: The functions φ_i.
-        saturating: Whether the last estimate's f_d or ζ lay outside its range before it was held.
+        saturating: Whether the last estimate's f_d or ζ was outside its range before it was clamped.
     """
 
     basis: BasisFunctions
@@ -120,21 +120,21 @@ class Polynomial(Estimator):
         centre: npt.ArrayLike | None = None,
         scale: npt.ArrayLike | None = None,
     ) -> None:
-        """Set the polynomials.
+        """Create the estimator from its coefficients.
 
         Args:
-            joints: Indices of the joints used, from 0.
+            joints: Indices of the selected joints, from 0.
             basis: `trigonometric` or `angles`.
             degree: Highest total degree.
             f_d_coefficients: a [Hz], shape (terms,), in the order of `terms`.
             zeta_coefficients: b [-], shape (terms,).
-            f_d_range: Lowest and highest f_d [Hz] that may come out, 1e-6 to 1e6.
-            zeta_range: Lowest and highest ζ [-] that may come out, 0 <= ζ < 1.
-            centre: Subtracted from the angles [rad], shape (len(joints),); None for zeros.
-            scale: Divides them [rad], shape (len(joints),); None for ones, which `trigonometric` needs.
+            f_d_range: Lowest and highest result for f_d [Hz], 1e-6 to 1e6.
+            zeta_range: Lowest and highest result for ζ [-], 0 <= ζ < 1.
+            centre: Angles that are subtracted [rad], shape (len(joints),); None for zeros.
+            scale: Divisor of the differences [rad], shape (len(joints),); None for ones, which `trigonometric` needs.
 
         Raises:
-            EstimatorError: A parameter is wrong; it names which.
+            EstimatorError: A parameter is invalid; the error names it.
         """
         self.basis = BasisFunctions(tuple(joints), basis, degree, centre, scale)
         self.saturating = False
@@ -165,7 +165,7 @@ class Polynomial(Estimator):
 
     @property
     def modes(self) -> int:
-        """One."""
+        """Number of modes, which is 1."""
         return 1
 
     @property
@@ -179,10 +179,10 @@ class Polynomial(Estimator):
         return float(self._ranges[1, 1])
 
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
-        """Evaluate both polynomials.
+        """Evaluate both polynomials at a configuration.
 
         Args:
-            q: Joint angles [rad], shape (n,), n more than the largest index used.
+            q: Joint angles [rad], shape (n,), with n above the largest index used.
 
         Returns:
             f_d [Hz] and ζ [-], each of shape (1,).

@@ -1,1 +1,1 @@
-"""The ways in and out: Zenoh, and in process."""
+"""Gateways: Zenoh, UR's interfaces and the console."""

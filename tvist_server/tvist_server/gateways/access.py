@@ -1,9 +1,10 @@
-"""Rights of clients on the network, as rules for Zenoh's access control: data made of names, nothing else.
+"""Rights of clients on the network, as rules for Zenoh's access control; computed from names alone.
 
-What no rule allows is denied, without a word to whoever tried. A rule holds for a key only where its own key
-includes it, so `tvist/**` is denied where `tvist/ur5e/state` is allowed. Flows are the server's: `ingress` is
-what a client sends, `egress` what reaches it. A client learns of a subscriber or queryable only by its
-declaration, so these need leave to go out; without it a put or query would not even be sent.
+Zenoh silently denies everything that no rule allows. A rule applies to a key only if the rule's key includes it, so
+`tvist/**` is denied where only `tvist/ur5e/state` is allowed. Flows are named from the server's point of view:
+`ingress` is what a client sends, `egress` is what reaches it. A client learns of a subscriber or queryable only
+through its declaration, so declarations need permission on egress; without it, a client would not even send its put
+or query.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -12,27 +13,27 @@ from typing import Any, Literal
 from tvist_protocol import keys
 
 Role = Literal["operator", "viewer"]
-"""An operator moves the robot and sees what it does; a viewer sees."""
+"""An operator moves the robot and sees what it does; a viewer only sees."""
 
 ROBOT_PUTS = (keys.state, keys.event, keys.telemetry, keys.truth, keys.io)
-"""Topics everybody with a role may read, and nobody but the robot may put."""
+"""Topics that everyone with a role may read and only the robot may publish."""
 
 
 def access_control(robots: Sequence[str], roles: Mapping[str, Role]) -> dict[str, Any]:
-    """Zenoh's `access_control` for a server.
+    """Return Zenoh's `access_control` settings for a server with certificates.
 
     Args:
         robots: Names of the robots it serves.
         roles: Role by common name of a client's certificate; at least one.
 
     Returns:
-        Rules, who they are for, and that everything else is denied: to a name without a role, and to whoever
-        shows no certificate.
+        Rules and the clients they apply to. Everything else is denied: to names without a role, and to clients without
+        a certificate.
     """
     viewing, operating = _viewing(robots), _operating(robots)
     rules_of: dict[Role, list[dict[str, Any]]] = {"viewer": viewing, "operator": [*viewing, *operating]}
     named = {role: [name for name, its in roles.items() if its == role] for role in rules_of}
-    # Zenoh takes no empty list of names: one would stand for everybody.
+    # Zenoh rejects an empty list of names, since that would apply to everyone.
     there = [role for role in rules_of if named[role]]
     return {
         "enabled": True,
@@ -47,15 +48,15 @@ def access_control(robots: Sequence[str], roles: Mapping[str, Role]) -> dict[str
 
 
 def open_access(robots: Sequence[str]) -> dict[str, Any]:
-    """Zenoh's `access_control` for a server that knows no certificates: whoever reaches it is an operator.
+    """Return Zenoh's `access_control` settings for a server without certificates: every client is an operator.
 
-    Nobody but the server may answer commands or put what the robot says: another session could otherwise swallow a
-    stop, or make up states.
+    Only the server may answer commands or publish the robot's topics. Otherwise another session could swallow a stop
+    or make up states.
 
     Args:
         robots: Names of the robots it serves.
     """
-    # By keys with wildcards, too: what may go out is said below, and a query reaches nobody but the server.
+    # Keys with wildcards are allowed too: egress is restricted below, and only the server answers queries.
     asking = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query", "query"]
     rules = [*_viewing(robots), *_operating(robots), _rule("ask for anything", "ingress", asking, ["**"])]
     return {
@@ -93,7 +94,8 @@ def _operating(robots: Sequence[str]) -> list[dict[str, Any]]:
         _rule("answer command", "egress", ["declare_queryable", "reply"], command),
         _rule("set-points", "ingress", ["put"], setpoint),
         _rule("take set-points", "egress", ["declare_subscriber"], setpoint),
-        # The going of a client's token ends its lease: a viewer could end an operator's with one of that name.
+        # When a client's token disappears, its lease ends. A viewer with a token of that name could end an
+        # operator's.
         _rule("be there", "ingress", ["liveliness_token"], clients),
         _rule("look for clients", "egress", ["declare_liveliness_subscriber", "liveliness_query"], clients),
     ]

@@ -1,4 +1,4 @@
-"""Gateways: the ways clients reach a robot, and what a gateway asks of the robot."""
+"""Gateways, through which clients reach a robot, and the interface between a gateway and its robot."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -16,14 +16,14 @@ Answer = Callable[[Reply], None]
 
 
 class GatewayError(Exception):
-    """A gateway cannot open; the sentence says why and what to do."""
+    """A gateway cannot open; the message says why and what to do."""
 
 
 class Desk(Protocol):
-    """Receives what arrives at a gateway. Callable from any thread; nothing here may wait."""
+    """Receives the messages that arrive at a gateway. Its methods may be called from any thread and do not block."""
 
     def request(self, data: bytes, answer: Answer) -> None:
-        """Take an encoded command; `answer` is called once: at once if it is turned away, else from another thread."""
+        """Take an encoded command; `answer` is called once: immediately if it is rejected, else from another thread."""
 
     def command(self, command: Command, answer: Answer) -> None:
         """Take a command that the gateway made itself; `answer` as for `request`."""
@@ -32,44 +32,44 @@ class Desk(Protocol):
         """Take an encoded set-point."""
 
     def info(self, answer: Callable[[bytes], None]) -> None:
-        """Take a question for `info`; `answer` is called once with the encoded message, from another thread."""
+        """Answer a request for `info`; `answer` is called once with the encoded message, from another thread."""
 
     def client_seen(self, client: str, session: str = "") -> None:
-        """Note that a client's liveliness token is there.
+        """Note that a client's liveliness token has appeared.
 
         Args:
-            client: Its name.
-            session: Session that it is of; empty where the token does not say.
+            client: Name of the client.
+            session: Session that declared the token; empty if the token does not name it.
         """
 
     def client_gone(self, client: str, session: str = "") -> None:
-        """Note that a client's liveliness token is gone, or its session."""
+        """Note that a client's liveliness token, or the session that declared it, has disappeared."""
 
     def session_gone(self, session: str) -> None:
-        """Note that a session has ended, whoever else holds its clients' liveliness tokens."""
+        """Note that a session has ended, even if other sessions hold liveliness tokens of the same clients."""
 
     def holder(self) -> str | None:
-        """Client that has control; None: nobody."""
+        """Client that has control; None if no client has it."""
 
 
 class Gateway(ABC):
-    """One way in and out."""
+    """One way for clients to reach a robot, and for the robot's messages to reach them."""
 
     setpoints_refused: int
-    """Set-points that never reached the desk: put on a key with a wildcard, or too large."""
+    """Number of set-points rejected before the desk: those on a key with a wildcard, and those that are too large."""
     dropped = 0
-    """States that found too many waiting."""
+    """Number of states dropped because too many were waiting."""
 
     @abstractmethod
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:
-        """Put a message, which is there encoded, too. Called from one thread; raises nothing for the network's sake."""
+        """Publish a message, given both decoded and encoded. Called from one thread; network errors raise nothing."""
 
-    async def open(self) -> None:  # noqa: B027  not every one waits for something
-        """Let clients in. The robot ticks."""
+    async def open(self) -> None:  # noqa: B027  not every gateway has to wait for something
+        """Let clients in. Called when the robot ticks."""
 
     async def shut(self) -> None:  # noqa: B027  likewise
-        """Let nobody in any more, and everybody out."""
+        """Let no more clients in, and disconnect the present ones."""
 
     @abstractmethod
     def close(self) -> None:
-        """Stop listening. What arrives meanwhile is left unanswered; a second call does nothing."""
+        """Stop listening. Messages that arrive from now on are not answered; a second call does nothing."""

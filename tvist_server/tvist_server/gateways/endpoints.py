@@ -1,29 +1,29 @@
-"""Zenoh endpoints, `<protocol>/<address>[?metadata][#options]`: which of them others can reach."""
+"""Zenoh endpoints, `<protocol>/<address>[?metadata][#options]`, and whether other machines can reach them."""
 
 import ipaddress
 import socket
 
 IP_PROTOCOLS = frozenset({"tcp", "udp", "ws", "tls", "quic"})
 LOCAL_PROTOCOLS = frozenset({"unixsock-stream"})
-"""These never leave the machine."""
+"""Protocols that never leave the machine."""
 
 
 def protocol(endpoint: str) -> str:
-    """`tcp` of `tcp/127.0.0.1:7447`; empty where there is none."""
+    """Return the protocol, such as `tcp` of `tcp/127.0.0.1:7447`; empty if there is none."""
     before, slash, _ = endpoint.partition("/")
     return before if slash else ""
 
 
 def options(endpoint: str) -> str:
-    """What stands behind `#`, which goes before the session's own settings; empty where there is none."""
+    """Return the part after `#`, which overrides the session's settings; empty if there is none."""
     return endpoint.partition("#")[2]
 
 
 def is_local(endpoint: str) -> bool:
-    """Whether only this machine can reach an endpoint.
+    """Return whether only this machine can reach an endpoint.
 
-    Whatever is not known to be local counts as not: a protocol this does not know, a name that cannot be
-    looked up, a name of which one address among others leaves the machine.
+    When in doubt, an endpoint counts as reachable from other machines: if the protocol is unknown, if its host name
+    cannot be looked up, or if any one of the name's addresses is not local.
     """
     if protocol(endpoint) in LOCAL_PROTOCOLS:
         return True
@@ -36,7 +36,7 @@ def is_local(endpoint: str) -> bool:
 
 
 def _addresses(host: str) -> list[ipaddress.IPv4Address | ipaddress.IPv6Address]:
-    """All addresses of a host; none where there is no such host, or no host is named."""
+    """Return all addresses of a host; empty if there is no such host or no host is named."""
     if not host:
         return []
     try:

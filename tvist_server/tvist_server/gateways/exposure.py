@@ -158,7 +158,7 @@ def _check_pair(folder: Path) -> None:
         server = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         server.load_cert_chain(folder / CERTIFICATE, folder / KEY)
         client = ssl.create_default_context(cafile=folder / AUTHORITY)
-        client.check_hostname = False  # only clients know the name by which they reach the robot
+        client.check_hostname = False  # clients alone know the name by which they reach the robot
         _shake_hands(server, client)
     except ssl.SSLCertVerificationError as error:
         why = f"no client would trust {CERTIFICATE}: {error.verify_message}"

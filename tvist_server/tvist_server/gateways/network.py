@@ -1,4 +1,4 @@
-"""The network: one Zenoh session, a router inside the server to which clients connect, for all its robots."""
+"""The network: one Zenoh session for all robots of the server; it acts as a router to which clients connect."""
 
 import json
 import threading
@@ -14,41 +14,41 @@ from tvist_server.gateways.zenoh import ZenohGateway
 
 CONFIG: Mapping[str, Any] = {
     "mode": "router",
-    # Nobody to look for: by default opening waits half a second for other routers.
+    # Skip looking for other routers, which by default makes opening wait for half a second.
     "scouting/delay": 0,
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
-    # A payload in shared memory passes every limit on size, and needs 3 kB to begin with.
+    # A payload in shared memory would bypass every size limit; it is used from 3 kB.
     "transport/shared_memory/enabled": False,
-    # By default a hundred connections that say nothing shut everybody else out for ten seconds.
+    # By default a hundred silent connections keep all other clients out for ten seconds.
     "transport/unicast/accept_timeout": 2000,
     "transport/unicast/accept_pending": 1000,
-    # A state costs about 20 µs a subscriber: this many would use up the 2 ms of a tick several times.
+    # A state costs about 20 µs for each subscriber: this many would use up a tick's 2 ms several times over.
     "transport/unicast/max_sessions": 256,
 }
 """Zenoh settings of the session, by path."""
 REALTIME: Mapping[str, Any] = {
-    # What the system holds for a client beyond that is dropped, not late: half a second of states. By itself it
-    # holds 3 MB, and a client on a slow link gets states and answers of half a minute ago.
+    # Data beyond this send buffer, half a second of states, is dropped rather than late. By default the system
+    # buffers 3 MB, and a client on a slow link would get states and answers that are half a minute old.
     "transport/link/tcp/so_sndbuf": 131_072,
     "transport/link/tls/so_sndbuf": 131_072,
-    # Answers alone wait for room in real time, and everybody's behind them: a client that goes on asking and has
-    # stopped reading is cut off after this [us], instead of 5 s.
+    # In real time, answers are the only messages that wait for room, and all other answers wait behind them. A client
+    # that keeps asking but has stopped reading is disconnected after this time [us] instead of 5 s.
     "transport/link/tx/queue/congestion_control/block/wait_before_close": 1_000_000,
 }
-"""Besides, where time does not wait for clients."""
+"""Additional settings for a clock that does not wait for clients."""
 
 
 class Network:
-    """Listens on endpoints; each robot has a gateway of its own there.
+    """Listens on endpoints, and creates a gateway for each robot.
 
     Args:
         endpoints: Endpoints to listen on, such as `tcp/127.0.0.1:7447`.
-        guard: Settings of the session that keep others out, path to value.
-        lockstep: Whether a client lets time pass: then one that is slow is waited for.
+        guard: Session settings that restrict access, by path.
+        lockstep: Whether a client advances time, so that the server waits for slow clients.
 
     Raises:
-        GatewayError: An endpoint cannot be listened on.
+        GatewayError: The server cannot listen on an endpoint.
     """
 
     def __init__(
@@ -65,20 +65,20 @@ class Network:
         _OPEN.add(self)
 
     def gateway(self, robot: str, desk: Desk, *, lockstep: bool, truth: bool) -> ZenohGateway:
-        """Let clients reach a robot.
+        """Create the gateway of a robot.
 
         Args:
-            robot: Its name, which stands in every key.
-            desk: Takes what arrives.
-            lockstep: Whether a client lets time pass: then no state may be lost, and the publisher waits.
-            truth: Whether to put the stream of what no robot can know.
+            robot: Name of the robot, which is part of every key.
+            desk: Desk that receives the messages that arrive.
+            lockstep: Whether a client advances time: then no state may be lost, and the publisher waits.
+            truth: Whether to publish the topic with values that a real robot cannot measure.
         """
         gateway = ZenohGateway(self._session, robot, desk, lockstep=lockstep, truth=truth)
         self._gateways.append(gateway)
         return gateway
 
     def close(self) -> None:
-        """Close the session; clients see every `alive` go at once. A second call does nothing."""
+        """Close the session, which makes every `alive` token disappear at once. A second call does nothing."""
         if self._closed:
             return
         self._closed = True
@@ -106,7 +106,7 @@ def _open(endpoints: Sequence[str], guard: Mapping[str, Any]) -> zenoh.Session:
 
 
 def _explain(error: zenoh.ZError, endpoints: str) -> str:
-    """Zenoh's reason in one sentence, without the places in its sources where it passed."""
+    """Zenoh's reason in one sentence, without the source locations that it appends."""
     cause = str(error)
     reasons = {
         "Address already in use": "the port is in use: stop the server that uses it, or choose another port",
@@ -128,6 +128,6 @@ def _close_all() -> None:
         network.close()
 
 
-# A session left open can hang the process at its end; `atexit` comes too late, after threads were joined.
+# A session that is left open can hang the process at its end. `atexit` runs too late: after threads were joined.
 _register: Callable[[Callable[[], None]], None] = threading._register_atexit  # type: ignore[attr-defined]  # noqa: SLF001
 _register(_close_all)

@@ -1,4 +1,4 @@
-"""Answers to Zenoh queries, sent from a thread of their own."""
+"""Answers to Zenoh queries, sent by a separate thread."""
 
 import contextlib
 import threading
@@ -13,16 +13,16 @@ from tvist_protocol.replies import Reply
 ENCODING = zenoh.Encoding("application/msgpack")
 
 CLOSE_WAIT = 0.2
-"""How long the last answers may take at close [s]."""
+"""Longest time to send the last answers at close [s]."""
 
 
 class Answers:
     """Sends replies to queries.
 
-    A reply has the quality of service its client asked for, BLOCK unless it says otherwise: a client that
-    sends queries and stops reading holds the thread that answers until its link is cut, after 1 s in real time
-    and 5 s in lockstep. That thread is this one, so what the publisher puts 500 times a second is not late for
-    the others.
+    A reply has the quality of service that its client asked for, by default BLOCK. A client that sends queries and
+    stops reading therefore blocks the thread that answers until its link is closed, after 1 s in real time and 5 s in
+    lockstep. Because a separate thread answers, the messages published 500 times a second still reach other clients
+    in time.
     """
 
     def __init__(self) -> None:
@@ -32,11 +32,11 @@ class Answers:
         self._thread.start()
 
     def to(self, query: zenoh.Query, key: str) -> Callable[[Reply | bytes], None]:
-        """Make the function that answers a query on a key, encoded or not. Zenoh ends the query when it is called."""
+        """Return the function that answers a query on a key, encoded or not. Zenoh ends the query when it is called."""
         return lambda reply: self._queue.put((query, key, reply))
 
     def close(self) -> None:
-        """Send what is waiting, as far as that is quick."""
+        """Send the answers still waiting, unless that takes longer than `CLOSE_WAIT`."""
         self._queue.put(None)
         self._thread.join(CLOSE_WAIT)
         self._closed = True
@@ -45,6 +45,6 @@ class Answers:
         while not self._closed and (answer := self._queue.get()) is not None:
             query, key, reply = answer
             data = reply if isinstance(reply, bytes) else encode(reply)
-            # The client may have left, the session may be closed: then nobody waits.
+            # If the client has left or the session is closed, the answer is no longer needed.
             with contextlib.suppress(zenoh.ZError), query:
                 query.reply(key, data, encoding=ENCODING)

@@ -1,8 +1,8 @@
 """The Zenoh gateway: one robot's keys on the server's session.
 
-Callbacks run in Zenoh's own threads, directly (`indirect=False`): what one client sends is then handed on in
-the order in which it was sent, a liveliness token before the command that follows it. They turn payloads into
-bytes, hand them to the desk and return; one may still be running when the session is closed, hence the flag.
+Callbacks run directly in Zenoh's own threads (`indirect=False`), so messages of one client are handled in the order
+in which it sent them: a liveliness token before the command that follows it. They convert payloads to bytes, pass
+them to the desk and return. One may still be running when the session is closed, hence the flag.
 """
 
 import contextlib
@@ -21,14 +21,14 @@ from tvist_server.gateways.replies import ENCODING, Answers
 
 
 class ZenohGateway(Gateway):
-    """One robot on Zenoh. `Network.gateway` makes one.
+    """One robot on Zenoh, created by `Network.gateway`.
 
     Args:
-        session: An open session, which closes after this.
-        robot: The robot's name, which stands in every key.
-        desk: Takes what arrives.
-        lockstep: Whether a client lets time pass: then no state may be lost, and the publisher waits.
-        truth: Whether to put the stream of what no robot can know.
+        session: An open session, to be closed after this gateway.
+        robot: Name of the robot, which is part of every key.
+        desk: Desk that receives the messages that arrive.
+        lockstep: Whether a client advances time: then no state may be lost, and the publisher waits.
+        truth: Whether to publish the topic with values that a real robot cannot measure.
     """
 
     def __init__(
@@ -57,18 +57,18 @@ class ZenohGateway(Gateway):
         setpoint = keys.setpoint(robot)
         session.declare_subscriber(setpoint, Callback(partial(self._on_setpoint, setpoint), indirect=False))
         self._publishers = _publishers(session, robot, lockstep=lockstep, truth=truth)
-        # Last, since it says that everything else is there.
+        # Declared last, since it announces that everything else is ready.
         self._alive = session.liveliness().declare_token(keys.alive(robot))
 
-    def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  it is encoded
-        """Put an encoded message; one of a topic that is not served goes nowhere."""
+    def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  it is already encoded
+        """Publish an encoded message; a message of a topic that is not served is ignored."""
         publisher = self._publishers.get(topic)
         if publisher is not None and not self._closed:
             with contextlib.suppress(zenoh.ZError):  # the session is being closed
                 publisher.put(payload)
 
     def close(self) -> None:
-        """Answer nothing any more. What is declared goes with the session."""
+        """Stop answering. The declarations end with the session."""
         if not self._closed:
             self._answers.close()
             self._closed = True
@@ -94,7 +94,7 @@ class ZenohGateway(Gateway):
             self._desk.info(answer)
 
     def _answer(self, key: str, query: zenoh.Query) -> Callable[[Reply | bytes], None] | None:
-        """How to answer; None where there is nothing to do any more."""
+        """Return the function that answers a query; None if the gateway is closed."""
         if self._closed:
             query.drop()  # type: ignore[no-untyped-call]
             return None
@@ -124,7 +124,7 @@ class ZenohGateway(Gateway):
             self._desk.client_gone(name, session)
 
     def session_gone(self, session: str) -> None:
-        """Hear that a session has ended: its liveliness tokens go only with their last copy, wherever that is."""
+        """Note that a session has ended. Its liveliness tokens may outlast it while another session holds a copy."""
         if not self._closed:
             self._desk.session_gone(session)
 
@@ -132,24 +132,24 @@ class ZenohGateway(Gateway):
 def _publishers(
     session: zenoh.Session, robot: str, *, lockstep: bool, truth: bool
 ) -> dict[Topic, zenoh.Publisher]:
-    """One publisher a topic.
+    """Declare one publisher for each topic.
 
-    In real time nothing may hold up the publisher, so everything is DROP, and nothing is express: then what
-    finds the link busy shares a batch of 64 KiB, and of those two may wait. Express, each message has a batch
-    of its own, and two states were all that could wait: on two cores with eight busy processes besides, a
-    client that read as fast as it could got 2330 of 3000 states, not express all of them, and none later.
+    In real time nothing may block the publisher, so all publishers use DROP and none is express. Messages that find
+    the link busy then share a batch of 64 KiB, and two batches may wait. With express, each message has a batch of
+    its own, so only two states could wait: on two cores loaded with eight busy processes, a client that read as fast
+    as it could got 2330 of 3000 states; without express it got all of them, none of them late.
 
-    What comes every tick has a low priority: on a link that is too slow for it, answers, events and telemetry
-    go first. With the priority of real time, and a link for a fifth of the states, no answer came through.
+    Messages of every tick have a low priority, so on a link that is too slow for them, answers, events and telemetry
+    are sent first. With real-time priority, and a link fast enough for a fifth of the states, no answer arrived.
 
-    An event must not be lost at all: events have a priority, hence queues, of their own, so that about a
-    thousand wait for a client that has stopped reading, on top of what its socket holds. Measured with a reader
-    stopped for 7.5 s under more states than its socket holds: 3300 of 6000 states were dropped and none of
-    240 events; half of the events, had they been of the states' priority. BLOCK would have held up the
-    publisher, and with it every other client, for 5 s.
+    Events must not be lost. They have a priority, and hence queues, of their own, so that about a thousand can wait
+    for a client that has stopped reading, in addition to what its socket buffers. Measured with a reader that stopped
+    for 7.5 s under more states than its socket buffers: 3300 of 6000 states were dropped, but none of 240 events;
+    with the states' priority, half of the events were lost. BLOCK would have held up the publisher, and with it all
+    other clients, for 5 s.
 
-    In lockstep everything is BLOCK, as the protocol has it, and events share the states' queue: who reads
-    state `n` has read every event up to tick `n`.
+    In lockstep all publishers use BLOCK, as the protocol requires, and events share the states' queue: a client that
+    reads state `n` has read all events up to tick `n`.
     """
     control = zenoh.CongestionControl.BLOCK if lockstep else zenoh.CongestionControl.DROP
     every_tick = zenoh.Priority.REAL_TIME if lockstep else zenoh.Priority.DATA_LOW

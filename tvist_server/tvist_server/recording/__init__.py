@@ -1,4 +1,4 @@
-"""Recording: every tick and everything that reached the controller, into an MCAP file."""
+"""Recording of every tick, and of everything that reached the controller, to an MCAP file."""
 
 from tvist_server.recording.recorder import Recorder, RecorderError
 

@@ -1,4 +1,4 @@
-"""The last second before a failure: kept in memory, written to a file when the arm's simulation has failed."""
+"""The last second before a failure: kept in memory, and written to a file when the simulated arm fails."""
 
 import logging
 import os
@@ -18,17 +18,17 @@ from tvist_server.recording.recorder import Recorder, RecorderError
 log = logging.getLogger(__name__)
 
 KEPT = 500
-"""Ticks before the failure, one second."""
+"""Number of ticks kept before the failure: one second."""
 MAX_FILES = 10
-"""Files of one robot: one that fails again and again does not fill the disk."""
+"""Largest number of files of one robot, so that repeated failures do not fill the disk."""
 
 
 class BlackBox(Sink):
-    """Keeps what came last in memory.
+    """Keeps the latest messages in memory.
 
     Args:
-        folder: For the files.
-        info: The robot as it says of itself; asked when a file is written.
+        folder: Folder of the files.
+        info: Returns the robot's description; called when a file is written.
         start: How the server was started, as in every recording.
     """
 
@@ -44,7 +44,7 @@ class BlackBox(Sink):
         self._written = 0
 
     def state(self, state: State) -> None:
-        """Keep a state; the first one after a failure is the last of its file."""
+        """Keep a state; the first state after a failure is the last one in its file."""
         kept = self._kept
         kept.append(state)
         while kept[0].tick < state.tick - KEPT:
@@ -59,11 +59,11 @@ class BlackBox(Sink):
         self._failed |= event.code == "plant_failure"
 
     def truth(self, truth: Truth) -> None:
-        """Keep what no robot can know."""
+        """Keep values that a real robot cannot measure."""
         self._kept.append(truth)
 
     def journal(self, entry: Entry) -> None:
-        """Keep what reached the controller."""
+        """Keep an input of the controller."""
         self._kept.append(entry)
 
     def _write(self, tick: int) -> None:

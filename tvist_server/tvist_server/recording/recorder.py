@@ -1,4 +1,4 @@
-"""The recorder: takes messages from the tick without making it wait, writes them in a thread of its own."""
+"""The recorder: takes messages from the tick without blocking it, and writes them in a separate thread."""
 
 import os
 import time
@@ -23,40 +23,43 @@ from tvist_server.recording.whereabouts import DeletedError, whereabouts
 from tvist_server.recording.writer import RecordingWriter, heading
 
 QUEUE_SIZE = 8192
-"""Messages that may wait. State, truth and a set-point every tick are 1500 a second: five seconds of a
-disk that does not answer, the time a file system takes to commit, in about 30 MB."""
+"""Number of messages that may wait. State, truth and a set-point every tick make 1500 messages a second, so this
+bridges five seconds in which the disk does not respond, the time that a file system may take to commit; about 30 MB.
+"""
 PAUSE = 0.02
-"""Time between two looks into the queue [s]. Nobody wakes the writer: that would cost the tick a system
-call, and the interpreter's lock in the middle of its work."""
+"""Time between two checks of the queue [s]. The tick does not wake the writer, since that would cost it a system
+call, and the interpreter's lock in the middle of its work.
+"""
 LOOK = 1.0
-"""Time between two looks whether the file is still where it was [s]."""
+"""Time between two checks whether the file has been moved or deleted [s]."""
 
 
 class RecorderError(TvistError):
-    """A recording cannot be begun."""
+    """A recording cannot be started."""
 
 
 class Recorder(Sink):
     """Records one robot until it is closed.
 
-    Messages come from one thread; they are not copied, and must not be changed afterwards. Without `wait`, no
-    method but `close` blocks, and none raises: what finds the queue full or the recording stopped is dropped
-    and counted.
+    Messages come from one thread; they are not copied, and must not be changed afterwards. Without `wait`, only
+    `close` blocks. No other method raises: messages are dropped and counted when the queue is full or the recording
+    has stopped.
 
     Args:
-        path: The file.
-        info: The robot.
-        start: How the server was started: all that a replay needs besides the journal, as JSON knows it.
-        overwrite: Whether a file of that name may be replaced.
-        queue_size: Messages that may wait for the writer.
-        wait: Whether a full queue is waited for: for a robot whose time waits too, in lockstep and free.
-        on_error: Called once, from the writer's thread, with a sentence when the recording has stopped by
-            itself: the disk is full, or the file was deleted.
-        on_moved: Called once, from the writer's thread, with a sentence when the file was moved away. The recording
-            goes on in it, wherever it is.
+        path: Path of the file.
+        info: Description of the robot.
+        start: How the server was started: everything besides the journal that a replay needs, as JSON types.
+        overwrite: Whether to replace an existing file.
+        queue_size: Number of messages that may wait for the writer.
+        wait: Whether to wait when the queue is full: for robots whose time waits too, with the clocks lockstep and
+            free.
+        on_error: Called once, from the writer's thread, with a sentence when the recording has stopped by itself
+            because the disk is full or the file was deleted.
+        on_moved: Called once, from the writer's thread, with a sentence when the file was moved. The recording
+            continues in it.
 
     Raises:
-        RecordingError: The file exists, cannot be written, or `start` cannot.
+        RecordingError: The file exists or cannot be written, or `start` cannot be encoded.
     """
 
     def __init__(
@@ -75,8 +78,7 @@ class Recorder(Sink):
             raise RecorderError(f"queue_size is {queue_size}: must be at least 1")
         self.path = Path(path)
         self.place: Path | None = self.path
-        """Place of the file, as far as is known: `path`, unless it was moved away. After `close` it is where it was
-        at the end."""
+        """Last known path of the file: `path`, unless it was moved. After `close`, the path at the end."""
         self.error: str | None = None
         """Why the recording stopped by itself, as a sentence."""
         self._dropped: dict[type[msgspec.Struct], int] = dict.fromkeys((State, Event, Truth, Entry), 0)
@@ -90,7 +92,7 @@ class Recorder(Sink):
         self._wake = Flag()
         self._room = Flag()
         self._begin(info, start, overwrite)
-        # A daemon: a program that ends without closing is not kept from it, and its file can be read.
+        # A daemon thread does not keep a program that ends without closing from ending, and the file stays readable.
         self._thread = Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
 
@@ -103,20 +105,20 @@ class Recorder(Sink):
         self._offer(event)
 
     def truth(self, truth: Truth) -> None:
-        """Record one tick of what no robot can know."""
+        """Record one tick of values that a real robot cannot measure."""
         self._offer(truth)
 
     def journal(self, entry: Entry) -> None:
-        """Record what reached the controller."""
+        """Record an input of the controller."""
         self._offer(entry)
 
     @property
     def dropped(self) -> int:
-        """Messages that were not recorded since the queue was full or the recording had stopped."""
+        """Number of messages that were dropped because the queue was full or the recording had stopped."""
         return sum(self._dropped.values())
 
     def close(self) -> None:
-        """Write what waits and the index, and end the thread. Closing again does nothing."""
+        """Write the waiting messages and the index, and end the thread. A second call does nothing."""
         self._stopped = True
         self._closing = True
         self._wake.set()
@@ -190,10 +192,10 @@ class Recorder(Sink):
             self._stop(f"the recording {self.path} has stopped and is incomplete: {_reason(error)}")
 
     def _look(self) -> None:
-        """Say once that the file was moved away.
+        """Report once that the file was moved.
 
         Raises:
-            DeletedError: It was deleted: to go on would fill the disk with what nobody can read.
+            DeletedError: The file was deleted; continuing would fill the disk with data that cannot be read.
         """
         self.place = whereabouts(self.path, self._stream.fileno())
         if self.place != self.path and self._on_moved is not None:
@@ -202,7 +204,7 @@ class Recorder(Sink):
             self._on_moved = None
 
     def _drain(self) -> None:
-        """Write what waits now; what comes meanwhile is the next round's, lest the file wait for ever."""
+        """Write the messages waiting now; later ones wait for the next call, so that the file is checked regularly."""
         for _ in range(len(self._queue)):
             self._writer.write(self._queue.popleft())
         self._writer.flush()

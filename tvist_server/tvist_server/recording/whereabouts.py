@@ -1,11 +1,11 @@
-"""Current place of a file that is being written: it may be moved or deleted meanwhile without an error."""
+"""Current path of an open file, which may be moved or deleted without an error."""
 
 import os
 from pathlib import Path
 
 
 class DeletedError(Exception):
-    """The file has no name any more: when it is closed, it is gone."""
+    """The file has been deleted: its data disappears when it is closed."""
 
 
 def whereabouts(path: Path, descriptor: int) -> Path | None:
@@ -13,13 +13,13 @@ def whereabouts(path: Path, descriptor: int) -> Path | None:
 
     Args:
         path: Path at which the file was opened.
-        descriptor: It.
+        descriptor: Descriptor of the open file.
 
     Returns:
-        `path` while that is this file, else the file's new name; None where the system does not tell it.
+        `path` while it is still this file, else the file's new path; None if the system does not report it.
 
     Raises:
-        DeletedError: It has none.
+        DeletedError: The file no longer has a name.
     """
     here = os.fstat(descriptor)
     if here.st_nlink == 0:
@@ -29,10 +29,10 @@ def whereabouts(path: Path, descriptor: int) -> Path | None:
             return path
     except (FileNotFoundError, NotADirectoryError):
         pass
-    except OSError:  # the folder cannot be looked into now: that says nothing about the file
+    except OSError:  # the folder cannot be read now, which says nothing about the file
         return path
     try:
         there = Path(f"/proc/self/fd/{descriptor}").readlink()
         return there if os.path.samestat(there.stat(), here) else None
-    except OSError:  # of several names the system may tell one that is gone
+    except OSError:  # of several names, the system may report a deleted one
         return None

@@ -1,4 +1,4 @@
-"""Messages into an MCAP file, in the caller's thread. Equal messages make equal files."""
+"""Writes messages to an MCAP file, in the caller's thread. Equal messages make equal files."""
 
 import json
 from collections.abc import Mapping
@@ -21,19 +21,20 @@ from tvist_protocol.recorded import (
 )
 
 CHUNK_SIZE = 64 * 1024
-"""Bytes compressed at once. Some 70 states: what a killed process loses, and half a millisecond of work; a
-megabyte, the library's default, would stall for several ticks."""
+"""Bytes compressed at once: some 70 states, which take half a millisecond and are lost if the process is killed. A
+megabyte, the library's default, would stall for several ticks.
+"""
 
 
 def heading(info: Info, start: Mapping[str, Any]) -> dict[str, str]:
-    """What stands at the beginning of a recording.
+    """Return the metadata at the beginning of a recording.
 
     Args:
-        info: The robot.
-        start: How the server was started, as JSON knows it.
+        info: Description of the robot.
+        start: How the server was started, as JSON types.
 
     Raises:
-        TypeError: `start` holds what JSON cannot.
+        TypeError: `start` holds a value that JSON cannot represent.
         ValueError: `start` holds a number that is not finite.
     """
     return {
@@ -49,10 +50,10 @@ class RecordingWriter:
     Args:
         stream: Stream to write to; the caller closes it.
         topic_of: Topic of each kind of message.
-        heading: What stands at its beginning.
+        heading: Metadata at its beginning.
 
     Raises:
-        OSError: The stream does not take it.
+        OSError: The stream cannot be written to.
     """
 
     def __init__(
@@ -71,21 +72,21 @@ class RecordingWriter:
         """Add a message.
 
         Raises:
-            OSError: The stream does not take it.
-            TypeError: The message holds what JSON cannot, a numpy number for instance.
+            OSError: The stream cannot be written to.
+            TypeError: The message holds a value that JSON cannot represent, such as a numpy number.
         """
         time = message.tick * TICK_NS
         self._writer.add_message(self._channels[type(message)], time, to_json(message), time)
 
     def flush(self) -> None:
-        """Hand complete chunks to the system, so that they outlive this process."""
+        """Pass complete chunks to the operating system, so that they survive the end of this process."""
         self._stream.flush()
 
     def finish(self, dropped: Mapping[type[msgspec.Struct], int]) -> None:
-        """Write the last chunk, what was dropped, and the index. Nothing can be added after it.
+        """Write the last chunk, the numbers of dropped messages and the index. Nothing can be added afterwards.
 
         Raises:
-            OSError: The stream does not take it.
+            OSError: The stream cannot be written to.
         """
         counts = {tag(kind): str(dropped.get(kind, 0)) for kind in self._channels}
         self._writer.add_metadata(END_METADATA, counts)

@@ -1,4 +1,4 @@
-"""UR's own interfaces to the controller that Zenoh's clients use, too.
+"""UR's own interfaces, connected to the same controller as Zenoh.
 
-Each is a codec and a session without socket or clock; `interfaces` opens them.
+Each interface consists of a codec and a session without socket or clock; `interfaces` opens the sockets.
 """

@@ -1,4 +1,4 @@
-"""What UR's interfaces have in common: a session is one client's connection to one of them, without its socket."""
+"""Common parts of UR's interfaces. A session is one client's connection to one interface, without its socket."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -10,69 +10,70 @@ from tvist_protocol.replies import Reply
 from tvist_protocol.stream import Event
 
 Send = Callable[[bytes], None]
-"""Sends an answer, which is never dropped."""
+"""Sends an answer; answers are never dropped."""
 Then = Callable[[Reply], None]
-"""Takes the controller's reply to a command, later."""
+"""Takes the controller's reply to a command, at a later time."""
 
 
 class ControllerAccess(Protocol):
-    """The way of one connection to the controller."""
+    """Access of one connection to the controller."""
 
     peer: str
-    """The client and the interface it uses, in words."""
+    """The client and its interface, as a phrase for messages to people."""
 
     def change(self, command: Callable[[str], Command], then: Then) -> None:
-        """Send a command that needs control, and take control first where nobody has it.
+        """Send a command that needs control; take control first if no client has it.
 
         Args:
-            command: Makes the command with the token of the lease.
-            then: Called exactly once; with the refusal where somebody else holds control.
+            command: Creates the command from the token of the lease.
+            then: Called exactly once; with a refusal if another client has control.
         """
 
     def ask(self, command: Command, then: Then) -> None:
-        """Send a command that needs none."""
+        """Send a command that does not need control."""
 
     def lasting(self) -> "ControllerAccess":
-        """Another one for the same host, that does not end with the connection but by its own `leave`."""
+        """Return another access for the same host, which lasts until its own `leave`, not only for the connection."""
 
     def leave(self) -> None:
-        """Give back what was held by it."""
+        """Give back control, if this access held it."""
 
     @property
     def held_by_other(self) -> bool:
-        """Whether somebody else holds control, as far as is known: commands that change something are refused."""
+        """Whether another client is known to have control, so that commands that change something are refused."""
 
 
 class PortSession(ABC):
-    """One connection. Everything is called in one thread, and nothing waits.
+    """One connection. All methods are called from one thread and do not block.
 
-    Whatever bytes come, nothing here raises: what is wrong is answered in the interface's own way.
+    The methods do not raise, whatever bytes arrive: errors are answered in the interface's own way.
     """
 
     over = False
-    """Whether the client has said that it goes: close the connection."""
+    """Whether the client has asked to end the connection, which is then closed."""
     client_begins = False
-    """Whether the interface has nothing for a client that asks for nothing. Such a client has to say something soon
-    after it came, and may have to give up its place later."""
+    """Whether the interface sends nothing to a client that requests nothing. Such a client has to send something soon
+    after it connects, and may later be disconnected to make room.
+    """
 
     @property
     def served(self) -> bool:
-        """Whether the client is being sent what it asked for: it may well be silent meanwhile."""
+        """Whether the client is being sent what it requested; it may then be silent for any time."""
         return False
 
-    def opened(self) -> None:  # noqa: B027  not every one has to
-        """The client is there: send what it is greeted with."""
+    def opened(self) -> None:  # noqa: B027  not every session has to
+        """Send the greeting, if any, to a client that has just connected."""
 
     @abstractmethod
     def receive(self, data: bytes) -> None:
-        """Take what arrived, cut anywhere."""
+        """Take data that arrived; it may be split anywhere."""
 
-    def sample(self, snapshot: Snapshot) -> bytes:  # noqa: ARG002  many have none
-        """What this tick has for the client; empty for nothing. It is dropped where the client is slow."""
+    def sample(self, snapshot: Snapshot) -> bytes:  # noqa: ARG002  many sessions send nothing
+        """Return the data that this tick sends to the client, or nothing. It is dropped if the client is slow."""
         return b""
 
-    def event(self, event: Event) -> None:  # noqa: B027  not every one has to
-        """Something happened at the robot."""
+    def event(self, event: Event) -> None:  # noqa: B027  not every session has to
+        """Handle an event of the robot."""
 
-    def closed(self) -> None:  # noqa: B027  not every one has to
-        """The connection is gone: give back what it held."""
+    def closed(self) -> None:  # noqa: B027  not every session has to
+        """Give back what the connection held, after it was closed."""

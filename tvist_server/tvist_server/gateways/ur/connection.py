@@ -1,4 +1,4 @@
-"""A socket of an interface, and the session behind it."""
+"""One client's socket, and the session behind it."""
 
 import asyncio
 import ipaddress
@@ -17,34 +17,36 @@ from tvist_server.gateways.ur.places import Places
 log = logging.getLogger(__name__)
 
 PIECE = 256
-"""Bytes read from a client at a time, so that one that floods its interface waits its turn."""
+"""Bytes read from a client at a time, so that a client that floods its interface does not delay the others."""
 MAX_COMMANDS = 32
-"""Commands of a client that may wait for the controller's answers before more is taken of it: a tick does them all."""
+"""Commands of a client that may wait for answers before reading from it pauses, since one tick carries out all of
+them.
+"""
 MAX_UNREAD = 1_000_000
-"""Bytes that may wait for a client that does not read them; then it is cut off."""
+"""Unread bytes at which a client is disconnected."""
 HEARS = MAX_UNREAD // 4
-"""Unread bytes above which, in real time, a client gets no messages that go to all clients."""
+"""Unread bytes above which, in real time, a client no longer gets messages that are sent to all clients."""
 ANSWERS = MAX_UNREAD // 2
-"""Unread bytes above which, in real time, nothing more is read from a client until it has read."""
+"""Unread bytes above which, in real time, reading from a client pauses until it has read."""
 MAX_UNREAD_LOCKSTEP = 64_000_000
-"""Limit in lockstep, where samples wait as well: a minute of them."""
+"""Limit in lockstep, where samples wait as well: a minute of samples."""
 
 FIRST_WORD = 30.0
-"""Time in which a client has to say something where it has to begin [s]."""
+"""Time within which a client has to send something if it has to begin [s]."""
 
 MakeSession = Callable[[ConnectionControl, Send], PortSession]
-"""Makes an interface's session: the way to the controller, and the way back."""
+"""Creates an interface's session from its access to the controller and the function that sends to the client."""
 
 
 class Connection(asyncio.BufferedProtocol):
     """One client at one interface.
 
     Args:
-        make: Its session.
-        lease: Control for a host.
-        places: Places of the robot; the connection occupies one as long as it lives.
-        notices: Tells the server's console what was done with whom.
-        lossless: Whether samples wait for a client that is slow: where a client lets time pass.
+        make: Creates its session.
+        lease: Returns the lease of a host.
+        places: Places of the robot; the connection occupies one until it is closed.
+        notices: Notices on the server's console.
+        lossless: Whether samples wait for a slow client, because a client advances time.
     """
 
     def __init__(
@@ -65,19 +67,19 @@ class Connection(asyncio.BufferedProtocol):
         self._transport: asyncio.Transport | None = None
         self._piece = bytearray(PIECE)
         self._behind = False
-        """Whether the client leaves its answers unread."""
+        """Whether the client has left many answers unread."""
         self._first_word: asyncio.TimerHandle | None = None
-        """What ends the connection of a client that says nothing."""
+        """Timer that disconnects a client that sends nothing."""
         self.session: PortSession | None = None
         self.peer = "a client"
-        """The client and the interface it uses, in words."""
+        """The client and its interface, as a phrase for messages to people."""
         self.heard = 0.0
-        """When it last sent something, or came [s of the loop's clock]."""
+        """When the client last sent something, or connected [s of the loop's clock]."""
         self.dropped = 0
-        """Samples that a slow client did not get."""
+        """Number of samples that were dropped because the client is slow."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """A client came."""
+        """Start a session, unless all places are taken."""
         stream = cast("asyncio.Transport", transport)
         (host, port), (own, own_port) = (stream.get_extra_info(end)[:2] for end in ("peername", "sockname"))
         self.peer = f"the client {host}:{port} of port {own_port}"
@@ -97,12 +99,12 @@ class Connection(asyncio.BufferedProtocol):
             self._first_word = loop.call_later(FIRST_WORD, self._said_nothing)
         self._guarded(self.session.opened)
 
-    def get_buffer(self, sizehint: int) -> bytearray:  # noqa: ARG002  it is always the same
+    def get_buffer(self, sizehint: int) -> bytearray:  # noqa: ARG002  the size is fixed
         """Return the buffer for the next piece of data."""
         return self._piece
 
     def buffer_updated(self, nbytes: int) -> None:
-        """The client sent something."""
+        """Pass received data to the session."""
         session = self.session
         self.heard = asyncio.get_running_loop().time()
         if self._first_word is not None:
@@ -114,22 +116,22 @@ class Connection(asyncio.BufferedProtocol):
             self._listen()
 
     def pause_writing(self) -> None:
-        """The client does not read what it asked for."""
+        """Note that the client has stopped reading, and pause reading from it."""
         self._behind = True
         self._listen()
 
     def resume_writing(self) -> None:
-        """It has read."""
+        """Note that the client has caught up, and resume reading from it."""
         self._behind = False
         self._listen()
 
     def _hear(self, answer: Callable[[], None]) -> None:
-        """The controller has answered."""
+        """Handle an answer of the controller."""
         self._guarded(answer)
         self._listen()
 
     def _listen(self) -> None:
-        """Take more of the client, unless it has to wait, or goes."""
+        """Resume or pause reading from the client, or close the connection if its session is over."""
         session, transport = self.session, self._transport
         if session is None or transport is None or transport.is_closing():
             return
@@ -140,8 +142,8 @@ class Connection(asyncio.BufferedProtocol):
         else:
             transport.resume_reading()
 
-    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  however it ended
-        """The client went, or was cut off."""
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  treated alike, whatever the reason
+        """Clean up after the connection was closed by either side."""
         session, self.session = self.session, None
         self._transport = None
         self._places.taken.discard(self)
@@ -157,7 +159,7 @@ class Connection(asyncio.BufferedProtocol):
             self._control.leave()
 
     def send(self, data: bytes) -> None:
-        """Send an answer; a client that does not read is cut off when too much waits."""
+        """Send an answer; disconnect a client that leaves too many bytes unread."""
         transport = self._transport
         if transport is not None and not transport.is_closing():
             transport.write(data)
@@ -166,13 +168,13 @@ class Connection(asyncio.BufferedProtocol):
                 transport.abort()
 
     def tell(self, message: bytes) -> None:
-        """Send what everybody is told; whoever does not read loses it, in real time."""
+        """Send a message that goes to all clients; in real time, a client that does not read misses it."""
         transport = self._transport
         if transport is not None and (self._lossless or transport.get_write_buffer_size() < HEARS):
             self.send(message)
 
     def sample(self, snapshot: Snapshot) -> None:
-        """Send what a tick has for the client; in real time what finds bytes still waiting is dropped, never queued."""
+        """Send the sample of a tick; in real time it is dropped if earlier bytes are still waiting, never queued."""
         session, transport = self.session, self._transport
         if session is None or transport is None or transport.is_closing():
             return
@@ -194,19 +196,19 @@ class Connection(asyncio.BufferedProtocol):
             transport.write(data)
 
     def event(self, event: Event) -> None:
-        """Tell of an event."""
+        """Pass an event to the session."""
         session = self.session
         if session is not None:
             self._guarded(lambda: session.event(event))
 
     @property
     def dispensable(self) -> bool:
-        """Whether it may have to go for a newcomer."""
+        """Whether the client may be disconnected to make room for another."""
         session = self.session
         return session is not None and session.client_begins and not session.served
 
     def cut_off(self) -> None:
-        """End it at once, whatever still waits to be read."""
+        """Close the connection at once, even if the client has yet to read something."""
         if self._transport is not None:
             self._transport.abort()
 
@@ -216,12 +218,12 @@ class Connection(asyncio.BufferedProtocol):
         self.cut_off()
 
     def close(self) -> None:
-        """End it; what waits for a client that reads is still sent."""
+        """Close the connection after sending what a client that reads still has to get."""
         if self._transport is not None:
             self._transport.close()
 
     def _guarded(self, action: Callable[[], None]) -> None:
-        """One client's fault is no other's: an error of ours ends its connection, loudly."""
+        """Call a function; log an error in it and end only this connection, so that other clients are not affected."""
         try:
             action()
         except Exception:

@@ -1,36 +1,36 @@
-"""Input variables of one robot: who may write which, and what was written."""
+"""Input variables of one robot: which connection may write each, and what was written."""
 
 from collections.abc import Hashable
 
 
 class InputOwners:
-    """Each variable belongs to the connection that asked for it first, until that is closed."""
+    """Each variable belongs to the first connection that asked for it, until that connection is closed."""
 
     def __init__(self) -> None:
         self._owners: dict[str, object] = {}
         self.ledger = Ledger()
-        """What was written, whoever did."""
+        """Values that were written, by any connection."""
 
     def is_free(self, name: str, connection: object) -> bool:
-        """Whether nobody else owns the variable."""
+        """Return whether no other connection owns the variable."""
         return self._owners.get(name, connection) is connection
 
     def take(self, names: tuple[str, ...], connection: object) -> None:
-        """Make variables belong to a connection; they must be free."""
+        """Make a connection the owner of variables, which must be free."""
         for name in names:
             self._owners[name] = connection
 
     def release(self, connection: object) -> None:
-        """Give back everything a connection owns."""
+        """Release all variables that a connection owns."""
         self._owners = {name: owner for name, owner in self._owners.items() if owner is not connection}
 
 
 class Ledger:
-    """What was asked of the controller, so that nothing is asked twice.
+    """Values requested from the controller, so that no value is requested twice.
 
-    Clients repeat what they set five hundred times a second, and what the robot tells of its terminals and registers
-    comes some ticks after it was set: a value is news where it differs from the last one asked for, and where the
-    robot shows another although its answer is there, since somebody else has set it meanwhile.
+    Clients repeat their values five hundred times a second, and the robot publishes its terminals and registers some
+    ticks after they were set. A value is therefore news if it differs from the last one requested, or if that request
+    has been answered and the robot shows another value, because another client has set it since.
     """
 
     def __init__(self) -> None:
@@ -38,24 +38,24 @@ class Ledger:
         self._waiting: dict[Hashable, object] = {}
 
     def is_news(self, key: Hashable, value: object, present: object) -> bool:
-        """Whether to ask for a value.
+        """Return whether to request a value.
 
         Args:
             key: Key of the terminal or register.
-            value: Wanted.
-            present: What the robot told last; None where it has told nothing.
+            value: Requested value.
+            present: Value that the robot published last; None if it has published none.
         """
         if key in self._waiting:
             return self._waiting[key] != value
         return value != present or self._asked.get(key, value) != value
 
     def ask(self, values: dict[Hashable, object]) -> None:
-        """These are on their way."""
+        """Note that these values were requested."""
         self._asked |= values
         self._waiting |= values
 
     def answered(self, values: dict[Hashable, object]) -> None:
-        """The controller has taken or refused them."""
+        """Note that the controller has accepted or refused these values."""
         for key, value in values.items():
             if self._waiting.get(key) == value:
                 del self._waiting[key]

@@ -1,4 +1,4 @@
-"""The interfaces of one robot: a listening socket each, and the clients connected to it."""
+"""The interfaces of one robot: a listening socket for each, and the connected clients."""
 
 import asyncio
 import contextlib
@@ -33,33 +33,34 @@ from tvist_server.ur_ports import InterfaceName
 log = logging.getLogger(__name__)
 
 SEND_BUFFER = 32_768
-"""What the system holds for a client [bytes]: a tenth of a second of samples; more would only be older."""
+"""System's send buffer for a client [bytes]: a tenth of a second of samples; a larger one would only add delay."""
 PROBES = (10, 5, 3)
-"""A client that is silent so long [s] is asked for a sign of life at such intervals [s]; after so many without one
-it is gone, and its control with it: its machine may have lost power or network."""
+"""TCP keepalive: idle time before the first probe [s], time between probes [s], and number of unanswered probes after
+which a client counts as disconnected and loses control. Its machine may have lost power or network.
+"""
 FIRST = 1000
-"""Ticks that the first one may take."""
+"""Longest wait for the first tick [ticks]."""
 MAX_PENDING = 250
-"""States that may wait for this thread: half a second."""
+"""States that may wait for the interfaces' thread: half a second."""
 LEAD = 20
-"""Largest lead in lockstep: the further a step runs ahead of what clients are told, the later their answers come."""
+"""Largest lead in lockstep; the further a step runs ahead of published states, the later clients get answers."""
 PAUSE = 0.02
-"""Time between two looks for room, in lockstep [s]."""
+"""Time between two checks for room, in lockstep [s]."""
 
 
 class UrInterfaces(Gateway):
-    """A robot's interfaces. They are bound at once, and open with `open`.
+    """A robot's interfaces. The constructor binds the sockets; `open` lets clients in.
 
     Args:
-        desk: The robot.
-        description: What it is.
-        name: On the network.
-        address: IP address to listen at.
-        ports: Port by interface; an interface without one stays shut.
-        lockstep: Whether a client lets time pass: then no state may be lost.
+        desk: The robot's desk.
+        description: Description of the robot.
+        name: Name of the robot on the network.
+        address: IP address to listen on.
+        ports: Port of each interface; an interface without a port stays closed.
+        lockstep: Whether a client advances time, so that no state may be lost.
 
     Raises:
-        GatewayError: A port cannot be listened on.
+        GatewayError: The server cannot listen on a port.
     """
 
     def __init__(
@@ -82,13 +83,13 @@ class UrInterfaces(Gateway):
         self._instruments = Instruments(description)
         self._io: Io | None = None
         self._early = deque[State](maxlen=FIRST)
-        """States before the interfaces open: temperatures and energies begin with the first tick."""
+        """States from before the interfaces open, since temperatures and energies begin with the first tick."""
         self._connections: set[Connection] = set()
-        """Connections in their `Places` while the interfaces are open."""
+        """Connections that have a place while the interfaces are open."""
         self._leases = WeakValueDictionary[str, HostLease]()
-        """By host, as long as one of its connections lives."""
+        """Lease of each host; it exists as long as one of the host's connections."""
         self._lockstep = lockstep
-        # Each is counted by one thread alone.
+        # Each of these counters is written by one thread only.
         self._handed, self._taken = 0, 0
         self._room = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -104,18 +105,18 @@ class UrInterfaces(Gateway):
 
     @property
     def ports(self) -> dict[InterfaceName, int]:
-        """Port by interface, as they are."""
+        """Actual port of each interface."""
         return {interface: bound.getsockname()[1] for interface, bound in self._sockets.items()}
 
     async def _first_tick(self) -> None:
-        """Wait for it, where time passes by itself: clients that come before would find no controller."""
+        """Wait for the first tick if time passes by itself; earlier clients would find no controller."""
         for _ in range(0 if self._lockstep else FIRST):
             if self._early:
                 return
             await asyncio.sleep(PERIOD)
 
     async def open(self) -> None:
-        """Let clients in, after the first tick; they are served by the running loop."""
+        """Let clients in after the first tick; the running event loop serves them."""
         await self._first_tick()
         self._loop = asyncio.get_running_loop()
         places = Places[Connection](self._loop.time, self._coming_and_going.tell)
@@ -141,8 +142,8 @@ class UrInterfaces(Gateway):
         self._alive = asyncio.create_task(self._keep_alive())
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  not MessagePack here
-        """Hand a message over to the interfaces' thread."""
-        if self._loop is None:  # nobody is in
+        """Pass a message to the interfaces' thread."""
+        if self._loop is None:  # the interfaces are not open
             if isinstance(message, Io):
                 self._io = message
             elif isinstance(message, State):
@@ -159,7 +160,7 @@ class UrInterfaces(Gateway):
             self._soon(lambda: self._on_event(message))
 
     def _has_room(self) -> bool:
-        """Whether one more state may wait; in lockstep there is room in the end."""
+        """Return whether one more state may wait; in lockstep, wait until there is room."""
         most = LEAD if self._lockstep else MAX_PENDING
         while self._handed - self._taken >= most:
             if not self._lockstep or self._loop is None:
@@ -169,21 +170,21 @@ class UrInterfaces(Gateway):
         return True
 
     async def shut(self) -> None:
-        """Let nobody in any more, and everybody out."""
+        """Let no more clients in, and disconnect the present ones."""
         if self._alive is not None:
             self._alive.cancel()
         for server in self._servers:
             server.close()
         for connection in tuple(self._connections):
             connection.close()
-        await asyncio.sleep(0)  # in which they end
+        await asyncio.sleep(0)  # lets the connections end
         self._loop = None
-        self._room.set()  # whoever hands over a state waits for nobody any more
+        self._room.set()  # releases a thread that waits to pass on a state
         self._scripts.flush()
         self._coming_and_going.flush()
 
     def close(self) -> None:
-        """Listen no more. A second call does nothing."""
+        """Stop listening. A second call does nothing."""
         self._loop = None
         self._close_sockets()
 
@@ -197,7 +198,8 @@ class UrInterfaces(Gateway):
     def _see(self, state: State) -> None:
         if self._io is not None:
             if self.robot.latest is not None:
-                # What was made of the last tick knows it: without this both would wait for the collector.
+                # Break the reference cycle between a snapshot and what was computed from it, which only the collector
+                # would free.
                 self.robot.latest.shared.clear()
             snapshot = self.robot.latest = self._instruments.snapshot(state, self._io)
             for connection in tuple(self._connections):
@@ -226,7 +228,7 @@ class UrInterfaces(Gateway):
     def _soon(self, action: Callable[[], None]) -> None:
         loop = self._loop
         if loop is not None:
-            with contextlib.suppress(RuntimeError):  # it is closed: all ends
+            with contextlib.suppress(RuntimeError):  # the loop is closed at shutdown
                 loop.call_soon_threadsafe(action)
 
     async def _keep_alive(self) -> None:
@@ -258,7 +260,7 @@ def _listen(address: str, port: int, interface: InterfaceName) -> socket.socket:
     bound = socket.socket(family, socket.SOCK_STREAM)
     try:
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        # Those of its clients have these, too.
+        # Accepted sockets inherit these options.
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
         for option, value in zip(

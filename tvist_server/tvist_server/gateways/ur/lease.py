@@ -1,7 +1,7 @@
-"""Control for clients without leases: the interfaces take it for a host with the first command that changes something.
+"""Control for clients without leases: a host gets control with its first command that changes something.
 
-All connections of a host share it, since a client opens several, one for commands, one for inputs, one to listen.
-It is given back when the last of them that used it is closed.
+All connections of a host share the lease, because a client opens several: one for commands, one for inputs, one to
+listen. Control is given back when the last connection that used it is closed.
 """
 
 from collections.abc import Callable
@@ -12,9 +12,9 @@ from tvist_server.gateways.base import Desk
 from tvist_server.gateways.ur.base import ControllerAccess, Then
 
 LEASE = 3600.0
-"""How long it lasts without a sign of life [s]; there is one every `ALIVE`."""
+"""Duration of the lease without renewal [s]; it is renewed every `ALIVE`."""
 ALIVE = 10.0
-"""[s]."""
+"""Time between two renewals of the lease [s]."""
 _LOST = {"no_control", "stale_token"}
 _NO_TOKEN = ""
 
@@ -28,12 +28,12 @@ class HostLease:
     Args:
         desk: The robot.
         host: Address of the host.
-        soon: Back into the interfaces' thread.
+        soon: Schedules a call in the interfaces' thread.
     """
 
     def __init__(self, desk: Desk, host: str, soon: Soon) -> None:
         self.client = f"ur-{host}"
-        """Under which the lease is held."""
+        """Name under which the lease is held."""
         self._desk = desk
         self._soon = soon
         self._token = _NO_TOKEN
@@ -49,7 +49,8 @@ class HostLease:
             return
 
         def again(reply: Reply) -> None:
-            # The lease was lost since: somebody else's power, or a reset. It may be free again.
+            # The lease has been lost since, through another client's power command or a reset. Control may be free
+            # again.
             if isinstance(reply, Refused) and reply.code in _LOST and reply.where == "token":
                 self._token = _NO_TOKEN
                 self._wait(command, then)
@@ -59,33 +60,33 @@ class HostLease:
         self.ask(command(self._token), again)
 
     def ask(self, command: Command, then: Then) -> None:
-        """Send a command as it is."""
+        """Send a command unchanged."""
         self._desk.command(command, lambda reply: self._soon(lambda: then(reply)))
 
     def leave(self, connection: object) -> None:
-        """A connection is closed; with the last one that used it control is given back."""
+        """Note that a connection is closed; give back control if it was the last one that used it."""
         self._users.discard(connection)
         if not self._users and self._token != _NO_TOKEN:
             self.ask(ReleaseControl(token=self._token), self._gone)
             self._token = _NO_TOKEN
 
     def _gone(self, _: Reply) -> None:
-        """Control was given back; unless somebody has come meanwhile, the client is there no more."""
+        """After control was given back, report the client as gone, unless a connection has begun to use it again."""
         if not self._users:
             self._desk.client_gone(self.client)
 
     def keep_alive(self) -> None:
-        """Renew the lease, where there is one."""
+        """Renew the lease, if there is one."""
         if self._token != _NO_TOKEN:
             self.ask(KeepAlive(token=self._token), _nothing)
 
     @property
     def held_by_other(self) -> bool:
-        """Whether somebody else has control."""
+        """Whether another client has control."""
         return self._desk.holder() not in {None, self.client}
 
     def _wait(self, command: Callable[[str], Command], then: Then) -> None:
-        """Send a command once there is control."""
+        """Send a command as soon as the host has control."""
         self._waiting.append((command, then))
         if not self._taking:
             self._taking = True
@@ -99,7 +100,7 @@ class HostLease:
             self._token = reply.token
             for command, then in waiting:
                 self.ask(command(self._token), then)
-            if not self._users:  # they went meanwhile
+            if not self._users:  # all of them have disconnected since
                 self.leave(None)
         else:
             self._desk.client_gone(self.client)
@@ -108,12 +109,12 @@ class HostLease:
 
 
 class ConnectionControl(ControllerAccess):
-    """One connection's way to the controller.
+    """One connection's access to the controller.
 
     Args:
         lease: Lease of the client's host.
-        hear: Called with each answer, as a call to make.
-        peer: Name of the client, for people; by default its host.
+        hear: Called with each answer, as a function to call.
+        peer: Name of the client in messages to people; by default its host.
     """
 
     def __init__(
@@ -126,14 +127,14 @@ class ConnectionControl(ControllerAccess):
         self._lease = lease
         self._hear = hear or _at_once
         self.unanswered = 0
-        """Commands whose answers are still to come."""
+        """Number of commands that are not yet answered."""
 
     def change(self, command: Callable[[str], Command], then: Then) -> None:
         """Send a command that needs control."""
         self._lease.change(self, command, self._counted(then))
 
     def ask(self, command: Command, then: Then) -> None:
-        """Send a command that needs none."""
+        """Send a command that does not need control."""
         self._lease.ask(command, self._counted(then))
 
     def _counted(self, then: Then) -> Then:
@@ -147,15 +148,15 @@ class ConnectionControl(ControllerAccess):
 
     @property
     def held_by_other(self) -> bool:
-        """Whether somebody else has control."""
+        """Whether another client has control."""
         return self._lease.held_by_other
 
     def lasting(self) -> "ConnectionControl":
-        """Another one for the same host, that does not end with the connection."""
+        """Return a further access for the same host, which does not end with the connection."""
         return ConnectionControl(self._lease)
 
     def leave(self) -> None:
-        """The connection is closed, or what lasted beyond it is over."""
+        """Give back control, when the connection or what outlasted it has ended."""
         self._lease.leave(self)
 
 

@@ -1,4 +1,4 @@
-"""Robot messages: packages of type 20, which tell that something happened.
+"""Robot messages: packages of type 20, which report events.
 
 int32 length, uint8 20, uint64 time [µs], uint8 source, uint8 kind, body; big-endian.
 """
@@ -11,9 +11,9 @@ from tvist_controller.instruments.snapshot import Snapshot
 
 ROBOT_MESSAGE: Final = 20
 SOURCE: Final = 254
-"""-2: of no joint and no board."""
+"""Source -2, which is neither a joint nor a board."""
 LONGEST: Final = 1000
-"""Bytes of a text: some clients take packages of more than 2000 for garbage."""
+"""Longest text [bytes]: some clients reject packages of more than 2000 bytes."""
 
 PROTECTIVE_STOP: Final = 209
 READ_ONLY: Final = 210
@@ -41,7 +41,7 @@ class MessageKind(IntEnum):
 
 
 class ErrorLevel(IntEnum):
-    """How bad an error is."""
+    """Severity of an error."""
 
     DEBUG = 0
     INFO = 1
@@ -52,52 +52,52 @@ class ErrorLevel(IntEnum):
 
 
 def stamp(snapshot: Snapshot | None) -> int:
-    """Time of a tick as packages say it; 0 before the first [µs]."""
+    """Return the time of a tick as packages state it [µs]; 0 before the first tick."""
     return 0 if snapshot is None else round(1e6 * snapshot.timestamp)
 
 
 def version(major: int, minor: int, bugfix: int, build: int, date: str) -> bytes:
-    """What runs on the controller: the first message a client gets."""
+    """Encode the version of the software, which is the first message that a client gets."""
     name = b"URControl"
     body = bytes([len(name)]) + name + _VERSION.pack(major, minor, bugfix, build) + _text(date)
     return _message(0, MessageKind.VERSION, body)
 
 
 def text(time: int, what: str) -> bytes:
-    """A line for the log."""
+    """Encode a line for the log."""
     return _message(time, MessageKind.TEXT, _text(what))
 
 
 def key(time: int, title: str, what: str) -> bytes:
-    """A program has started or stopped: `PROGRAM_XXX_STARTED` or `PROGRAM_XXX_STOPPED`, and its name."""
+    """Encode that a program has started or stopped: `PROGRAM_XXX_STARTED` or `PROGRAM_XXX_STOPPED`, and its name."""
     head = _text(title, 255)
     return _message(time, MessageKind.KEY, _KEY.pack(0, 0, len(head)) + head + _text(what))
 
 
 def runtime_exception(time: int, line: int, column: int, what: str) -> bytes:
-    """A program cannot go on, or cannot begin.
+    """Encode that a program cannot continue or cannot begin.
 
     Args:
-        time: [µs].
+        time: Time of the message [µs].
         line: Line, 1 for the first.
         column: Column in the line, 1 for the first.
-        what: Why.
+        what: Reason.
     """
     return _message(time, MessageKind.RUNTIME_EXCEPTION, _PLACE.pack(line, column) + _text(what))
 
 
 def error_code(time: int, code: int, argument: int, level: ErrorLevel, what: str) -> bytes:
-    """An error by its number, without data."""
+    """Encode an error by its number, without data."""
     return _message(time, MessageKind.ERROR_CODE, _ERROR.pack(code, argument, level, 0, 0) + _text(what))
 
 
 def safety_mode(time: int, mode: int) -> bytes:
-    """The safety mode has changed to this, RTDE's number."""
+    """Encode a change to this safety mode, given as RTDE's number."""
     return _message(time, MessageKind.SAFETY_MODE, _SAFETY.pack(0, 0, mode & 0xFF, 0, 0))
 
 
 def popup(time: int, title: str, what: str) -> bytes:
-    """A window for the person at the robot, that waits for no answer."""
+    """Encode a pop-up window for the person at the robot; it expects no answer."""
     head = _text(title, 255)
     return _message(
         time, MessageKind.POPUP, _POPUP.pack(0, 0, False, False, False, len(head)) + head + _text(what)
@@ -109,5 +109,5 @@ def _message(time: int, kind: MessageKind, body: bytes) -> bytes:
 
 
 def _text(what: str, most: int = LONGEST) -> bytes:
-    """UTF-8, cut between two characters."""
+    """UTF-8, cut at a boundary between two characters."""
     return what.encode(errors="replace")[:most].decode(errors="ignore").encode()

@@ -9,10 +9,10 @@ EVERY: Final = 1.0
 
 
 class Notices:
-    """Says at most one line a second, however many there are to say.
+    """Writes at most one line a second, however many are passed to it.
 
-    The first line is said at once. Of those that follow within a second the newest is said when the second is
-    over, with the number of the others, which are left out. All methods are called in the event loop's thread.
+    The first line is written at once. Of the lines that follow within a second, only the newest is written when the
+    second is over, together with the number of lines left out. All methods are called in the event loop's thread.
 
     Args:
         say: Takes a line, without its line feed.
@@ -25,7 +25,7 @@ class Notices:
         self._pause: asyncio.TimerHandle | None = None
 
     def tell(self, line: str) -> None:
-        """Say a line, now or when its turn has come."""
+        """Write a line now, or when a second has passed since the last one."""
         if self._pause is not None:
             self._newest = line
             self._waiting += 1
@@ -34,7 +34,7 @@ class Notices:
         self._pause = asyncio.get_running_loop().call_later(EVERY, self._go_on)
 
     def flush(self) -> None:
-        """Say what waits, at the end: no timer will."""
+        """Write the waiting line at shutdown, when no timer will."""
         if self._pause is not None:
             self._pause.cancel()
             self._pause = None

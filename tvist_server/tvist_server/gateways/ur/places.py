@@ -4,11 +4,11 @@ from collections.abc import Callable
 from typing import Final, Generic, Protocol, TypeVar
 
 MOST: Final = 256
-"""Connections to all interfaces of a robot together."""
+"""Largest number of connections to all interfaces of a robot together."""
 KEPT: Final = 8
 """Number of places kept for clients on this machine, so that a local user can always connect."""
 SCARCE: Final = 0.9
-"""Share of the places that may be taken before somebody has to go for each newcomer [-]."""
+"""Share of the places above which each new client displaces another [-]."""
 
 
 class Occupant(Protocol):
@@ -16,50 +16,50 @@ class Occupant(Protocol):
 
     @property
     def peer(self) -> str:
-        """Name of the client, for people."""
+        """Name of the client in messages to people."""
 
     @property
     def heard(self) -> float:
-        """When it last sent something, or came, if it never has [s]."""
+        """When the client last sent something; if it never has, when it connected [s]."""
 
     @property
     def dispensable(self) -> bool:
-        """Whether it may have to go for a newcomer: nothing is sent to it unless it asks."""
+        """Whether the client may be disconnected for a new one, because nothing is sent to it unless it asks."""
 
     def cut_off(self) -> None:
-        """End the connection at once."""
+        """Close the connection at once."""
 
 
 AnOccupant = TypeVar("AnOccupant", bound=Occupant)
 
 
 class Places(Generic[AnOccupant]):
-    """Lets clients in.
+    """Decides which clients may connect.
 
-    When nine places of ten are taken, each newcomer sends away the dispensable client that has been silent for
-    longest, counted from when it last sent something. Dispensable are clients of the dashboard, and those of RTDE
-    that are not being served: RTDE serves a client from its start to its pause, during which it may well only
-    read. Whoever is served stays, and so does whoever reads from the other interfaces. A newcomer is turned away only
-    where all places are taken by such clients: a flood of newcomers then disturbs nobody who is at work.
+    When nine places of ten are taken, each new client displaces the dispensable client that has been silent for
+    longest. Dispensable are clients of the dashboard, and clients of RTDE that are not being served: RTDE serves a
+    client from its start to its pause, and during this time the client may only read. Clients that are being served
+    stay connected, and so do those that read from the other interfaces. A new client is turned away only if such
+    clients take all places, so a flood of new clients does not disturb those that are working.
 
     Args:
-        now: The time by which `Occupant.heard` is told [s].
+        now: Returns the time on the same clock as `Occupant.heard` [s].
         note: Takes a sentence for the server's console.
-        most: Connections.
+        most: Largest number of connections.
     """
 
     def __init__(self, now: Callable[[], float], note: Callable[[str], None], most: int = MOST) -> None:
         self.taken: set[AnOccupant] = set()
-        """Everybody who has a place; `Occupant` itself enters and leaves."""
+        """Clients that have a place; each adds and removes itself."""
         self._now = now
         self._note = note
         self._most = most
 
     def make_room(self, peer: str, *, local: bool) -> bool:
-        """Whether a newcomer may come in; if need be somebody goes first.
+        """Return whether a new client may connect; if necessary, disconnect another one first.
 
         Args:
-            peer: Name of the new client, for people.
+            peer: Name of the new client in messages to people.
             local: Whether it is on this machine.
         """
         if len(self.taken) >= SCARCE * self._most:

@@ -1,4 +1,4 @@
-"""Power, brakes and protective stops, as the dashboard and the primary interface ask for them."""
+"""Power, brakes and protective stops, as requested on the dashboard and the primary interface."""
 
 from collections.abc import Callable
 
@@ -9,11 +9,11 @@ from tvist_server.gateways.ur.base import ControllerAccess
 from tvist_server.gateways.ur.robot import UrRobot
 
 Outcome = Callable[[Refused | None], None]
-"""Takes the refusal, or None where it is as it was asked for."""
+"""Takes the refusal, or None if the robot is in the requested mode."""
 
 
 def power_on(robot: UrRobot, control: ControllerAccess, outcome: Outcome) -> None:
-    """Power an arm that has none; the brakes go on holding it."""
+    """Power on an arm that is off; its brakes stay closed."""
     there = (RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING)
     _change(
         control,
@@ -24,7 +24,7 @@ def power_on(robot: UrRobot, control: ControllerAccess, outcome: Outcome) -> Non
 
 
 def release_brakes(robot: UrRobot, control: ControllerAccess, outcome: Outcome) -> None:
-    """Make the arm ready to move, from wherever it is."""
+    """Make the arm ready to move, from any mode."""
     _change(
         control,
         lambda token: PowerOn(token=token),
@@ -34,12 +34,12 @@ def release_brakes(robot: UrRobot, control: ControllerAccess, outcome: Outcome) 
 
 
 def power_off(control: ControllerAccess, outcome: Outcome) -> None:
-    """Take the arm's power, once it stands; no program survives it."""
+    """Power off the arm once it stands still; this ends any program."""
     _change(control, lambda token: PowerOff(token=token), outcome, lambda: False)
 
 
 def restart_safety(robot: UrRobot, control: ControllerAccess, outcome: Outcome) -> None:
-    """Restart the safety system after a violation or a fault; otherwise take the arm's power, as a restart does."""
+    """Restart the safety system after a violation or a fault; otherwise power off the arm, as a restart does."""
     latest = robot.latest
     if latest is not None and latest.safety_mode in (SafetyMode.VIOLATION, SafetyMode.FAULT):
         _change(control, lambda token: RestartSafety(token=token), outcome, lambda: False)
@@ -48,7 +48,7 @@ def restart_safety(robot: UrRobot, control: ControllerAccess, outcome: Outcome) 
 
 
 def unlock(robot: UrRobot, control: ControllerAccess, outcome: Outcome) -> None:
-    """Leave a protective stop; where there is none, nothing is left to do."""
+    """Unlock a protective stop; without one, there is nothing to do."""
     _change(
         control,
         lambda token: UnlockProtectiveStop(token=token),
@@ -60,7 +60,7 @@ def unlock(robot: UrRobot, control: ControllerAccess, outcome: Outcome) -> None:
 def _change(
     control: ControllerAccess, command: Callable[[str], Command], outcome: Outcome, there: Callable[[], bool]
 ) -> None:
-    """Ask for a change; a robot that refuses it since it is already so has nothing against it."""
+    """Request a change; a refusal counts as success if the robot is already in the requested mode."""
 
     def then(reply: Reply) -> None:
         refused = reply if isinstance(reply, Refused) else None

@@ -1,4 +1,4 @@
-"""The controller's program as clients of UR's interfaces know it: by paths, key messages and runtime exceptions."""
+"""The controller's program as UR's interfaces present it: by path, key message and runtime exception."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import PurePosixPath
@@ -14,31 +14,31 @@ from tvist_server.gateways.ur import messages
 from tvist_server.gateways.ur.base import ControllerAccess
 
 FOLDER = "/programs"
-"""Folder in which a controller keeps programs; every other folder is accepted as well."""
+"""Folder in which a controller keeps programs; every other folder is accepted too."""
 
 Heard = Callable[[bool], None]
-"""Takes whether it was done."""
+"""Takes whether the request succeeded."""
 
 
 class ProgramRobot(Protocol):
-    """What the program's messages need of its robot."""
+    """Access to the robot, as far as the program's messages need it."""
 
     @property
     def latest(self) -> Snapshot | None:
-        """The last tick; None before the first."""
+        """Snapshot of the last tick; None before the first."""
 
     def tell(self, message: bytes) -> None:
         """Send a robot message to all clients that get them."""
 
 
 class Programs:
-    """Asks the controller to load, play, pause and stop, and tells clients what becomes of it.
+    """Asks the controller to load, play, pause and stop a program, and reports its state to clients.
 
-    What it knows it has from replies and from `io`, which come in the controller's order.
+    It learns the program's state from replies and from `io`, which arrive in the controller's order.
 
     Args:
-        host: The robot.
-        known: Programs that can be loaded, by name: their moves.
+        host: Access to the robot.
+        known: Programs that can be loaded: name to moves.
     """
 
     def __init__(self, host: ProgramRobot, known: Mapping[str, Sequence[ProgramLine]]) -> None:
@@ -48,7 +48,9 @@ class Programs:
         """Path of the loaded program; None before the first."""
         self.state: ProgramState = "STOPPED"
         self._control: ControllerAccess | None = None
-        """Control of the client that plays the program; it lasts as long as the program, even without the client."""
+        """Access of the client that plays the program. It lasts as long as the program, even after the client
+        disconnects.
+        """
 
     @property
     def name(self) -> str | None:
@@ -62,24 +64,24 @@ class Programs:
 
     @property
     def paused(self) -> bool:
-        """Whether one was paused."""
+        """Whether a program is paused."""
         return self.state == "PAUSED"
 
     @property
     def moves(self) -> bool:
-        """Whether one runs, or is paused, that moves the arm."""
+        """Whether a program that moves the arm is running or paused."""
         return self.state != "STOPPED" and bool(self._known.get(self.name or ""))
 
     def has(self, path: str) -> bool:
-        """Whether there is such a file; folders before its name make no difference."""
+        """Return whether there is such a file; the folders in its path are ignored."""
         return PurePosixPath(path).name in self._known
 
     def load(self, path: str, control: ControllerAccess, heard: Heard) -> None:
-        """Load a program, and stop the one that runs.
+        """Load a program, and stop the running one.
 
         Args:
-            path: Path of the file; folders before its name make no difference.
-            control: Control of the client that loads it.
+            path: Path of the file; its folders are ignored.
+            control: Access of the client that loads it.
             heard: Called once.
         """
         name = PurePosixPath(path).name
@@ -94,11 +96,11 @@ class Programs:
         control.ask(ProgramLoad(name=name), then)
 
     def play(self, control: ControllerAccess, heard: Heard) -> None:
-        """Start the loaded program, or go on with a paused one.
+        """Start the loaded program, or resume a paused one.
 
         Args:
-            control: Control of the client that plays it.
-            heard: Called once, as soon as it runs or cannot.
+            control: Access of the client that plays it.
+            heard: Called once, as soon as the program runs or has failed to start.
         """
         if self.path is None or control.held_by_other:
             heard(False)
@@ -117,10 +119,10 @@ class Programs:
         lasting.change(lambda token: ProgramPlay(token=token), then)
 
     def pause(self, control: ControllerAccess, heard: Heard) -> None:
-        """Hold the program that runs.
+        """Pause the running program.
 
         Args:
-            control: Control of the client that pauses it.
+            control: Access of the client that pauses it.
             heard: Called once.
         """
         if not self.playing or control.held_by_other:
@@ -129,23 +131,23 @@ class Programs:
             control.change(lambda token: ProgramPause(token=token), self._changed("PAUSED", heard))
 
     def stop(self, control: ControllerAccess, heard: Heard) -> None:
-        """End the program, and whatever moves: anyone may.
+        """Stop the program and any motion; no control is needed.
 
         Args:
-            control: Control of the client that stops it.
+            control: Access of the client that stops it.
             heard: Called once.
         """
         control.ask(ProgramStop(), self._changed("STOPPED", heard))
 
     def io(self, io: Io) -> None:
-        """The controller says how it stands."""
+        """Take over the program's state from the controller."""
         if io.program is not None and io.program != self.name:
-            self._become("STOPPED")  # the one before, under its own name
+            self._become("STOPPED")  # the previous program, under its own name
             self.path = f"{FOLDER}/{io.program}"
         self._become(io.program_state)
 
     def event(self, event: Event) -> None:
-        """Something happened at the robot."""
+        """Handle an event of the robot."""
         if event.line is not None:
             stamp = messages.stamp(self._host.latest)
             self._host.tell(messages.runtime_exception(stamp, event.line, 1, event.why or ""))

@@ -1,4 +1,4 @@
-"""UR's real-time interface, ports 30003 and 30013: all there is to know of a tick, at every tick.
+"""UR's real-time interface, ports 30003 and 30013: all values of a tick, at every tick.
 
 One package of 1220 bytes: its length as an int32, then 152 doubles, big-endian.
 """
@@ -31,7 +31,7 @@ LAYOUT: Final[tuple[tuple[str | None, int], ...]] = (
     ("actual_digital_input_bits", 1),
     ("joint_temperatures", 6),
     ("actual_execution_time", 1),
-    (None, 1),  # test value, of UR's own use
+    (None, 1),  # test value, for UR's own use
     ("robot_mode", 1),
     ("joint_mode", 6),
     ("safety_mode", 1),
@@ -55,14 +55,14 @@ LAYOUT: Final[tuple[tuple[str | None, int], ...]] = (
     ("payload_cog", 3),
     ("payload_inertia", 6),
 )
-"""Doubles of the package: the snapshot's value and how many; reserved ones, without a name, are 0."""
+"""Doubles of the package: the snapshot's attribute and its length; reserved ones have no name and are 0."""
 
 PACKAGE: Final = Struct(f">i{sum(count for _, count in LAYOUT)}d")
 _KEY: Final = "realtime"
 
 
 def package(snapshot: Snapshot) -> bytes:
-    """The package of a tick, made once for all clients of a robot."""
+    """Return the package of a tick, which is created once for all clients of a robot."""
     made: bytes | None = snapshot.shared.get(_KEY)
     if made is None:
         values: list[float] = []
@@ -80,13 +80,13 @@ def package(snapshot: Snapshot) -> bytes:
 
 
 class RealtimeSession(PortSession):
-    """One client of the real-time interface. What it sends is taken for URScript, as on the primary interface.
+    """One client of the real-time interface. What it sends is treated as URScript, as on the primary interface.
 
     Args:
-        robot: Robot that ticks.
-        control: The way to its controller.
-        send: Not needed: answers to scripts come on the primary interface.
-        read_only: Whether what the client sends is thrown away.
+        robot: The robot.
+        control: Access to its controller.
+        send: Not used, since scripts are answered on the primary interface.
+        read_only: Whether what the client sends is dropped.
     """
 
     def __init__(
@@ -107,11 +107,11 @@ class RealtimeSession(PortSession):
                 self._orders.carry_out(unit)
 
     def closed(self) -> None:
-        """Say what the client leaves unfinished."""
+        """Report what the client leaves unfinished."""
         unfinished = self._intake.unfinished
         if self._orders is not None and unfinished is not None:
             self._orders.leave(unfinished)
 
     def sample(self, snapshot: Snapshot) -> bytes:
-        """The package of the tick."""
+        """Return the package of the tick."""
         return package(snapshot)

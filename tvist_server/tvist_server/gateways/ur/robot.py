@@ -10,15 +10,15 @@ from tvist_server.gateways.ur.input_owners import InputOwners
 from tvist_server.gateways.ur.programs import Programs
 
 NO_MODE = "NONE"
-"""Operational mode while nobody has set one."""
+"""Operational mode until a client sets one."""
 
 
 class UrRobot:
-    """One robot, as the clients of its interfaces see it.
+    """State of one robot that clients of its interfaces share.
 
     Args:
-        description: The robot.
-        name: On the network.
+        description: Description of the robot.
+        name: Name of the robot on the network.
         tell: Sends a robot message to all clients that get them.
         report: Takes a sentence for the server's console.
     """
@@ -33,9 +33,9 @@ class UrRobot:
         self.description = description
         self.name = name
         self.serial = f"2024550{crc32(name.encode()) % 10_000:04d}"
-        """UR's begin with the year; the last digits stand for the name."""
+        """Serial number: UR's begin with the year; the last digits are derived from the name."""
         self.latest: Snapshot | None = None
-        """The last tick; None before the first."""
+        """Snapshot of the last tick; None before the first."""
         self.operational_mode = NO_MODE
         """Operational mode set by the dashboard."""
         self.inputs = InputOwners()
@@ -48,5 +48,5 @@ class UrRobot:
         self._tell(message)
 
     def report(self, sentence: str) -> None:
-        """Tell the person at the server's console."""
+        """Write a sentence to the server's console."""
         self._report(sentence)

@@ -1,1 +1,1 @@
-"""UR's dashboard server, port 29999: lines of text, each answered with one."""
+"""UR's dashboard server, port 29999: each line of text is answered with one line."""

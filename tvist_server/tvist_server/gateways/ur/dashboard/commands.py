@@ -12,20 +12,20 @@ from tvist_server.gateways.ur.base import ControllerAccess
 from tvist_server.gateways.ur.robot import NO_MODE, UrRobot
 
 UNNAMED: Final = "<unnamed>"
-"""Stands for the program where none is loaded."""
+"""Name of the program while none is loaded."""
 INSTALLATION: Final = "default.installation"
-"""The one there is."""
+"""Name of the only installation."""
 MODES: Final = ("MANUAL", "AUTOMATIC")
 TOO_SOON: Final = (
     "Cannot unlock protective stop until 5s after occurrence. "
     "Always inspect cause of protective stop before unlocking"
 )
-"""Here it means that the arm is still stopping: nobody has to wait longer."""
+"""UR's answer. Here it means that the arm is still stopping; there are no 5 s to wait."""
 
 Answer = Callable[[str], None]
-"""Takes the answer, now or later, once."""
+"""Takes the answer, once, now or later."""
 AtRest = Callable[[bool, Callable[[bool], None]], None]
-"""Takes whether something was about to move, and what to do once nothing does; or when that takes too long."""
+"""Takes whether something was moving and a function to call at rest, with whether rest was reached in time."""
 
 
 @dataclass(frozen=True)
@@ -34,34 +34,34 @@ class Request:
 
     robot: UrRobot
     control: ControllerAccess
-    """The way to its controller."""
+    """Access to the robot's controller."""
     keyword: str
     argument: str
     answer: Answer
     at_rest: AtRest
 
     def failed(self) -> None:
-        """Answer as for anything that did not work."""
+        """Answer that the command failed."""
         self.answer(f"Failed to execute: {self.keyword}")
 
     def unless_refused(self, done: str) -> Callable[[Refused | None], None]:
-        """Answer with this, or that it failed."""
+        """Return a function that answers with `done`, or that the command failed."""
         return lambda refused: self.answer(done) if refused is None else self.failed()
 
     def if_done(self, done: str) -> Callable[[bool], None]:
-        """Answer with this, or that it failed."""
+        """Return a function that answers with `done`, or that the command failed."""
         return lambda well: self.answer(done) if well else self.failed()
 
 
 @dataclass(frozen=True)
 class Command:
-    """One row of the table."""
+    """One row of the table of commands."""
 
     keyword: str
-    """In the spelling of the manual; clients may write it as they like."""
+    """Keyword in the manual's spelling; clients may use any case."""
     carry_out: Callable[[Request], None]
     argument: bool = False
-    """Whether something may follow."""
+    """Whether an argument may follow."""
 
 
 # ---------------------------------------------------------------------- power and safety
@@ -232,7 +232,7 @@ def _remote(request: Request) -> None:
     request.answer(_bool(not request.control.held_by_other))
 
 
-# ---------------------------------------------------------------------- what it is
+# ---------------------------------------------------------------------- information
 
 
 def _number() -> str:
@@ -294,11 +294,11 @@ COMMANDS: Final = (
     Command("shutdown", _shutdown),
     Command(QUIT, _say("Disconnected")),
 )
-"""All there are, and before every command one that begins with it."""
+"""All commands; a longer keyword comes before one that it begins with."""
 
 
 def find(line: str) -> tuple[Command, str] | None:
-    """The command of a line, and what follows it; None where there is none."""
+    """Return the command on a line and its argument; None if there is no such command."""
     lower = line.lower()
     for command in COMMANDS:
         keyword = command.keyword.lower()

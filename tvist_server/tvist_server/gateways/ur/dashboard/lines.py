@@ -1,19 +1,19 @@
-"""Cuts what a client sends into lines."""
+"""Cuts a client's data into lines."""
 
 from typing import Final
 
 LONGEST: Final = 4096
-"""Bytes of a line."""
+"""Longest line [bytes]."""
 
 
 class Lines:
-    """One client's stream, cut anywhere. A carriage return before the line feed is no part of the line."""
+    """One client's stream, which may be split anywhere. A carriage return before the line feed is dropped."""
 
     def __init__(self) -> None:
         self._rest = bytearray()
 
     def feed(self, data: bytes) -> list[str]:
-        """Take a piece; the lines that it completes. Of one that is too long the end is thrown away."""
+        """Take a piece and return the lines that it completes; a line that is too long is cut off."""
         lines: list[str] = []
         *whole, rest = data.split(b"\n")
         for piece in whole:

@@ -13,21 +13,21 @@ from tvist_server.gateways.ur.robot import UrRobot
 
 GREETING: Final = "Connected: Universal Robots Dashboard Server"
 MAX_WAITING: Final = 1000
-"""Lines that may wait for the answer to an earlier one."""
+"""Number of lines that may wait for the answer to an earlier one."""
 TOO_MANY: Final = f"could not understand: more than {MAX_WAITING} commands wait to be carried out"
 PATIENCE: Final = 2500
-"""Ticks in which what was stopped has to come to rest."""
+"""Ticks within which a stopped arm has to come to rest."""
 ECHO: Final = 200
-"""Characters that are repeated of a line that makes no sense."""
+"""Characters of an unknown line that the answer repeats."""
 
 
 class DashboardSession(PortSession):
-    """Carries out a client's commands one after the other: the next begins when the last one was answered.
+    """Carries out a client's commands one after the other: the next begins when the previous one was answered.
 
     Args:
         robot: The robot.
-        control: The way to its controller.
-        send: To the client.
+        control: Access to its controller.
+        send: Sends data to the client.
     """
 
     client_begins = True
@@ -39,19 +39,19 @@ class DashboardSession(PortSession):
         self._lines = Lines()
         self._waiting: deque[str] = deque()
         self._declined = 0
-        """Lines behind those, that were too many."""
+        """Number of further lines, which exceeded the limit."""
         self._asked = 0
-        """Commands begun."""
+        """Number of commands begun."""
         self._answered = 0
         """Number of commands answered."""
         self._working = False
         self._rested: Callable[[bool], None] | None = None
-        """What waits until the arm rests."""
+        """Function to call when the arm rests."""
         self._last = 0
-        """Tick at which it waits no longer."""
+        """Tick at which waiting for rest ends."""
 
     def opened(self) -> None:
-        """Greet."""
+        """Send the greeting."""
         self._say(GREETING)
 
     def receive(self, data: bytes) -> None:
@@ -66,7 +66,7 @@ class DashboardSession(PortSession):
             self._work()
 
     def sample(self, snapshot: Snapshot) -> bytes:
-        """Go on with a command that waited for the arm to rest."""
+        """Continue a command that waited for the arm to rest."""
         rested = self._rested
         if rested is not None:
             still = snapshot.runtime_state == RuntimeState.STOPPED
@@ -76,11 +76,11 @@ class DashboardSession(PortSession):
         return b""
 
     def closed(self) -> None:
-        """Forget what waits."""
+        """Drop the waiting commands."""
         self.over, self._rested = True, None
 
     def _work(self) -> None:
-        """Carry out what waits, until a command has to wait for its answer."""
+        """Carry out the waiting commands, until one has to wait for its answer."""
         if self._working:
             return
         self._working = True
@@ -114,7 +114,7 @@ class DashboardSession(PortSession):
             command.carry_out(Request(self._robot, self._control, keyword, argument, answer, self._at_rest))
 
     def _at_rest(self, moves: bool, then: Callable[[bool], None]) -> None:
-        """Call a function at rest, see `AtRest`: a stopped program may be played as soon as that is answered."""
+        """Call a function at rest, see `AtRest`, so that a stopped program can be played once its stop is answered."""
         latest = self._robot.latest
         if latest is None or (latest.runtime_state == RuntimeState.STOPPED and not moves):
             then(True)

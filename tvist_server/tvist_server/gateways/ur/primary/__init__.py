@@ -1,1 +1,1 @@
-"""UR's primary and secondary interface: robot state ten times a second, robot messages, and an ear for commands."""
+"""UR's primary and secondary interface: robot state ten times a second, robot messages, and some script commands."""

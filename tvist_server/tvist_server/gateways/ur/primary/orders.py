@@ -1,4 +1,4 @@
-"""What a client of the primary, secondary or real-time interface wants done."""
+"""Commands from clients of the primary, secondary or real-time interface."""
 
 from collections.abc import Callable
 from typing import Final
@@ -18,14 +18,14 @@ READ_ONLY: Final = (
 
 
 class Orders:
-    """Carries out units of script text: a handful of commands that are no URScript; the others are declined.
+    """Carries out units of script text: a few commands that are not URScript programs; it declines all others.
 
-    Whatever becomes of a unit is reported to the server's console, too: few clients show what they are answered.
+    The outcome of each unit is also reported on the server's console, since few clients show their answers.
 
     Args:
-        robot: Whom they are for.
-        control: The way to its controller.
-        answer: Sends a robot message to the client, or to whoever hears for it.
+        robot: Robot that carries out the commands.
+        control: Access to its controller.
+        answer: Sends a robot message to the client, or to the clients that receive its messages.
     """
 
     def __init__(self, robot: UrRobot, control: ControllerAccess, answer: Callable[[bytes], None]) -> None:
@@ -34,7 +34,7 @@ class Orders:
         self._answer = answer
 
     def carry_out(self, unit: Unit) -> None:
-        """Do what a unit says."""
+        """Carry out a unit."""
         if unit.too_long:
             self._except(unit, TOO_LONG)
             self._report(unit, f"was refused: it has more than {LONGEST} bytes")
@@ -66,11 +66,11 @@ class Orders:
                 self._report(unit, "was not run: URScript programs are not simulated")
 
     def leave(self, unit: Unit) -> None:
-        """The client has gone before a unit was complete."""
+        """Report that the client disconnected before a unit was complete."""
         self._report(unit, "was not run: the connection ended before its last line feed")
 
     def decline(self, unit: Unit) -> None:
-        """Say that nothing is taken here."""
+        """Report that this interface accepts no commands."""
         self._read_only()
         self._report(unit, "was refused: this port is read-only")
 

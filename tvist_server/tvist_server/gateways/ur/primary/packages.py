@@ -1,7 +1,7 @@
 """Robot state: the package of type 16, 1386 bytes in thirteen parts.
 
-int32 length, uint8 16, then the parts: uint32 length with itself, uint8 number, body; all big-endian. Order and
-lengths are those of a controller of software 5.
+int32 length, uint8 16, then the parts. Each part has a uint32 length (which includes itself), a uint8 number and a
+body; all numbers are big-endian. The order and lengths of the parts are those of a controller with software 5.
 """
 
 import re
@@ -17,15 +17,16 @@ ROBOT_STATE: Final = 16
 JOINTS: Final = 6
 """Number of joints in a package; for an arm with fewer, the others are 0."""
 NOMINAL: Final = 0xFFFFFFFF
-"""Checksum of kinematics that were not calibrated."""
+"""Checksum of uncalibrated kinematics."""
 SUBTYPE: Final = 3
 """Robot subtype of an e-Series arm."""
 BOARD_TEMPERATURE: Final = 25.0
-"""[°C]"""
+"""Temperature of the boards [°C]."""
 FULL_SPEED: Final = 1.0
 MOTION_DEFAULTS: Final = (1.0471975511965976, 1.3962634015954636, 0.25, 1.2, 0.25)
 """Defaults of a new program: joint velocity [rad/s] and acceleration [rad/s²], tool velocity [m/s] and acceleration
-[m/s²], and the radius that weighs turning against travel [m]."""
+[m/s²], and the radius that weighs rotation against translation [m].
+"""
 _TYPES: Final = {"UR5": 1, "UR10": 2, "UR3": 3, "UR16": 4, "UR20": 7, "UR30": 8}
 
 _PACKAGE = Struct(">iB")
@@ -43,13 +44,13 @@ _KEY: Final = "robot state"
 
 
 def robot_state(description: RobotDescription, snapshot: Snapshot, *, playing: bool, paused: bool) -> bytes:
-    """The package of a tick, made once for all clients of a robot.
+    """Return the package of a tick, which is created once for all clients of a robot.
 
     Args:
         description: The robot.
-        snapshot: The tick.
-        playing: Whether a program is, besides what the snapshot knows.
-        paused: Whether one is held.
+        snapshot: Snapshot of the tick.
+        playing: Whether a program is running that the snapshot does not know of.
+        paused: Whether a program is paused.
     """
     made: bytes | None = snapshot.shared.get(_KEY)
     if made is None:
@@ -62,8 +63,8 @@ def robot_state(description: RobotDescription, snapshot: Snapshot, *, playing: b
             _part(3, _masterboard(snapshot)),
             _part(2, _tool(snapshot)),
             _part(6, _configuration(description)),
-            _part(7, _FORCE.pack(*snapshot.actual_TCP_force, 0.0)),  # the last is dexterity, which nobody computes
-            _part(8, bytes((0, 1, 0, 1))),  # buttons: teach not pressed, and enabled; on the flange, likewise
+            _part(7, _FORCE.pack(*snapshot.actual_TCP_force, 0.0)),  # the last is dexterity, which is not computed
+            _part(8, bytes((0, 1, 0, 1))),  # teach button: not pressed, and enabled; the one on the flange likewise
             _part(10, bytes(38)),  # for UR's own safety check
             _part(11, _TOOL_LINE.pack(0, 115200, 0, 1, 1.5, 3.5)),  # off; baud, parity, stop bits, idle characters
             _part(12, bytes((snapshot.tool_output_mode, snapshot.tool_digital_output0_mode,
@@ -74,7 +75,7 @@ def robot_state(description: RobotDescription, snapshot: Snapshot, *, playing: b
 
 
 def robot_type(description: RobotDescription) -> int:
-    """UR's number of a model, of which `e` is no part; 0 of one that is not UR's."""
+    """Return UR's number of a robot type, which is the same with and without the `e`; 0 if the robot is not UR's."""
     model = re.match(r"UR\d+", description.robot.model)
     return _TYPES.get(model[0], 0) if model else 0
 
@@ -90,7 +91,7 @@ def _robot_mode(snapshot: Snapshot, *, playing: bool, paused: bool) -> bytes:
     return _MODE.pack(
         messages.stamp(snapshot),
         True,  # the arm is connected
-        True,  # and is to be moved
+        True,  # and may be moved
         snapshot.powered,
         snapshot.safety_mode in emergency,
         snapshot.safety_mode == SafetyMode.PROTECTIVE_STOP,
@@ -113,7 +114,7 @@ def _joints(snapshot: Snapshot) -> bytes:
         snapshot.actual_current,
         snapshot.actual_joint_voltage,
         snapshot.joint_temperatures,
-        [0.0] * JOINTS,  # a second temperature, which e-Series joints do not have
+        [0.0] * JOINTS,  # second temperature, which e-Series joints do not have
         snapshot.joint_mode,
         strict=False,
     )

@@ -1,7 +1,7 @@
-"""Cuts what clients send as scripts into units that can be carried out one by one.
+"""Cuts script text from clients into units that can be carried out one by one.
 
-A unit is a line, or a block from `def`, `sec` or another word that opens one to its `end`. Lines end with a line
-feed, before which a carriage return is no part of them; a last line without one is not complete.
+A unit is a line, or a block from `def`, `sec` or another word that opens a block to its `end`. Lines end with a line
+feed; a carriage return before it is dropped. A last line without a line feed is incomplete.
 """
 
 import re
@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from typing import Final
 
 LONGEST: Final = 1 << 20
-"""Bytes of a unit: twenty times the longest program that a known client sends."""
+"""Longest unit [bytes]: twenty times the longest program that a known client sends."""
 GLIMPSE: Final = 200
-"""Characters that are kept of one that is longer."""
+"""Characters that are kept of a unit that is too long."""
 TITLE: Final = 60
-"""Characters of a title at most."""
+"""Longest title [characters]."""
 
 _OPENS = re.compile(r"(?:def|sec|thread|if|while|for|switch)\b.*:")
 _CLOSES = re.compile(r"\bend$")
@@ -23,31 +23,31 @@ _STRING = re.compile(r"\"[^\"]*\"?|'[^']*'?")
 
 @dataclass(frozen=True)
 class Unit:
-    """A line or a block, complete."""
+    """A complete line or block."""
 
     text: str
-    """Text as it was sent, with lines ended by line feeds; only the beginning if it is too long."""
+    """Text as sent, with lines ended by line feeds; only its beginning if it is too long."""
     line: int
-    """Line at which its code begins, 1 for the first: comments may come before it."""
+    """Line at which its code begins, 1 for the first; comments may precede it."""
     column: int
     """Column in that line, 1 for the first."""
     too_long: bool = False
-    """Whether it is longer than `LONGEST` bytes: then it is thrown away to its end."""
+    """Whether it is longer than `LONGEST` bytes and was therefore dropped."""
 
     @property
     def words(self) -> str:
-        """Its code with single spaces, to be compared with a command."""
+        """Its code with single spaces, for comparison with a command."""
         return " ".join(word for line in self.text.split("\n") for word in _code(line).split())
 
     @property
     def name(self) -> str | None:
-        """Name of the program that the script defines; None for others."""
+        """Name of the program that the script defines; None if it defines none."""
         head = _HEAD.match(self._first)
         return None if head is None else head[1]
 
     @property
     def title(self) -> str:
-        """What a person knows it by: the name of the program that it defines, else its first line of code, cut."""
+        """Title for messages to people: the name of the program it defines, else its first line of code."""
         title = self.name or self._first
         if len(title) > TITLE:
             title = f"{title[: TITLE - 1]}…"
@@ -55,42 +55,44 @@ class Unit:
 
     @property
     def _first(self) -> str:
-        """Its first line of code; of one that is too long, what is kept may end before it."""
+        """Its first line of code, which may be missing from the kept text of a unit that is too long."""
         lines = self.text.split("\n")
         return lines[min(self.line, len(lines)) - 1].strip()
 
 
 class Intake:
-    """One client's stream of script text, cut anywhere."""
+    """One client's stream of script text, which may be split anywhere."""
 
     def __init__(self) -> None:
         self._rest = bytearray()
-        """Beginning of a line that is not yet complete."""
+        """Beginning of an incomplete line."""
         self._unit = bytearray()
-        """Lines of the unit that is not complete: as bytes, since a string a line takes twenty times as much."""
+        """Lines of an incomplete unit. They are kept as bytes, since a string for each line takes twenty times the
+        memory.
+        """
         self._depth = 0
-        """Blocks that are open."""
+        """Number of open blocks."""
         self._start: tuple[int, int] | None = None
         """Line and column of the unit's first code."""
         self._skipping = False
-        """Whether the rest of a unit is thrown away, which was too long."""
+        """Whether the rest of a unit that was too long is being skipped."""
 
     @property
     def held(self) -> int:
-        """Bytes that are kept for a unit that is not complete."""
+        """Number of bytes kept for an incomplete unit."""
         return len(self._unit) + len(self._rest)
 
     @property
     def unfinished(self) -> Unit | None:
-        """The beginning of the unit that is not complete; None where there is none, or comments alone."""
-        if self._skipping:  # it was handed out when it became too long
+        """Beginning of the incomplete unit; None if there is none, or it has only comments so far."""
+        if self._skipping:  # it was returned when it became too long
             return None
         line, column = self._start or (self._unit.count(b"\n") + 1, 1)
         begun = self._start is not None or _code(self._rest.decode(errors="replace"))
         return Unit((self._unit + self._rest).decode(errors="replace"), line, column) if begun else None
 
     def feed(self, data: bytes) -> list[Unit]:
-        """Take a piece; the units that it completes."""
+        """Take a piece and return the units that it completes."""
         units: list[Unit] = []
         *lines, rest = data.split(b"\n")
         for piece in lines:
@@ -102,19 +104,19 @@ class Intake:
         return units
 
     def _keep(self, piece: bytes, units: list[Unit]) -> None:
-        """Add to the line that is not complete."""
+        """Append to the incomplete line."""
         if self.held + len(piece) > LONGEST:
             if not self._skipping:
                 seen = (self._unit + self._rest + piece).decode(errors="replace")
                 units.append(Unit(seen[:GLIMPSE], *(self._start or (1, 1)), too_long=True))
             self._skipping = True
             self._unit.clear()
-            del self._rest[GLIMPSE:]  # the beginning of a line tells what it opens
+            del self._rest[GLIMPSE:]  # the beginning of a line determines what it opens
             piece = piece[:GLIMPSE]
         self._rest += piece
 
     def _take(self, whole: bytes, units: list[Unit]) -> None:
-        """A line is complete."""
+        """Take a complete line."""
         line = whole.decode(errors="replace")
         code = _code(line)
         if not line.strip() and not self._unit and not self._skipping:
@@ -136,5 +138,5 @@ class Intake:
 
 
 def _code(line: str) -> str:
-    """What is left of it without strings' contents, comments, and space around."""
+    """The line without comments, the contents of strings, and surrounding space."""
     return _STRING.sub('""', line).partition("#")[0].strip()

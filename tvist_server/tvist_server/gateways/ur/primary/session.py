@@ -17,12 +17,12 @@ EVERY: Final = 50
 
 
 class PrimarySession(PortSession):
-    """Tells a client of the robot's state and of what happens, and hears its commands. The secondary is the same.
+    """Sends a client the robot's state and messages, and takes its commands. The secondary interface is the same.
 
     Args:
         robot: The robot.
-        control: The way to its controller.
-        send: To the client.
+        control: Access to its controller.
+        send: Sends data to the client.
         read_only: Whether what the client sends is declined.
     """
 
@@ -37,10 +37,10 @@ class PrimarySession(PortSession):
         self._due = 0
         """Tick of the next robot state."""
         self._safety_mode: int | None = None
-        """Safety mode that the client knows; it is told only of changes."""
+        """Safety mode last sent to the client, which only gets changes."""
 
     def opened(self) -> None:
-        """Say what runs here; the first robot state follows with the next tick."""
+        """Send the version; the first robot state follows with the next tick."""
         self._send(
             messages.version(version.MAJOR, version.MINOR, version.BUGFIX, version.BUILD, version.DATE)
         )
@@ -54,7 +54,7 @@ class PrimarySession(PortSession):
                 self._orders.carry_out(unit)
 
     def sample(self, snapshot: Snapshot) -> bytes:
-        """The robot state, ten times a second; before it, what has changed."""
+        """Return the robot state ten times a second, preceded by messages about changes."""
         mode = snapshot.safety_mode
         if mode != self._safety_mode:
             if self._safety_mode is not None:
@@ -70,17 +70,17 @@ class PrimarySession(PortSession):
         )
         if not first:
             return state
-        self._send(state)  # a client waits for it: it is not to be dropped
+        self._send(state)  # the client waits for it, so it must not be dropped
         return b""
 
     def closed(self) -> None:
-        """Say what the client leaves unfinished."""
+        """Report what the client leaves unfinished."""
         unfinished = self._intake.unfinished
         if unfinished is not None:
             self._orders.leave(unfinished)
 
     def event(self, event: Event) -> None:
-        """Tell of a protective stop as the error it is, of other safety stops and warnings as a line of the log."""
+        """Send a protective stop as an error, and other safety stops and warnings as lines of the log."""
         stamp = messages.stamp(self._robot.latest)
         why = event.why or ""
         if event.kind == "protective_stop":
