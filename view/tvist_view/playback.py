@@ -53,15 +53,16 @@ class Playback:
             "Speed", ("1", "0.5", "0.25", "0.1", "0.05"), order=3.0,
             hint="In slow motion an eye can follow the vibration.",
         )  # fmt: skip
-        self._plots = Plots(gui, tuple(track.shown.label for track in tracks) if several else ("",))
-        with gui.add_folder("View", order=40.0):
-            self._appearance = Appearance(
-                gui,
-                truth=all(track.has_truth for track in tracks),
-                why_not=NO_TRUTH,
-                factor=factor,
-                ghost=ghost,
-            )
+        with gui.add_folder(None, order=10.0):
+            self._plots = Plots(gui, tuple(track.shown.label for track in tracks) if several else ("",))
+            with gui.add_folder("View", order=40.0):
+                self._appearance = Appearance(
+                    gui,
+                    truth=all(track.has_truth for track in tracks),
+                    why_not=NO_TRUTH,
+                    factor=factor,
+                    ghost=ghost,
+                )
         self._drawn = [
             DrawnRobot(
                 server.scene,

@@ -13,6 +13,8 @@ POINTS = 500
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#8A8A8A"
 HEIGHT = 150
 """Height of a plot [px]."""
+BRAKES_S = 0.02
+"""Time after the reference has stopped within which the tool still brakes [s]."""
 SMALL = 0.1
 """Least upper end of an axis, so that noise does not fill a plot [m/s², rad/s², Hz]."""
 
@@ -33,15 +35,16 @@ class Plots:
         self._alpha = _plot(gui, "Tool acceleration |α| [m/s²]", [(f"{n}|α|", c, True) for n, c in named])
         self._peak = gui.add_html("")
         self._delay = gui.add_html("")
-        self._labels = labels
+        self._labels, self._colours = labels, colours
         with gui.add_folder("More plots", order=50.0):
             self._add_more(gui, named)
 
     def _add_more(self, gui: GuiApi, named: list[tuple[str, str]]) -> None:
         lines = [(f"{n}q̈ shaped", c, False) for n, c in named]
+        grey = ", grey: before the shaper" if len(named) == 1 else ""
         if len(named) == 1:
             lines.insert(0, ("q̈ before the shaper", GREY, False))
-        self._acceleration = _plot(gui, "Largest joint acceleration |q̈| [rad/s²]", lines)
+        self._acceleration = _plot(gui, f"Largest joint acceleration |q̈| [rad/s²]{grey}", lines)
         self._f_d = _plot(gui, "Estimated frequency f_d [Hz]", [(f"{n}f_d", c, False) for n, c in named])
         self._zeta = _plot(gui, "Estimated damping ratio ζ [-]", [(f"{n}ζ", c, False) for n, c in named])
 
@@ -69,15 +72,18 @@ class Plots:
 
     def _say(self, shown: list[Signals]) -> None:
         peaks, delays = [], []
-        for label, signals in zip(self._labels, shown, strict=True):
+        for label, colour, signals in zip(self._labels, self._colours, shown, strict=False):
             if not len(signals.time):
                 continue
-            name = f"<b>{label}</b>: " if label else ""
-            peaks.append(f"{name}largest {signals.alpha.max():.2f} m/s²")
+            name = f'<b style="color:{colour}">{label}</b>: ' if label else ""
+            peak = f"{name}largest {signals.alpha.max():.2f} m/s²"
             words = f"{name}mean delay of the shaper {1e3 * signals.delay[-1]:.0f} ms"
             rests = rests_since(signals)
             if rests is not None:
+                rest = signals.between(rests[0] + BRAKES_S, signals.time[-1]).alpha
+                peak += f", {rest.max(initial=0.0):.2f} m/s² after the stop"
                 words += f"; came to rest {1e3 * (rests[1] - rests[0]):.0f} ms after its reference"
+            peaks.append(peak)
             delays.append(words)
         _write(self._peak, peaks)
         _write(self._delay, delays)
@@ -104,7 +110,7 @@ def _plot(gui: GuiApi, title: str, lines: list[tuple[str, str, bool]]) -> GuiUpl
         title=title,
         scales={"x": uplot.Scale(time=False, auto=False, range=(-SPAN, 0.0)), "y": uplot.Scale(auto=True)},
         height=HEIGHT,
-        legend=uplot.Legend(show=len(lines) > 1),
+        legend=uplot.Legend(show=False),
     )
 
 

@@ -65,6 +65,12 @@ def open_stage(address: str, port: int, title: str, *, insecure: bool = False) -
     return server
 
 
+def close_stage(server: ViserServer) -> None:
+    """End the page."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
+
+
 def look_at(server: ViserServer, target: tuple[float, float, float], distance: float) -> None:
     """Have every camera begin with a look at a point [m] from the front and above.
 

@@ -102,7 +102,7 @@ def _serve(
     insecure: bool,
 ) -> None:
     """Serve a page until Control+C."""
-    from tvist_view.stage import StageError, open_stage
+    from tvist_view.stage import StageError, close_stage, open_stage
 
     logging.basicConfig(format="tvist: %(message)s", level=logging.WARNING)
     with told(StageError):
@@ -114,7 +114,7 @@ def _serve(
     except KeyboardInterrupt:
         raise interrupted("the page has ended") from None
     finally:
-        server.stop()
+        close_stage(server)
 
 
 def _recorded(file: Path) -> "list[Track]":
@@ -158,13 +158,22 @@ def _compared(shapers: Sequence[str], robot: str) -> "list[Track]":
 
 
 def _look_of(content: "RecordingFile") -> "tuple[Geometry, Payload]":
-    """What the robot of a recording looks like."""
-    if content.info is None or content.info.geometry is None:
-        raise Failure(
-            "this recording does not contain the arm's geometry, since an older server wrote it: "
-            "tvist replay FILE NEW.mcap writes one that does"
-        )
-    return content.info.geometry, content.info.payload
+    """What the robot of a recording looks like: as it says, or by its robot file, which a server's recording holds."""
+    from tvist_controller.about import geometry_of
+    from tvist_plant.description import RobotDescription
+    from tvist_protocol.content import checked
+    from tvist_protocol.values import Payload
+
+    info, start = content.info, content.start or {}
+    if info is not None and info.geometry is not None:
+        return info.geometry, info.payload
+    if "description" in start:
+        geometry = geometry_of(checked(start["description"], RobotDescription))
+        nothing = Payload(mass=0.0, com=(0.0, 0.0, 0.0), inertia=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        return geometry, nothing if info is None else info.payload
+    raise Failure(
+        "this recording does not say what its robot looks like: record it with tvist serve --record"
+    )
 
 
 def _write_gif(tracks: "list[Track]", factor: float, file: Path) -> None:
@@ -179,12 +188,12 @@ def _write_gif(tracks: "list[Track]", factor: float, file: Path) -> None:
 
 def _write_html(tracks: "list[Track]", factor: float, file: Path) -> None:
     from tvist_view.playback import Playback
-    from tvist_view.stage import StageError, open_stage
+    from tvist_view.stage import StageError, close_stage, open_stage
 
     with told(StageError, OSError):
         server = open_stage("127.0.0.1", 0, "tvist")
         try:
             file.write_text(Playback(server, tracks, factor=factor).html(), encoding="utf-8")
         finally:
-            server.stop()
+            close_stage(server)
     err.print(f"wrote {file}")
