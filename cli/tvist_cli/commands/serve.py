@@ -140,7 +140,9 @@ def _ur_port(text: str) -> tuple[str, int]:
     """Split INTERFACE=PORT; the configuration checks whether there is such an interface."""
     interface, equals, port = text.partition("=")
     if not equals or not (port == "off" or (port.isascii() and port.isdigit() and len(port) < 9)):
-        raise Failure(f"ur-port is {text!r}: must be INTERFACE=PORT such as rtde=31004, or INTERFACE=off", code=2)
+        raise Failure(
+            f"ur-port is {text!r}: must be INTERFACE=PORT such as rtde=31004, or INTERFACE=off", code=2
+        )
     return interface, 0 if port == "off" else int(port)
 
 
