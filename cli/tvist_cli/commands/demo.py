@@ -38,7 +38,10 @@ def demo(
             print_paper(result.report)
         for line in answer(result.report, ANSWERED):
             out.print(line, markup=False)
-        out.print(f"\n  look at {result.overview}\n", soft_wrap=True, markup=False)
+        out.print(f"\n  look at {result.overview}", soft_wrap=True, markup=False)
+        out.print(
+            f"  ({output} also holds the paper's figures and the recording)\n", soft_wrap=True, markup=False
+        )
         words({**terms(result.report, ANSWERED), **checks(result.report, result.difference)})
         _print_next()
     if not result.equal:
