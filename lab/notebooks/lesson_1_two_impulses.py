@@ -87,7 +87,7 @@ def _():
     An *input shaper* does this to any command: it replaces each change by several smaller changes, the *impulses*
     $A_1, A_2, \dots$ at the times $\tau_1 = 0, \tau_2, \dots$, whose sum is one.
 
-    **Try it:** find the waiting time and the share at which the blue curve stops swinging. Where the damping is zero,
+    **Try it:** find the waiting time and the share at which the blue curve stops swinging. When the damping is zero,
     the right share is one half; why must it be larger when there is damping?
     """)
     return
@@ -213,7 +213,7 @@ def _():
             mo.md(
                 "## Question\n\nYou know the frequency of your arm only within some percent. What is the most that "
                 "ZV leaves, and which is the **shortest** shaper that never leaves more than 5 %? Read it off the "
-                "figure first; the damping ratio is that of the first slider."
+                "figure first; the damping ratio is that of the slider at the top."
             ),
             tolerance,
         ]
@@ -238,16 +238,17 @@ def _(damping, tolerance):
         if shaper.duration_periods and shaper.peak == 1.0 and damping.value < shaper.zeta_max
     ]
     _good = [shaper for shaper in _candidates if worst(shaper, _share, damping.value) <= 0.05 + 1e-3]
-    _best = min(_good, key=lambda shaper: shaper.function(1.0, damping.value).duration, default=None)
+    _periods = [round(shaper.function(1.0, damping.value).duration, 6) for shaper in _good]
     answer = {
         "zv_leaves": worst(ts.shaper("zv"), _share, damping.value),
-        "shortest": None if _best is None else _best.name,
-        "periods": None if _best is None else _best.function(1.0, damping.value).duration,
+        "shortest": [s.name for s, periods in zip(_good, _periods, strict=True) if periods == min(_periods)],
+        "periods": min(_periods, default=None),
     }
     _words = (
-        "No shaper of the catalogue does that."
-        if _best is None
-        else f"The shortest within 5 % is **{_best.name}**. It lasts {answer['periods']:.2f} periods, ZV 0.50."
+        f"The shortest within 5 %: **{', '.join(answer['shortest'])}**, {answer['periods']:.2f} periods long. "
+        "ZV is 0.50 periods long."
+        if _good
+        else "No shaper of the catalogue does that."
     )
     mo.accordion({"Answer": mo.md(f"ZV leaves up to **{100 * answer['zv_leaves']:.1f} %**. {_words}")})
     return (answer,)
