@@ -98,52 +98,65 @@ def _(recordings):
     return
 
 
+@app.function
+def markdown(columns, rows):
+    """A table."""
+    lines = [columns, ["---", *["---:"] * (len(columns) - 1)], *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+@app.function
+def number(value, form):
+    """A number in a table; a dash where there is none."""
+    return "–" if value is None else format(value, form)
+
+
 @app.cell(hide_code=True)
 def _(judged):
-    def _row(name, one):
-        still = one.still_after
-        return {
-            "method": name,
-            "longer by (ms)": round(one.result.delay_ms),
-            "largest acceleration after it (m/s²)": round(one.peak, 3),
-            "at rest after (ms)": None if still is None else round(1e3 * still),
-        }
-
-    mo.ui.table([_row(name, one) for name, one in judged.items()], selection=None, label="After the motion")
+    _columns = ["method", "longer by (ms)", "largest acceleration after it (m/s²)", "at rest after (ms)"]
+    _rows = [
+        [
+            name,
+            f"{one.result.delay_ms:.0f}",
+            f"{one.peak:.3f}",
+            number(None if one.still_after is None else 1e3 * one.still_after, ".0f"),
+        ]
+        for name, one in judged.items()
+    ]
+    mo.md(
+        "The largest acceleration is that of the tool later than 10 ms after the end of the command, without noise; "
+        "the tool is at rest when its acceleration stays below 0.1 m/s² (dashed).\n\n"
+        + markdown(_columns, _rows)
+    )
     return
 
 
 @app.cell(hide_code=True)
 def _(judged, motion):
-    _names = {
-        "delay_ms": "delay (ms)",
-        "stabilisation_ms": "stabilisation (ms)",
-        "cycle_ms": "cycle (ms)",
-        "overshoot_m": "overshoot (m)",
-        "residual_vibration_m_s2": "residual vibration (m/s²)",
+    _columns = {
+        "delay_ms": ("delay (ms)", ".0f"),
+        "stabilisation_ms": ("stabilisation (ms)", ".0f"),
+        "cycle_ms": ("cycle (ms)", ".0f"),
+        "overshoot_m": ("overshoot (m)", ".1e"),
+        "residual_vibration_m_s2": ("residual vibration (m/s²)", ".2f"),
     }
-
-    def _plain(value):
-        return "–" if value is None else f"{value:.2g}" if abs(value) < 10 else f"{value:.0f}"
-
     _paper = published()["table_2"][motion.value]
-    table_2 = []
+    table_2 = {}
     for _kind, _method in (("unshaped", "unshaped"), ("shaped", "TVIST")):
-        for _who, _source in (("paper", _paper[_kind]), ("here", vars(judged[_method].result))):
-            _values = {words: _plain(_source[key]) for key, words in _names.items()}
-            table_2.append({"": f"{_kind}, {_who}", **_values})
-    mo.vstack(
-        [
-            mo.md(
-                f"## Table 2 of the paper: {motion.value}\n\nThe paper's figures are means of ten runs of a real arm; "
-                "ours are of one run of a simulated arm. *Stabilisation* is the time from the tool's first coming "
-                "within 0.03 mm of where it ends to its staying there, *cycle* the time until then from the start. "
-                "*Residual vibration* is read off the noisy accelerometer, as in the paper, so that it never falls "
-                "below about 0.1 m/s². The simulated arm was calibrated to the paper's frequencies and damping "
-                "ratios: [the tables side by side](../../docs/reference/paper.md) say what follows from that."
-            ),
-            mo.ui.table(table_2, selection=None),
-        ]
+        table_2[f"{_kind}, paper"] = _paper[_kind]
+        table_2[f"{_kind}, here"] = {key: getattr(judged[_method].result, key) for key in _columns}
+    _rows = [
+        [name, *(number(values[key], form) for key, (_, form) in _columns.items())]
+        for name, values in table_2.items()
+    ]
+    mo.md(
+        f"## Table 2 of the paper: {motion.value}\n\nThe paper's figures are means of ten runs of a real arm; ours are "
+        "of one run of a simulated arm. *Stabilisation* is the time from the tool's first coming within 0.03 mm of "
+        "where it ends to its staying there, *cycle* the time from the start until then, *overshoot* how far it leaves "
+        "that place in between. *Residual vibration* is read off the noisy accelerometer, as in the paper, so that it "
+        "never falls below about 0.1 m/s². The simulated arm was calibrated to the paper's frequencies and damping ratios; "
+        "`docs/reference/paper.md` says of every figure whether it was fitted or predicted.\n\n"
+        + markdown(["", *(words for words, _ in _columns.values())], _rows)
     )
     return (table_2,)
 
