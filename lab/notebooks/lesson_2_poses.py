@@ -98,10 +98,10 @@ def _():
 
 @app.cell(hide_code=True)
 def _():
-    name = mo.ui.dropdown(["zv", "mzv", "zvd", "ei", "ei2", "ei3"], value="zv", label="shaper")
+    chosen = mo.ui.dropdown(["zv", "mzv", "zvd", "ei", "ei2", "ei3"], value="zv", label="shaper")
     design = mo.ui.slider(6.0, 18.0, 0.5, value=10.5, label="designed for (Hz)", show_value=True)
-    mo.vstack([name, design])
-    return design, name
+    mo.vstack([chosen, design])
+    return chosen, design
 
 
 @app.cell(hide_code=True)
@@ -118,11 +118,11 @@ def remaining(f_d, zeta, impulses):
 
 
 @app.cell(hide_code=True)
-def _(design, name, spread_f, spread_zeta):
-    _impulses = shaper(name.value).function(design.value, float(np.median(spread_zeta)))
+def _(chosen, design, spread_f, spread_zeta):
+    _impulses = shaper(chosen.value).function(design.value, float(np.median(spread_zeta)))
     left = remaining(spread_f, spread_zeta, _impulses)
     _figure, (_above, _below) = panels(2, 5.0)
-    _above.plot(spread_f, 100.0 * left, ".", color=UNSHAPED, label=f"{name.value} for {design.value:g} Hz")
+    _above.plot(spread_f, 100.0 * left, ".", color=UNSHAPED, label=f"{chosen.value} for {design.value:g} Hz")
     _above.axhline(0.0, color=SHAPED, linewidth=2, label="a shaper that follows the pose")
     _above.axhline(5.0, color=INK, linewidth=0.8, linestyle="--")
     note(
@@ -163,23 +163,23 @@ def _():
 
 
 @app.cell(hide_code=True)
-def _(name, spread_f, spread_zeta):
+def _(chosen, spread_f, spread_zeta):
     _designs = np.linspace(spread_f.min(), spread_f.max(), 60)
     _zeta = float(np.median(spread_zeta))
     _worst = [
-        remaining(spread_f, spread_zeta, shaper(name.value).function(f_d, _zeta)).max() for f_d in _designs
+        remaining(spread_f, spread_zeta, shaper(chosen.value).function(f_d, _zeta)).max() for f_d in _designs
     ]
     _best = int(np.argmin(_worst))
     answer = {
         "design_hz": float(_designs[_best]),
         "worst": float(_worst[_best]),
-        "fixed_ms": 1e3 * shaper(name.value).function(float(_designs[_best]), _zeta).duration,
+        "fixed_ms": 1e3 * shaper(chosen.value).function(float(_designs[_best]), _zeta).duration,
         "following_ms": float(np.mean(500.0 / spread_f)),
     }
     mo.accordion(
         {
             "Answer": mo.md(
-                f"`{name.value}` is best designed for **{answer['design_hz']:.1f} Hz**, and still leaves up to "
+                f"`{chosen.value}` is best designed for **{answer['design_hz']:.1f} Hz**, and still leaves up to "
                 f"**{100 * answer['worst']:.0f} %**. It costs {answer['fixed_ms']:.0f} ms a motion. A ZV that "
                 f"follows the pose leaves nothing and costs {answer['following_ms']:.0f} ms on average. The frequency "
                 f"spans {spread_f.min():.1f} to {spread_f.max():.1f} Hz: no fixed shaper that is as short covers it."

@@ -154,8 +154,8 @@ def _(judged, motion):
         "of one run of a simulated arm. *Stabilisation* is the time from the tool's first coming within 0.03 mm of "
         "where it ends to its staying there, *cycle* the time from the start until then, *overshoot* how far it leaves "
         "that place in between. *Residual vibration* is read off the noisy accelerometer, as in the paper, so that it "
-        "never falls below about 0.1 m/s². The simulated arm was calibrated to the paper's frequencies and damping ratios; "
-        "`docs/reference/paper.md` says of every figure whether it was fitted or predicted.\n\n"
+        "never falls below about 0.1 m/s². The simulated arm was calibrated to the paper's frequencies and damping "
+        "ratios; `docs/reference/paper.md` says of every figure whether it was fitted or predicted.\n\n"
         + markdown(["", *(words for words, _ in _columns.values())], _rows)
     )
     return (table_2,)

@@ -127,8 +127,9 @@ def _(error, rival, try_on_moves):
 
 @app.function
 def remaining(judged):
-    """Median over the moves of the peak, shaped over unshaped; a move that hardly rings does not count."""
-    return float(np.median([one.shaped.peak / one.unshaped.peak for one in judged if one.counts]))
+    """Median over the moves of the peak, shaped over unshaped; those that hardly ring count only if all do so."""
+    loud = [one for one in judged if one.counts] or judged
+    return float(np.median([one.shaped.peak / one.unshaped.peak for one in loud]))
 
 
 @app.function
@@ -142,9 +143,10 @@ def _(tried):
     _figure, (_panel,) = panels(1, 3.2)
     _unshaped = [one.unshaped.peak for one in next(iter(tried.values()))]
     _where = 1 + np.arange(len(_unshaped))
-    _panel.semilogy(_where, _unshaped, "s", color=UNSHAPED, label="unshaped")
-    for (_name, _judged), _color in zip(tried.items(), (SHAPED, THIRD), strict=True):
-        _panel.semilogy(_where, [one.shaped.peak for one in _judged], "o", color=_color, label=_name)
+    _panel.bar(_where - 0.27, _unshaped, 0.25, color=UNSHAPED, label="unshaped")
+    for (_name, _judged), _color, _beside in zip(tried.items(), (SHAPED, THIRD), (0.0, 0.27), strict=True):
+        _peaks = [one.shaped.peak for one in _judged]
+        _panel.bar(_where + _beside, _peaks, 0.25, color=_color, label=_name)
     _panel.set(xlabel="Move", ylabel="Largest acceleration\nafter it (m/s²)", xticks=_where)
     legend(_figure, _panel)
     _lines = [
@@ -173,6 +175,7 @@ def _(try_on_moves):
         "remaining": {key: remaining(judged) for key, judged in _tried.items()},
         "delay_ms": {name: delay(_tried[name, 0.0]) for name in ("zv", "ei")},
     }
+    _delay = answer["delay_ms"]
     _left = {key: f"{100 * share:.0f} %" for key, share in answer["remaining"].items()}
     _best = {
         wrong: min(("zv", "ei"), key=lambda name: answer["remaining"][name, wrong]) for wrong in (0.0, 0.25)
@@ -182,9 +185,9 @@ def _(try_on_moves):
             "Answer": mo.md(
                 f"With the wrong frequency `zv` leaves {_left['zv', 0.25]} and `ei` {_left['ei', 0.25]}: "
                 f"**{_best[0.25]}** is better. With the right one `zv` leaves {_left['zv', 0.0]} and `ei` "
-                f"{_left['ei', 0.0]}: **{_best[0.0]}** is better. `zv` makes the moves {answer['delay_ms']['zv']:.0f} ms longer, `ei` "
-                f"{answer['delay_ms']['ei']:.0f} ms. What is left even with the right frequency is of the other modes, "
-                "of friction and of the gears: `docs/reference/floors.md` says how much of which."
+                f"{_left['ei', 0.0]}: **{_best[0.0]}** is better. `zv` makes the moves {_delay['zv']:.0f} ms longer, "
+                f"`ei` {_delay['ei']:.0f} ms. What is left with the right frequency is of other modes, of "
+                "friction and of the gears: `docs/reference/floors.md` says how much of which."
             )
         }
     )
