@@ -86,6 +86,17 @@ def _(dampings, elbow, elbows, estimator, frequencies, shoulder, wrist, wrists):
 
 
 @app.cell(hide_code=True)
+def _(estimator):
+    _named = {key: estimator.estimate(np.array(pose(key))) for key in ("Q1", "Q2", "Q3")}
+    mo.md(
+        "The paper's poses: "
+        + "; ".join(f"{key} {f[0]:.1f} Hz, $\\zeta$ = {z[0]:.2f}" for key, (f, z) in _named.items())
+        + ". Lesson 3 moves between them."
+    )
+    return
+
+
+@app.cell(hide_code=True)
 def _():
     mo.md(r"""
     ## A shaper that is designed once
@@ -187,17 +198,6 @@ def _(chosen, spread_f, spread_zeta):
         }
     )
     return (answer,)
-
-
-@app.cell(hide_code=True)
-def _(estimator):
-    _named = {key: estimator.estimate(np.array(pose(key))) for key in ("Q1", "Q2", "Q3")}
-    mo.md(
-        "The paper's poses: "
-        + "; ".join(f"{key} {f[0]:.1f} Hz, $\\zeta$ = {z[0]:.2f}" for key, (f, z) in _named.items())
-        + ". Lesson 3 moves between them."
-    )
-    return
 
 
 if __name__ == "__main__":
