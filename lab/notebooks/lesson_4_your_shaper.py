@@ -34,8 +34,8 @@ def _():
     $\zeta$ of the arm's lowest mode. It returns amplitudes $A$, whose sum is one, and times $\tau$ in seconds, which
     begin with zero and are proportional to $1/f_d$. The controller asks it at every tick, so that it follows the arm.
 
-    As it stands, it is a zero-vibration shaper with a mistake. Find the mistake, then try a third impulse. Control+Enter
-    runs the cell, and everything below follows.
+    As it stands, it is a zero-vibration shaper with a mistake. Find the mistake, then try a third impulse.
+    Control+Enter runs the cell, and everything below follows.
     """)
     return
 

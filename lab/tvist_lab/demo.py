@@ -100,7 +100,7 @@ async def _run(
             for method in (Unshaped(), TimeVarying()):
                 live[motion, method.name] = await run(robot, arm, motion, method, seed=1000 * seed)
                 done.labels[method.name] = method.label
-                progress(f"{motion} {method.label}")
+                progress(f"{motion} {method.name}")
     return done, live
 
 
