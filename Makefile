@@ -7,7 +7,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 WORKERS ?= auto
 READY := .venv/.ready
 
-.PHONY: setup demo test test-all lint bench soak format lock schemas clean
+.PHONY: setup demo notebooks test test-all lint bench soak format lock schemas clean
 
 setup: $(READY)
 
@@ -21,6 +21,9 @@ $(READY): requirements.lock pyproject.toml
 
 demo: setup
 	$(BIN)/tvist demo
+
+notebooks: setup
+	$(BIN)/marimo edit lab/notebooks
 
 # Side by side, a file in one process; what is in real time alone after that, as it needs the machine.
 BESIDE := $(BIN)/pytest --numprocesses $(WORKERS) --dist loadfile

@@ -8,7 +8,7 @@ from tvist_server.ending import ending_signals
 
 COMMANDS = {
     "serve": "Run a robot on the network.",
-    "demo": "Run the paper's motions in real time and draw figures.",
+    "demo": "Run the paper's motions in real time, unshaped and shaped, and say what happened.",
     "check": "Check that a robot answers and is ready to be moved; exit code 0 if so.",
     "unlock": "Make a stopped robot ready to be moved again; exit code 0 if it is.",
     "move": "Move a served robot to a pose.",

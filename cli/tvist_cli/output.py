@@ -1,15 +1,19 @@
 """Output of the commands: tables and progress for people, one JSON object for programs."""
 
 import os
+import shlex
+import shutil
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import msgspec
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
 from tvist_cli.failure import interrupted
 
@@ -28,6 +32,15 @@ def say(message: str) -> None:
     except OSError:
         # The terminal is closed. Without this, the unwritten rest would fail again when the process ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
+
+
+def program() -> str:
+    """Return what to type in this folder to call this program: its name if the shell finds it, or else its path."""
+    here, found = Path(sys.executable).with_name("tvist"), shutil.which("tvist")
+    if not here.exists() or (found is not None and Path(found).samefile(here)):
+        return "tvist"
+    folder = Path.cwd()
+    return shlex.quote(str(here.relative_to(folder) if here.is_relative_to(folder) else here))
 
 
 def print_json(value: Any) -> None:
@@ -73,6 +86,16 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
     for row in rows:
         drawn.add_row(*row)
     out.print(drawn)
+    out.print()
+
+
+def words(meanings: Mapping[str, str]) -> None:
+    """Print words with what they mean beside them."""
+    grid = Table.grid(padding=(0, 2, 0, 0))
+    grid.add_column(no_wrap=True)
+    for word, meaning in meanings.items():
+        grid.add_row(Text(word), Text(meaning))
+    out.print(grid)
     out.print()
 
 

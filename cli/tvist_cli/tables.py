@@ -2,9 +2,27 @@
 
 from typing import Any
 
-from tvist_cli.output import number, out, table
+from tvist_cli.output import number, out, table, words
 
 COLUMNS = ("delay_ms", "stabilisation_ms", "cycle_ms", "overshoot_m", "residual_vibration_m_s2")
+
+TERMS = {
+    "f_d, ζ": "frequency at which the arm vibrates, and its damping ratio: 0 rings for ever, 1 does not swing back",
+    "shaped": "the command is split into two, half a period of the vibration apart, so that their vibrations cancel",
+    "delay": "how much longer the shaped command takes",
+    "stabil.": "time from the tool's first coming within 0.03 mm of where it ends to its staying there",
+    "cycle": "time from the start of the motion until the tool stays there",
+    "overshoot": "how far the tool leaves that place again in between",
+    "RV": "residual vibration: acceleration with which the tool vibrates at the end of the command",
+    "impact": "change by shaping",
+}
+"""Words of Tables 1 and 2."""
+METHOD_TERMS = {
+    "peak": "largest true acceleration of the tool later than 10 ms after the end of the command; less: by how much",
+    "still": "last time at which it exceeds 0.1 m/s²",
+    "q̈/limit": "largest acceleration of a joint over its limit",
+}
+"""Words of the tables of methods."""
 
 
 def print_paper(result: dict[str, Any]) -> None:
@@ -31,6 +49,7 @@ def print_paper(result: dict[str, Any]) -> None:
         ("motion", "delay ms", "stabil. ms", "cycle ms", "overshoot m", "RV m/s²"),
         rows,
     )
+    words(TERMS)
     for motion, methods in result["baselines"].items():
         first = min(
             (row["still_after_ms"] for row in methods.values() if row["still_after_ms"] is not None),
@@ -49,8 +68,11 @@ def print_paper(result: dict[str, Any]) -> None:
                 for name, row in methods.items()
             ],
         )  # fmt: skip
+    words(METHOD_TERMS)
     for note in result["notes"]:
         out.print(note)
+    if result["notes"]:
+        out.print()
 
 
 def _mode(name: str, paper: dict[str, Any], row: dict[str, float]) -> tuple[str, ...]:

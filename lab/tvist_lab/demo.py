@@ -10,7 +10,7 @@ import numpy as np
 
 from tvist_lab.mcap_file import RecordingFile, read
 from tvist_lab.metrics import NotMeasurableError
-from tvist_lab.paper.drawing import draw
+from tvist_lab.paper.drawing import draw, draw_overview
 from tvist_lab.paper.experiment import Experiment, judge, run, table_1
 from tvist_lab.paper.methods import TimeVarying, Unshaped
 from tvist_lab.paper.published import MOTIONS
@@ -18,6 +18,9 @@ from tvist_lab.paper.report import as_dict
 from tvist_lab.recordings import Recording, RecordingError
 from tvist_lab.replay import replay_file
 from tvist_lab.served import served_robot
+
+ANSWERED = "Q1-Q3"
+"""Motion of which the overview is drawn: on its way the arm's frequency doubles, and its vibration is seen to ring."""
 
 
 class DemoError(RuntimeError):
@@ -31,11 +34,17 @@ class Demo:
     report: dict[str, Any]
     """Report of `tvist paper`, with the checks."""
     recording: Path
+    overview: Path
+    """Figure of one motion that shows the answer at a glance."""
     figures: list[Path]
-    equal: bool
-    """Whether the replay gave equal states, and the recording equal figures."""
-    verdict: str
-    """Result of the checks in words."""
+    """The paper's figures."""
+    difference: str | None
+    """Where the replay differs from the recording first; None if it does not."""
+
+    @property
+    def equal(self) -> bool:
+        """Whether the replay gave equal states, and the recording the figures of the live stream."""
+        return self.difference is None and bool(self.report["recording_gives_same_figures"])
 
 
 def run_demo(folder: Path, seed: int, progress: Callable[[str], None]) -> Demo:
@@ -62,10 +71,9 @@ def run_demo(folder: Path, seed: int, progress: Callable[[str], None]) -> Demo:
     except (RuntimeError, NotMeasurableError, RecordingError) as error:
         raise DemoError(str(error)) from error
     again = replay_file(content)
-    equal = again.first_difference is None
     report = as_dict(done) | {
         "replayed_ticks": len(again.states),
-        "replay_equal": equal,
+        "replay_equal": again.first_difference is None,
         "recording_gives_same_figures": same,
         "states_lost_on_the_way": lost,
         "missed_ticks": content.states[-1].missed_ticks,
@@ -73,9 +81,9 @@ def run_demo(folder: Path, seed: int, progress: Callable[[str], None]) -> Demo:
     return Demo(
         report=report,
         recording=path,
+        overview=draw_overview(done, ANSWERED, folder),
         figures=draw(done, folder, all_figures=False),
-        equal=equal and same,
-        verdict=_verdict(report, again.first_difference),
+        difference=again.first_difference,
     )
 
 
@@ -92,7 +100,7 @@ async def _run(
             for method in (Unshaped(), TimeVarying()):
                 live[motion, method.name] = await run(robot, arm, motion, method, seed=1000 * seed)
                 done.labels[method.name] = method.label
-                progress(f"{motion} {method.label}")
+                progress(f"{motion} {method.name}")
     return done, live
 
 
@@ -112,20 +120,3 @@ def _measure(
         if complete:
             same = same and judge(received).result == done.judged[key][0].result
     return same, lost
-
-
-def _verdict(report: dict[str, Any], difference: str | None) -> str:
-    replayed = (
-        "free of any clock, give every state to the last bit"
-        if difference is None
-        else f"free of any clock, differ: {difference}"
-    )
-    lost = report["states_lost_on_the_way"]
-    figures = "the same figures" if report["recording_gives_same_figures"] else "OTHER figures"
-    received = "; the live stream gives " + figures
-    if lost:
-        received += f" where all of it arrived ({lost} states were dropped on the way: the machine is busy)"
-    ticks, missed = report["replayed_ticks"], report["missed_ticks"]
-    return (
-        f"{ticks} ticks in real time, {missed} missed; the recorded commands, run again {replayed}{received}."
-    )

@@ -3,6 +3,7 @@
 import doctest
 import functools
 import importlib.util
+import itertools
 import json
 import os
 import re
@@ -120,6 +121,11 @@ def check_command(words):
         case "make":
             targets = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
             assert set(arguments) <= set(targets)
+        case "marimo":
+            verbs = list(itertools.takewhile(lambda word: not word.startswith(("-", "lab/")), arguments))
+            unknown = {word for word in arguments if word.startswith("--")} - marimo_options(*verbs)
+            assert not unknown, f"marimo {' '.join(verbs)} does not know {unknown}"
+            assert all((ROOT / word).exists() for word in arguments if word.startswith("lab/"))
         case "python" if arguments[0] == "-m":
             assert importlib.util.find_spec(arguments[1]) is not None, arguments[1]
         case "python" | "cp":
@@ -135,6 +141,11 @@ def options(*command):
     told = assert_well(run("-m", "tvist_cli", *command, "--help"))
     assert not command or f"tvist {command[0]}" in told
     return set(re.findall(r"--[\w-]+", told))
+
+
+@functools.cache
+def marimo_options(*verbs):
+    return set(re.findall(r"--[\w-]+", assert_well(run("-m", "marimo", *verbs, "--help"))))
 
 
 @pytest.fixture(scope="module")

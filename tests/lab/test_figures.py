@@ -83,6 +83,36 @@ def test_figure_16_writes_the_rv_it_draws_and_where_it_is_no_fit(figures, record
     assert sum(text == "$t_b$" for text in words) == 2
 
 
+@pytest.fixture
+def rung(one_motion, ring):
+    """A motion after which the tool rings with an amplitude, in the truth."""
+
+    def make(shaped_ticks, amplitude):
+        recording = one_motion(shaped_ticks, truth=ring(TICKS, 501 + shaped_ticks, 10.0, 0.1, amplitude))
+        return recording, motions(recording)[0]
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "changed", "gained"), [(0.1, "less", "earlier"), (4.0, "more", "later")]
+)
+def test_the_overview_says_by_its_own_curves_whether_the_tool_shakes_less_and_rests_earlier(
+    figures, rung, amplitude, changed, gained
+):
+    (panel,) = figures.after_stop_figure(rung(0, 1.0), rung(10, amplitude), "Q1-Q3").axes
+    curves = [line for line in panel.get_lines() if line.get_linewidth() == 1.8]
+    peaks = [line for line in panel.get_lines() if line.get_marker() == "o"]
+    for curve, peak in zip(curves, peaks, strict=True):
+        time, alpha = curve.get_xydata().T
+        assert peak.get_xydata()[0][1] == pytest.approx(alpha[time >= peak.get_xydata()[0][0]].max())
+    before, after = (peak.get_xydata()[0][1] for peak in peaks)
+    without, with_shaping, rest, *_ = texts(panel)[:2] + [text for text in texts(panel) if "at rest" in text]
+    assert without == f"without shaping: {before:.2f} m/s²"
+    assert with_shaping == f"with shaping: {after:.2f} m/s², {100 * abs(after / before - 1):.0f} % {changed}"
+    assert rest.endswith(f"{gained} with shaping")
+
+
 def test_a_saved_figure_is_an_equal_file_each_time_and_makes_its_folder(figures, tmp_path):
     files = [figures.save(figures.figure_4(), tmp_path / name / "figure_4.png") for name in ("a", "b")]
     first, second = (file.read_bytes() for file in files)

@@ -440,6 +440,7 @@ def test_the_demonstration_replays_equal_and_its_recording_gives_the_same_figure
     assert said["recording_gives_same_figures"] is True
     assert len(said["table_2"]) == 3
     assert {path.suffix for path in (tmp_path / "demo").iterdir()} >= {".mcap", ".png"}
+    assert (tmp_path / "demo" / "vibration-with-and-without-shaping.png").exists()
     assert [path.name for path in tmp_path.iterdir()] == ["demo"]
 
 

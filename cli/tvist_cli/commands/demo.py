@@ -3,19 +3,23 @@
 from pathlib import Path
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import out, print_json, progress
+from tvist_cli.output import out, print_json, program, progress, words
 from tvist_cli.tables import print_paper
 
 
-def demo(*, output: Path = Path("tvist-demo"), seed: int = 0, json: bool = False) -> None:
-    """Serve a robot, run the paper's motions on it over Zenoh in real time, unshaped and shaped, and show the results.
+def demo(
+    *, output: Path = Path("tvist-demo"), seed: int = 0, tables: bool = False, json: bool = False
+) -> None:
+    """Serve a robot, run the paper's motions on it over Zenoh in real time, unshaped and shaped, and say what happened.
 
     Args:
         output: Folder for the recording and the figures.
         seed: Seed of sensor noise and gear errors.
-        json: Print one JSON object.
+        tables: Print the paper's tables beside those of this run as well.
+        json: Print one JSON object with all results.
     """
-    from tvist_lab.demo import DemoError, run_demo
+    from tvist_lab.demo import ANSWERED, DemoError, run_demo
+    from tvist_lab.paper.answer import answer, checks, terms
     from tvist_lab.paper.experiment import count
 
     with (
@@ -30,12 +34,29 @@ def demo(*, output: Path = Path("tvist-demo"), seed: int = 0, json: bool = False
     if json:
         print_json(result.report)
     else:
-        print_paper(result.report)
-        out.print(result.verdict)
-        for path in (result.recording, *result.figures):
-            out.print(f"  {path}")
+        if tables:
+            print_paper(result.report)
+        for line in answer(result.report, ANSWERED):
+            out.print(line, markup=False)
+        out.print(f"\n  look at {result.overview}", soft_wrap=True, markup=False)
         out.print(
-            "next: tvist serve, then tvist move Q2 in another terminal; or clients/examples/01_bare_client.py"
+            f"  ({output} also holds the paper's figures and the recording)\n", soft_wrap=True, markup=False
         )
+        words({**terms(result.report, ANSWERED), **checks(result.report, result.difference)})
+        _print_next()
     if not result.equal:
         raise Failure("the recording differs from its replay or from what the client received")
+
+
+def _print_next() -> None:
+    """Print three commands that work as they stand; each is one line, however narrow the terminal, to be copied."""
+    name = program()
+    commands = {
+        f"{name} paper --runs 1 --no-baselines": "prints the paper's tables beside ours",
+        f"{name} serve": "starts a robot: leave it running, and in a second terminal",
+        f"{name} move Q3 --shaper none": "moves it, unshaped; with --shaper zv, shaped",
+    }
+    width = max(map(len, commands))
+    out.print("next:")
+    for command, does in commands.items():
+        out.print(f"  {command:{width}}  {does}", soft_wrap=True, markup=False)

@@ -1,5 +1,6 @@
 """The paper's figures, drawn from recordings and from the shaping library."""
 
+from tvist_lab.figures.after_stop import after_stop_figure
 from tvist_lab.figures.catalogue import catalogue_figure
 from tvist_lab.figures.discretisation import figure_7
 from tvist_lab.figures.evaluated import residual_by_move_figure, vibration_figure
@@ -13,6 +14,7 @@ from tvist_lab.figures.style import save
 
 __all__ = [
     "Recorded",
+    "after_stop_figure",
     "catalogue_figure",
     "figure_4",
     "figure_7",
