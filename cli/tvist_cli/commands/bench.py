@@ -1,13 +1,19 @@
 """`tvist bench`: measure how fast tvist runs on this machine."""
 
 import asyncio
+from typing import Any
 
 from tvist_cli.failure import Failure, interrupted
 from tvist_cli.output import err, out, print_json, say, table
 
 
 def bench(
-    *, seconds: float = 10.0, soak: float | None = None, hostile: int | None = None, json: bool = False
+    *,
+    seconds: float = 10.0,
+    soak: float | None = None,
+    hostile: int | None = None,
+    viewed: int | None = None,
+    json: bool = False,
 ) -> None:
     """Measure the plant, the filter, the whole control cycle, a served robot, and how many robots one core can run.
 
@@ -16,28 +22,36 @@ def bench(
         soak: Serve a robot under load for this many minutes instead, and report whether memory and timing stay stable.
         hostile: Instead, compare how late a served robot's ticks are with and without 100 messages a second of every
             type and size, valid and invalid, in this many pairs of runs of --seconds each.
+        viewed: Instead, compare how late a served robot's ticks are with and without a page of tvist view, in this
+            many pairs of runs of --seconds each, and report the page's pictures per second and its memory.
         json: Print one JSON object.
     """
     if seconds < 0.0:
         raise Failure(f"seconds is {seconds:g}: must be at least 0", code=2)
     if soak is not None and soak <= 0.0:
         raise Failure(f"soak is {soak:g} minutes: must be more than 0", code=2)
-    if hostile is not None and not (hostile >= 2 and seconds > 0.0):
-        raise Failure(
-            f"hostile is {hostile}: must be at least 2 pairs of runs, of more than 0 seconds", code=2
-        )
+    for name, pairs in (("hostile", hostile), ("viewed", viewed)):
+        if pairs is not None and not (pairs >= 2 and seconds > 0.0):
+            raise Failure(
+                f"{name} is {pairs}: must be at least 2 pairs of runs, of more than 0 seconds", code=2
+            )
     try:
         if hostile is not None:
             _hostile(hostile, seconds, json)
-            return
-        if soak is not None:
+        elif viewed is not None:
+            _viewed(viewed, seconds, json)
+        elif soak is not None:
             _soak(soak, json)
-            return
-        from tvist_lab.bench import bench as run
-
-        result = run(seconds, tell=lambda what: err.print(f"measuring {what} ..."))
+        else:
+            _all(seconds, json)
     except KeyboardInterrupt:
         raise interrupted("the measurements so far are lost; the served robots have stopped") from None
+
+
+def _all(seconds: float, json: bool) -> None:
+    from tvist_lab.bench import bench as run
+
+    result = run(seconds, tell=lambda what: err.print(f"measuring {what} ..."))
     if json:
         print_json(result)
         return
@@ -56,11 +70,26 @@ def _hostile(pairs: int, seconds: float, json: bool) -> None:
     if json:
         print_json(result)
         return
+    _pairs(result, f"{pairs} pairs of {seconds:g} s, {result['messages_per_second']:g} messages a second")
+
+
+def _viewed(pairs: int, seconds: float, json: bool) -> None:
+    from tvist_lab.benchmark.viewed import viewed
+
+    result = asyncio.run(viewed(pairs, seconds, tell=err.print))
+    if json:
+        print_json(result)
+        return
+    _pairs(result, f"{pairs} pairs of {seconds:g} s, without and with a page")
+    figures = {key: value for key, value in result.items() if not isinstance(value, dict)}
+    table("the page", ("what", "figure"), [(key, f"{value:.4g}") for key, value in figures.items()])
+
+
+def _pairs(result: dict[str, Any], title: str) -> None:
     rows = [
         (what, *(f"{result[what][name]:.4g}" for name in ("without", "with", "difference", "interval")))
         for what in ("late_p99_us", "missed")
     ]
-    title = f"{pairs} pairs of {seconds:g} s, {result['messages_per_second']:g} messages a second"
     table(title, ("a run", "without", "with", "difference", "± (95 %)"), rows)
 
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import os
 from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from tvist_protocol.values import Payload
     from tvist_view.track import Track
 
+NICE = 5
+"""How much a page gives way to other programs, such as a robot's server on the same machine."""
 MAGNIFY_COMPARED = 100.0
 """Magnification where shapers are compared, unless another is given [-]."""
 
@@ -105,6 +108,8 @@ def _serve(
     from tvist_view.stage import StageError, close_stage, open_stage
 
     logging.basicConfig(format="tvist: %(message)s", level=logging.WARNING)
+    if hasattr(os, "nice"):
+        os.nice(NICE)
     with told(StageError):
         server = open_stage(*place, title, insecure=insecure)
     err.print(f"the page is at http://{place[0]}:{server.get_port()} (Control+C ends it)")
