@@ -65,4 +65,5 @@ def info_of(controller: Controller) -> Info:
         stop=controller.stop_reason,
         arm=controller.arm,
         programs=sorted(controller.programs.known),
+        poses=setup.description.poses,
     )

@@ -6,7 +6,7 @@ import pinocchio as pin
 from tvist_controller.control.differentiator import Floats, Target
 from tvist_controller.control.inverse_dynamics import SLEW
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.model import FLANGE, rigid_model
+from tvist_plant.model import FLANGE, carries_weight, rigid_model
 from tvist_plant.plant import PERIOD
 
 EVERY = 10
@@ -33,6 +33,9 @@ class PayloadMonitor:
     so they do not count for long. A warning needs a μ that friction and an honest inaccuracy together do not explain:
     upright, where gravity has no lever, there is none.
 
+    An arm whose axes are all vertical feels its payload only while it accelerates, and there a soft joint delays what
+    its drive feels: it is not judged.
+
     A frequency that is off would show it, too, but only where the arm rings, and less: 3 kg of 5 change the
     frequency by a fifth and the shoulder's torque by half.
 
@@ -42,6 +45,7 @@ class PayloadMonitor:
     """
 
     def __init__(self, description: RobotDescription, declared: Payload) -> None:
+        self._judges = carries_weight(description)
         self._model = rigid_model(description, Payload())
         for number in range(self._model.njoints):  # what is left weighs nothing but the kilogram
             self._model.inertias[number] = pin.Inertia.Zero()
@@ -108,7 +112,7 @@ class PayloadMonitor:
         return self._judge()
 
     def _judge(self) -> str | None:
-        if self._warned or self._time < ENOUGH:
+        if not self._judges or self._warned or self._time < ENOUGH:
             return None
         mass, bound = self.excess
         if not abs(mass) > TOLERATED + bound:

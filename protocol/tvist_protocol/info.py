@@ -126,3 +126,5 @@ class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=F
     """Client that holds the clock and alone may step time; null: the client that has control may step it."""
     commands: dict[str, list[str]] = {}
     """Fields of each command that the server knows; empty from older servers."""
+    poses: dict[str, tuple[float, ...]] = {}
+    """Named joint positions of the robot file, one angle per joint [rad]; empty from older servers."""
