@@ -5,6 +5,7 @@ from tvist_lab.figures.discretisation import figure_7
 from tvist_lab.figures.evaluated import residual_by_move_figure, vibration_figure
 from tvist_lab.figures.identified import identified_figure
 from tvist_lab.figures.mean_delay import mean_delay_figure
+from tvist_lab.figures.one_joint import figure_2
 from tvist_lab.figures.pareto import pareto_figure
 from tvist_lab.figures.recorded import Recorded, motion_figure, observed_figure
 from tvist_lab.figures.residual import figure_16
@@ -14,6 +15,7 @@ from tvist_lab.figures.style import save
 __all__ = [
     "Recorded",
     "catalogue_figure",
+    "figure_2",
     "figure_4",
     "figure_7",
     "figure_16",
