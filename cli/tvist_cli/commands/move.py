@@ -28,8 +28,8 @@ def move(
     """Move a served robot to a pose and print how long it took; Control+C stops the motion.
 
     Args:
-        target: Name of a pose in the robot file, such as Q1, Q2 or Q3, or joint angles in rad separated by commas:
-            -0.5,-3.1,0,-1.57,0,0.
+        target: Name of a pose in the robot file that begins with a letter, such as Q1, or joint angles in rad separated
+            by commas: -0.5,-3.1,0,-1.57,0,0.
         endpoint: Zenoh endpoint of the robot.
         name: Name of the robot [ur5e; if there is none, the only robot at the endpoint].
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
@@ -44,6 +44,9 @@ def move(
     from tvist_client.robot import NAME, Robot
     from tvist_client.transports.zenoh import only_robot
 
+    if "," in target or not target.strip()[:1].isalpha():
+        # A name begins with a letter; angles are checked before the robot is asked for anything.
+        pose(target, {}, "target", degrees=degrees)
     held = False
 
     async def run() -> tuple[int, int]:
