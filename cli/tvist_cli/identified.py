@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from tvist_lab.identification.payload import PayloadFound
     from tvist_protocol.calibration import ModalParameter, Spread
 
-PAPER_MASS = 5.0
-"""Default payload of a served robot [kg]."""
 UNSEEN = "ring-downs at poses that were left out of the fit"
 QUANTITIES = {
     "gear_stiffness": ("gear stiffness", "N m/rad"),
@@ -24,8 +22,15 @@ QUANTITIES = {
 }
 
 
-def report_polynomial(done: "Identification", output: Path, *, json: bool) -> None:
-    """Print the deviations of a polynomial calibration."""
+def report_polynomial(done: "Identification", output: Path, options: str, *, json: bool) -> None:
+    """Print the deviations of a polynomial calibration, and how to serve with it.
+
+    Args:
+        done: The identification.
+        output: File of the calibration.
+        options: Options of `tvist serve` for the robot that was identified.
+        json: Whether to print one JSON object.
+    """
     how = done.calibration.provenance
     if json:
         print_json(
@@ -65,14 +70,11 @@ def report_polynomial(done: "Identification", output: Path, *, json: bool) -> No
             *([_row(done.against, done.error_f_d, done.error_zeta)] if done.true_f_d is not None else []),
         ],
     )
-    mass = (
-        f" --payload {done.calibration.payload.mass:g}" if done.calibration.payload.mass != PAPER_MASS else ""
-    )
-    out.print(f"written to {output}; use it with: tvist serve --calibration {output}{mass}")
+    out.print(f"written to {output}; use it with: tvist serve --calibration {output}{options}")
 
 
-def report_modal(done: "ModalIdentification", output: Path, *, json: bool) -> None:
-    """Print the parameters of a modal calibration and the deviations of its modes."""
+def report_modal(done: "ModalIdentification", output: Path, options: str, *, json: bool) -> None:
+    """Print the parameters of a modal calibration and the deviations of its modes; see `report_polynomial`."""
     how, model = done.calibration.provenance, done.calibration.modal
     if model is None:
         raise TypeError("an identification of springs and drives has a modal model")
@@ -128,7 +130,7 @@ def report_modal(done: "ModalIdentification", output: Path, *, json: bool) -> No
             f"Not identifiable from these ring-downs: {names}. The vibration hardly depends on it; the initial guess "
             "is kept."
         )
-    out.print(f"written to {output}; use it with: tvist serve --calibration {output}")
+    out.print(f"written to {output}; use it with: tvist serve --calibration {output}{options}")
 
 
 def report_payload(found: "PayloadFound", *, declared: bool, json: bool) -> None:

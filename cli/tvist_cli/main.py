@@ -18,6 +18,7 @@ COMMANDS = {
     "analyze": "Measure the motions of a recording.",
     "replay": "Run a recording's commands again and compare bit by bit.",
     "paper": "Run the paper's experiment and print its tables beside ours.",
+    "lesson": "Show on an arm with one flexible joint why a fixed shaper is not enough.",
     "shapers": "List the shapers with their durations and their robustness to a wrong frequency.",
     "identify": "Calibrate a robot from its own accelerometer.",
     "evaluate": "Compare the vibration of any moves unshaped and shaped.",

@@ -30,9 +30,7 @@ def pose(
         angles = ()
     if not angles or not all(map(math.isfinite, angles)):
         unit = "degrees" if degrees else "rad"
-        known = ", ".join(poses)
-        why = (
-            f"{what} is {quoted(text)}: must be one of {known}, or joint angles in {unit} separated by commas"
-        )
+        known = f"one of {', '.join(poses)}, or " if poses else ""
+        why = f"{what} is {quoted(text)}: must be {known}joint angles in {unit} separated by commas"
         raise Failure(why, code=2)
     return tuple(map(math.radians, angles)) if degrees else angles

@@ -67,6 +67,7 @@ def info_of(controller: Controller) -> Info:
         stop=controller.stop_reason,
         arm=controller.arm,
         programs=sorted(controller.programs.known),
+        poses=setup.description.poses,
         geometry=geometry_of(setup.description),
     )
 
@@ -85,5 +86,4 @@ def geometry_of(description: RobotDescription) -> Geometry:
         ],
         payload_radius=collision.payload_radius,
         floor=collision.floor,
-        poses={name: list(q) for name, q in description.poses.items()},
     )

@@ -4,7 +4,7 @@ The modules behind it may change; `tvist_lab` imports nothing else of this packa
 """
 
 from tvist_controller.ahead import resting_after
-from tvist_controller.calibrations import DEFAULT as DEFAULT_CALIBRATION
+from tvist_controller.calibrations import default_for as default_calibration
 from tvist_controller.calibrations import estimator_of
 from tvist_controller.calibrations import load as load_calibration
 from tvist_controller.calibrations.modal import drivetrain, mass_matrix, modal_estimator
@@ -26,7 +26,6 @@ from tvist_controller.trajectory import JointLine, MotionLimits, Trajectory, qui
 
 __all__ = [
     "CLEARANCE",
-    "DEFAULT_CALIBRATION",
     "FAR",
     "STILL",
     "TORQUE_SHARE",
@@ -47,6 +46,7 @@ __all__ = [
     "body",
     "central_differences",
     "choose_filter",
+    "default_calibration",
     "drivetrain",
     "estimator_of",
     "load_calibration",

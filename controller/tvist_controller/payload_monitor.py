@@ -6,7 +6,7 @@ import pinocchio as pin
 from tvist_controller.control.differentiator import Floats, Target
 from tvist_controller.control.inverse_dynamics import SLEW
 from tvist_plant.description import Payload, RobotDescription
-from tvist_plant.model import FLANGE, rigid_model
+from tvist_plant.model import FLANGE, carries_weight, rigid_model
 from tvist_plant.plant import PERIOD
 
 EVERY = 10
@@ -34,6 +34,9 @@ class PayloadMonitor:
     warning requires that μ exceed what friction and the tolerated error of the declaration explain together. In an
     upright posture, where gravity has no lever arm, there is therefore no warning.
 
+    An arm with only vertical axes is not judged: it feels its payload only while it accelerates, and there a soft joint
+    delays what its drive feels.
+
     A deviating frequency would show the error too, but only while the arm vibrates, and less clearly: 3 kg instead of
     5 kg change the frequency by a fifth and the shoulder's torque by half.
 
@@ -43,6 +46,7 @@ class PayloadMonitor:
     """
 
     def __init__(self, description: RobotDescription, declared: Payload) -> None:
+        self._judges = carries_weight(description)
         self._model = rigid_model(description, Payload())
         for number in range(self._model.njoints):  # only the kilogram has mass in this model
             self._model.inertias[number] = pin.Inertia.Zero()
@@ -110,7 +114,7 @@ class PayloadMonitor:
         return self._judge()
 
     def _judge(self) -> str | None:
-        if self._warned or self._time < ENOUGH:
+        if not self._judges or self._warned or self._time < ENOUGH:
             return None
         mass, bound = self.excess
         if not abs(mass) > TOLERATED + bound:

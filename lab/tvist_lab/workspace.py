@@ -1,11 +1,13 @@
-"""Workspace in which a six-joint arm on a stand is measured and tested."""
+"""Workspace in which an arm is measured and tested."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import qmc
 
 from tvist_lab.recordings import Floats
+from tvist_plant.description import RobotDescription
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,38 @@ WORKSPACE = Region(
     low=(-np.pi, -np.pi, -5.0 * np.pi / 6.0, -np.pi),
     high=(np.pi, 0.0, 5.0 * np.pi / 6.0, 0.0),
 )
-"""Space above the stand, with the wrist's two outer joints at zero."""
-IDENTIFIED = Region(low=(0.0, *WORKSPACE.low[1:]), high=(0.0, *WORKSPACE.high[1:]))
-"""Workspace without the base joint, which does not change the modes of an arm on a rigid stand."""
+"""That of a six-joint arm: above the stand, the wrist's two outer joints at zero."""
+
+
+def ranges(description: RobotDescription) -> list[tuple[float, float]]:
+    """Return the smallest and the largest angle of each joint of an arm [rad]."""
+    return [(-limit, limit) for limit in description.limits.position]
+
+
+def workspace(position: Sequence[tuple[float, float]], margin: float = 0.0) -> Region:
+    """Return the workspace of an arm with these limits.
+
+    An arm with fewer joints than `WORKSPACE` has is not taken to stand and reach as that one does: its workspace is
+    all that its limits allow, half a turn either way at most.
+
+    Args:
+        position: Smallest and largest angle of each joint [rad].
+        margin: Distance to keep from these limits [rad].
+    """
+    sides = len(WORKSPACE.low)
+    whole = WORKSPACE if len(position) >= sides else Region(low=(-np.pi,) * sides, high=(np.pi,) * sides)
+    limits = list(position)[:sides]
+    low = [max(side, limit + margin) for side, (limit, _) in zip(whole.low, limits, strict=False)]
+    high = [min(side, limit - margin) for side, (_, limit) in zip(whole.high, limits, strict=False)]
+    return Region(low=tuple(low), high=tuple(high))
+
+
+def identified(position: Sequence[tuple[float, float]], margin: float = 0.0) -> Region:
+    """Return the workspace without the base: turning an arm on a rigid stand changes none of its modes.
+
+    Args:
+        position: Smallest and largest angle of each joint [rad].
+        margin: Distance to keep from these limits [rad].
+    """
+    region = workspace(position, margin)
+    return Region(low=(0.0, *region.low[1:]), high=(0.0, *region.high[1:]))

@@ -42,5 +42,3 @@ class Geometry(Struct, frozen=True, kw_only=True, gc=False):
     """Radius of the capsule from the flange through the centre of mass of the payload to twice its distance [m]."""
     floor: float = 0.0
     """Height of the floor [m]."""
-    poses: dict[str, list[float]] = {}
-    """Named poses, one angle per joint [rad]."""

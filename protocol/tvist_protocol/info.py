@@ -127,5 +127,7 @@ class Info(Struct, frozen=True, kw_only=True, tag_field="type", tag="info", gc=F
     """Client that holds the clock and alone may step time; null: the client that has control may step it."""
     commands: dict[str, list[str]] = {}
     """Fields of each command that the server knows; empty from older servers."""
+    poses: dict[str, tuple[float, ...]] = {}
+    """Named poses, one angle per joint [rad]; empty from older servers."""
     geometry: Geometry | None = None
     """Kinematics and shape of the arm; null from older servers."""

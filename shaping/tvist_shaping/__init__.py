@@ -17,7 +17,16 @@ from tvist_shaping.errors import (
     ShapingError,
     UnknownShaperError,
 )
-from tvist_shaping.estimators import Drivetrain, Estimator, Fixed, Modal, Polynomial, terms
+from tvist_shaping.estimators import (
+    Drivetrain,
+    Estimator,
+    Fixed,
+    FlexibleJoint,
+    Modal,
+    Polynomial,
+    flexible_joint,
+    terms,
+)
 from tvist_shaping.exact import ei2_exact, ei3_exact, ei_exact
 from tvist_shaping.fade import Fade
 from tvist_shaping.filter import TvistFilter
@@ -51,6 +60,7 @@ __all__ = [
     "FirDesign",
     "FirShaper",
     "Fixed",
+    "FlexibleJoint",
     "ImpulseError",
     "Impulses",
     "Modal",
@@ -76,6 +86,7 @@ __all__ = [
     "ei3_exact",
     "ei_exact",
     "ei_of",
+    "flexible_joint",
     "make_filter",
     "mzv",
     "mzv_of",

@@ -18,7 +18,16 @@ change without notice.
 """
 PARTS: dict[str, tuple[str, ...]] = {
     "Filters": ("make_filter", "Filter", "TvistFilter", "SteadyFilter", "AimedFilter", "Fade", "DelayLine"),
-    "Where the modes come from": ("Estimator", "Fixed", "Polynomial", "terms", "Modal", "Drivetrain"),
+    "Where the modes come from": (
+        "Estimator",
+        "Fixed",
+        "Polynomial",
+        "terms",
+        "FlexibleJoint",
+        "flexible_joint",
+        "Modal",
+        "Drivetrain",
+    ),
     "Shapers by name": ("SHAPERS", "shaper", "DESIGNS", "Registry", "BUILT_IN"),
     "Shapers of your own": (
         *("Shaper", "shaper_of", "custom", "FirShaper", "check_shaper", "mzv_of", "ei_of", "si_of"),

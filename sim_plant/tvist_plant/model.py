@@ -91,6 +91,11 @@ def flexible_model(description: RobotDescription, payload: Payload) -> FlexibleM
     )
 
 
+def carries_weight(description: RobotDescription) -> bool:
+    """Whether gravity can load a joint: not where every axis is vertical, as the first one always is."""
+    return bool(np.any(np.abs(np.sin(description.kinematics.alpha[:-1])) > 1e-9))
+
+
 def _shift(x: float, z: float) -> pin.SE3:
     return pin.SE3(np.eye(3), np.array([x, 0.0, z]))
 

@@ -5,6 +5,8 @@ import pytest
 
 from tvist_controller.about import info_of
 from tvist_controller.calibrations import available, load
+from tvist_plant.description import load as load_robot
+from tvist_plant.description import robots
 from tvist_plant.fingerprint import fingerprint
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Done
@@ -12,6 +14,7 @@ from tvist_protocol.replies import Done
 from .robots import UR5E, Robot, calibration
 
 REPLACE = msgspec.structs.replace
+SHIPPED = [load_robot(name) for name in robots()]
 SOFT = REPLACE(
     UR5E,
     drives=REPLACE(UR5E.drives, gear_stiffness=tuple(0.5 * k for k in UR5E.drives.gear_stiffness)),
@@ -30,7 +33,9 @@ def warnings(robot):
 
 @pytest.mark.parametrize("name", available())
 def test_the_calibrations_of_the_package_are_of_its_robot(name):
-    assert load(name).provenance.arm == fingerprint(UR5E)
+    calibration = load(name)
+    (arm,) = (arm for arm in SHIPPED if arm.robot.model == calibration.robot)
+    assert calibration.provenance.arm == fingerprint(arm)
 
 
 @pytest.mark.parametrize("description", [UR5E, RENAMED], ids=["ur5e", "renamed"])

@@ -36,7 +36,7 @@ def ur5e():
 
 @pytest.fixture(scope="module")
 def paper(ur5e):
-    return calibrations.load(calibrations.DEFAULT)
+    return calibrations.load("ur5e_5kg")
 
 
 @pytest.fixture

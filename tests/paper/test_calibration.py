@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tvist_controller.calibrations import DEFAULT, estimator_of, fits, load
+from tvist_controller.calibrations import estimator_of, fits, load
 from tvist_lab.paper.published import published
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.flexible_arm import FlexibleArm
@@ -12,7 +12,7 @@ from tvist_server.config import ServeConfig
 
 @pytest.fixture(scope="module")
 def calibration():
-    return load(DEFAULT)
+    return load("ur5e_5kg")
 
 
 @pytest.mark.parametrize("name", ["Q1", "Q2", "Q3"])

@@ -5,8 +5,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tvist_plant.description import Payload
-from tvist_plant.model import FLANGE, flexible_model, rigid_model
+from tvist_plant.description import Payload, load
+from tvist_plant.model import FLANGE, carries_weight, flexible_model, rigid_model
 
 from .arms import chain, forward_kinematics
 
@@ -131,3 +131,8 @@ def test_virtual_joints_turn_about_the_middle_of_their_link(ur5e):
 def test_a_payload_of_zero_mass_changes_nothing(ur5e):
     empty = rigid_model(ur5e, Payload())
     assert pin.computeTotalMass(empty) == pytest.approx(sum(ur5e.links.mass), rel=1e-12)
+
+
+def test_an_arm_with_vertical_axes_alone_carries_no_weight():
+    assert carries_weight(load("ur5e"))
+    assert not carries_weight(load("one-joint"))

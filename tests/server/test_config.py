@@ -4,9 +4,11 @@ import json
 import tomllib
 from importlib import resources
 
+import msgspec
 import pytest
 from tests.controller.robots import Q1, Q3, UR5E, calibration, cut, setup
 
+from tvist_controller import calibrations
 from tvist_controller.setup import Setup, paper_payload
 from tvist_plant.user_file import UserFileError
 from tvist_protocol.calibration import calibration_to_json
@@ -76,12 +78,37 @@ def test_the_defaults_are_the_paper_s():
     assert (made.name, made.shaper, made.seed, made.clock, made.truth) == ("ur5e", "zv", 0, "realtime", False)
 
 
-@pytest.mark.parametrize("none", [None, "none"])
-def test_without_calibration_the_estimator_is_fixed(none):
-    made = config(calibration=none).setup()
+def test_without_calibration_the_estimator_is_fixed():
+    made = config(calibration="none").setup()
     assert made.calibration is None
     f_d, zeta = made.estimator().estimate(Q1)
     assert (f_d.tolist(), zeta.tolist()) == ([10.0], [0.2])
+
+
+@pytest.mark.parametrize(("robot", "name"), [("ur5e", "ur5e_5kg"), ("one-joint", "one-joint_1kg")])
+def test_the_default_calibration_belongs_to_the_robot(robot, name):
+    made = from_mapping({"robot": robot}, "tvist.toml").setup()
+    assert made.calibration.name == name
+    assert made.calibration.robot == made.description.robot.model
+    assert made.source().fits_arm
+
+
+def test_a_calibration_that_is_named_takes_the_place_of_the_default(tmp_path):
+    file = tmp_path / "mine.json"
+    own = msgspec.structs.replace(calibrations.load("one-joint_1kg"), name="mine")
+    file.write_bytes(calibration_to_json(own))
+    assert config(robot="one-joint", calibration=str(file)).setup().calibration == own
+
+
+def test_a_robot_that_no_calibration_belongs_to_says_what_to_do(tmp_path):
+    file = tmp_path / "mine.toml"
+    shipped = (resources.files("tvist_plant") / "robots" / "one-joint.toml").read_text("utf-8")
+    file.write_text(shipped.replace('"one-joint arm"', '"mine"'), encoding="utf-8")
+    said = sentence(from_mapping({"robot": str(file)}, "tvist.toml").setup)
+    assert said == (
+        "no calibration for a mine comes with the package: give one that tvist identify made, or none"
+    )
+    assert config(robot=str(file)).setup().calibration is None
 
 
 @pytest.mark.parametrize("start", ["0.1,-1,2,0,0,0.5", " 0.1, -1, 2, 0, 0, 0.5", [0.1, -1, 2, 0, 0, 0.5]])

@@ -331,6 +331,10 @@ class TestMoveAndWatch:
             assert state["runtime_state"] == STOPPED
             assert 0.1 < state["target_q"][0] < 2.9
 
+    def test_a_name_of_no_pose_is_answered_with_the_robots_poses(self, realtime):
+        ended = tvist("move", "there", "--endpoint", realtime.endpoint)
+        assert ended.assert_failed(2, "target is 'there'", "Q1, Q2, Q3").out == ""
+
     def test_a_target_outside_the_limits_is_the_robots_sentence(self, realtime):
         ended = tvist("move", "9,0,0,0,0,0", "--endpoint", realtime.endpoint, "--json")
         assert ended.assert_failed(1, "limit_position", "q[0]").out == ""
@@ -363,7 +367,6 @@ class TestMoveAndWatch:
     ("arguments", "named"),
     [
         (("move",), "target"),
-        (("move", "there"), "target"),
         (("move", "Q2", "--velocity", "fast"), "--velocity"),
         (("analyze",), "file"),
         (("dance",), "dance"),

@@ -77,7 +77,7 @@ def test_a_motion_of_the_page_moves_the_arm(tab, wire, served):
     assert wire.info()["control"].startswith("view-")
     tab.get_by_role("button", name="Q1 → Q3").click()
     moving(wire)
-    target = wire.info()["geometry"]["poses"]["Q3"]
+    target = wire.info()["poses"]["Q3"]
     wire.wait(
         "state", lambda state: max(abs(a - b) for a, b in zip(state["target_q"], target, strict=True)) < 1e-9
     )

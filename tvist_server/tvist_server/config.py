@@ -13,6 +13,7 @@ from tvist_controller import calibrations
 from tvist_controller.setup import Setup, check_rating, paper_payload
 from tvist_plant import user_file
 from tvist_plant.description import RobotDescription, load
+from tvist_protocol.calibration import Calibration
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Clock
@@ -55,8 +56,9 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Start even if the declared payload exceeds the robot's rating."""
     shaper: str = "zv"
     """Initial shaper: its name, or FILE.py:NAME for your own."""
-    calibration: str | None = calibrations.DEFAULT
-    """Name of a calibration that comes with the package, or path of one; "none" for a robot yet to be identified."""
+    calibration: str | None = None
+    """Name of a calibration that comes with the package, or path of one; "none" for a robot yet to be identified;
+    default: the one that comes with the package for this robot."""
     clock: Clock = "realtime"
     """What advances simulation time."""
     speed: Annotated[float, Meta(gt=0, le=100)] = 1.0
@@ -150,8 +152,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         """
         try:
             description = load(self.robot)
-            named = self.calibration not in {None, "none"}
-            calibration = calibrations.load(str(self.calibration)) if named else None
+            calibration = self._calibration(description.robot.model)
             setup = Setup(
                 description=description,
                 q=self._start(description),
@@ -183,6 +184,15 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
                 f"{description.robot.model}: give another calibration, or none"
             )
         return setup
+
+    def _calibration(self, model: str) -> Calibration | None:
+        """Load the calibration that is named or, if none is, the one that comes with the package for this model."""
+        name = calibrations.default_for(model) if self.calibration is None else self.calibration
+        if name is None:
+            raise ConfigError(
+                f"no calibration for a {model} comes with the package: give one that tvist identify made, or none"
+            )
+        return None if name == "none" else calibrations.load(name)
 
     def _start(self, description: RobotDescription) -> tuple[float, ...]:
         if not isinstance(self.start, str):

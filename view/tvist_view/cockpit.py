@@ -80,7 +80,7 @@ class Cockpit:
         self._pilot.do(self._tab, doing)
 
     def _motions(self, info: Info) -> None:
-        poses = {} if info.geometry is None else info.geometry.poses
+        poses = info.poses
         for first, last in pairs(list(poses)):
             self._button(
                 f"{first} → {last}",

@@ -52,12 +52,12 @@ def evaluate(
         random: Number of moves to draw instead: over the workspace, 30 to 100 % of the way between two
             configurations, and free of collisions.
         payload: Mass of the disc on the flange in kg, both carried and declared; uniform draws one for each move, from
-            0 to the arm's rating [5].
+            0 to the arm's rating [that of the robot file; 5 for the ur5e].
         shaper: Name of a shaper; or of a filter for several modes: auto, short, or auto-target, which is given the
             target of each move; or FILE.py:NAME, which runs that file, for your own shaper.
         modes: Number of modes that the shaper suppresses; more than one needs a modal calibration.
         calibration: Name of a calibration that comes with the package, or path of a calibration file
-            [ur5e_5kg; for several modes, ur5e_modal].
+            [the one that comes with the package for this robot; for several modes, its modal one].
         robot: Name of a robot that comes with the package, or path of a robot file.
         seed: Seed of random moves, payloads and gear errors.
         wrists: Let random moves turn the two outer wrist joints as well.
@@ -185,8 +185,8 @@ def _calibration(
     modes: int,
     description: "RobotDescription",
 ) -> "Calibration | None":
-    """Return the calibration that was named; by default the paper's, or a modal one for several modes."""
-    from tvist_controller.calibrations import DEFAULT, load
+    """Return the calibration that was named, or the one of this robot: for several modes, a modal one."""
+    from tvist_controller.calibrations import default_for, load
     from tvist_controller.choices import wanted_modes
     from tvist_controller.mode_source import modal_source
     from tvist_controller.refusal import RefusalError
@@ -198,11 +198,12 @@ def _calibration(
         several = wanted_modes(shaper, modes, "shaper", known) > 1
         if name is not None:
             return load(name)
-        paper = load(DEFAULT)
-        if paper.robot != description.robot.model:
+        default = default_for(description.robot.model)
+        if default is None:
             return None
-        found = modal_source(description, paper) if several else None
-        return paper if found is None else found.calibration
+        calibration = load(default)
+        found = modal_source(description, calibration) if several else None
+        return calibration if found is None else found.calibration
 
 
 def _moves(

@@ -1,7 +1,7 @@
 """`tvist identify`: identify a robot's vibration, or its payload, from the robot's own sensors."""
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from tvist_lab.identification.modal import ModalIdentification
     from tvist_lab.identification.payload import PayloadFound
     from tvist_plant.description import RobotDescription
+    from tvist_protocol.info import Info
 
-MASSES = "0,5"
-"""Default payloads for the identification of a modal model [kg]."""
+ROBOT = "ur5e"
+"""Robot that is identified unless another one is named."""
 
 Doing = Callable[["Robot", "Arm"], Awaitable[Any]]
 
@@ -31,7 +32,7 @@ def identify(
     *,
     output: Path = Path("calibration.json"),
     name: str | None = None,
-    robot: str = "ur5e",
+    robot: str = ROBOT,
     description: str | None = None,
     security: Path | None = None,
     model: Literal["polynomial", "modal"] = "polynomial",
@@ -69,13 +70,13 @@ def identify(
         configurations: Number of configurations, spread over the workspace (polynomial).
         repeats: Number of jogs averaged in each configuration (polynomial).
         ring_downs: Total number of ring-downs (modal).
-        payloads: Masses in kg, separated by commas, that a simulated arm carries in turn (modal); default: 0,5 in this
-            process, the declared payload over a network.
+        payloads: Masses in kg, separated by commas, that a simulated arm carries in turn (modal); default: nothing and
+            the robot file's payload in this process, which is 0,5 for the ur5e; the declared payload over a network.
         poses: Number of poses in which the arm rests to identify the payload.
         declare: Declare the identified payload to the robot.
         seed: Seed of the choice of configurations and, in this process, of noise and gear errors.
         at: Poses to measure with more weight (polynomial): names from the robot file, or angles separated by commas
-            [Q1 Q2 Q3].
+            [all poses of the robot file].
         figures: Folder to write a figure of the fit to (polynomial).
         json: Print one JSON object.
     """
@@ -87,17 +88,18 @@ def identify(
     from tvist_plant.description import DescriptionError, load
 
     with told(DescriptionError, code=2):
-        arm = load(description or (robot if endpoint is None else "ur5e"))
+        arm = load(description or (robot if endpoint is None else ROBOT))
     place = _Place(endpoint, robot, security, mass, seed)
     called = name or output.stem
     if payload is not None and mass is None:
         _payload(place, arm, poses, declare=declare, json=json)
     elif model == "modal":
-        masses = MASSES if payloads is None and mass is None and endpoint is None else payloads
+        whole = payloads is None and mass is None and endpoint is None
+        masses = f"0,{arm.payload.mass:g}" if whole else payloads
         _modal(place, arm, ring_downs, masses, output, called, json=json)
     else:
-        anchors = [_pose(text, arm.poses, arm.joints) for text in at or list(arm.poses)]
-        _polynomial(place, anchors, configurations, repeats, output, called, figures, json=json)
+        anchors = place.anchors(at)
+        _polynomial(place, arm, anchors, configurations, repeats, output, called, figures, json=json)
 
 
 class _Place:
@@ -127,6 +129,20 @@ class _Place:
             with told(ValueError, code=2):
                 check_rating(self._setup.payload, self._setup.description)
 
+    @property
+    def options(self) -> str:
+        """Option that names the robot in this process, where it is not the default."""
+        return f" --robot {self.robot}" if self._setup is not None and self.robot != ROBOT else ""
+
+    def anchors(self, names: list[str] | None) -> list[tuple[float, ...]]:
+        """Return poses of the robot, or angles; by default all poses that it has a name for."""
+
+        async def info(client: "Robot", _arm: "Arm") -> "Info":
+            return await client.info()
+
+        known: Info = self.run(info)
+        return [_pose(text, known.poses, len(known.joints)) for text in names or known.poses]
+
     def run(self, doing: Doing) -> Any:
         """Run a coroutine as a client with control."""
 
@@ -152,6 +168,7 @@ class _Place:
 
 def _polynomial(
     place: _Place,
+    arm: "RobotDescription",
     anchors: list[tuple[float, ...]],
     configurations: int,
     repeats: int,
@@ -170,13 +187,12 @@ def _polynomial(
         configurations=configurations, anchors=tuple(anchors), repeats=repeats, seed=place.seed
     )
     command = f"tvist identify --configurations {configurations} --repeats {repeats} --seed {place.seed}"
-    if place.mass is not None:
-        command += f" --payload {place.mass:g}"
+    command += place.options if place.mass is None else f"{place.options} --payload {place.mass:g}"
     with told(FitError, OSError):
         with progress(configurations + len(anchors), "ring-downs") as bar:
             done = place.run(
-                lambda client, arm: run(
-                    client, arm, plan, name=name, command=command, progress=lambda: bar(1, None)
+                lambda client, control: run(
+                    client, control, plan, name=name, command=command, progress=lambda: bar(1, None)
                 )
             )
         output.write_bytes(calibration_to_json(done.calibration))
@@ -188,7 +204,9 @@ def _polynomial(
             done.calibration, done.q, done.f_d, done.zeta, done.true_f_d, done.true_zeta
         )
         err.print(str(save(drawn, figures / "identification.png")))
-    report_polynomial(done, output, json=json)
+    found, own = done.calibration.payload.mass, arm.payload.mass
+    options = place.options if found == own else f"{place.options} --payload {found:g}"
+    report_polynomial(done, output, options, json=json)
 
 
 def _modal(
@@ -209,6 +227,7 @@ def _modal(
     carried = () if masses is None else tuple(paper_payload(arm, mass) for mass in _masses(masses))
     plan = ModalPlan(ring_downs=ring_downs, payloads=carried, seed=place.seed)
     command = f"tvist identify --model modal --ring-downs {ring_downs} --seed {place.seed}"
+    command += place.options
     if masses is not None:
         command += f" --payloads {masses}"
     elif place.mass is not None:
@@ -224,7 +243,7 @@ def _modal(
 
             done = place.run(run)
         output.write_bytes(calibration_to_json(done.calibration))
-    report_modal(done, output, json=json)
+    report_modal(done, output, place.options, json=json)
 
 
 def _payload(place: _Place, arm: "RobotDescription", poses: int, *, declare: bool, json: bool) -> None:
@@ -272,7 +291,7 @@ def _masses(text: str) -> tuple[float, ...]:
     return masses
 
 
-def _pose(text: str, poses: dict[str, tuple[float, ...]], joints: int) -> tuple[float, ...]:
+def _pose(text: str, poses: Mapping[str, tuple[float, ...]], joints: int) -> tuple[float, ...]:
     angles = pose(text, poses, "at")
     if len(angles) != joints:
         raise Failure(f"at has {len(angles)} angles, {text.strip()}: the arm has {joints} joints", code=2)

@@ -28,7 +28,8 @@ def move(
     """Move a served robot to a pose and print how long it took; Control+C stops the motion.
 
     Args:
-        target: Q1, Q2, Q3, or joint angles in rad separated by commas: -0.5,-3.1,0,-1.57,0,0.
+        target: Name of a pose in the robot file that begins with a letter, such as Q1, or joint angles in rad separated
+            by commas: -0.5,-3.1,0,-1.57,0,0.
         endpoint: Zenoh endpoint of the robot.
         name: Name of the robot [ur5e; if there is none, the only robot at the endpoint].
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
@@ -42,16 +43,17 @@ def move(
     from tvist_client.readiness import look, unlock_command
     from tvist_client.robot import NAME, Robot
     from tvist_client.transports.zenoh import only_robot
-    from tvist_lab.paper.published import published
 
-    poses = {key: tuple(value["q"]) for key, value in published()["configurations"].items()}
-    q = pose(target, poses, "target", degrees=degrees)
+    if "," in target or not target.strip()[:1].isalpha():
+        # A name begins with a letter; angles are checked before the robot is asked for anything.
+        pose(target, {}, "target", degrees=degrees)
     held = False
 
     async def run() -> tuple[int, int]:
         nonlocal held
         found = name if name is not None else await only_robot(endpoint, NAME, security)
         async with await Robot.connect(endpoint, found, security=security) as robot:
+            q = pose(target, (await robot.info()).poses, "target", degrees=degrees)
             standing = await look(robot, unlock_command(endpoint, found, security))
             if not standing.ready:
                 raise Failure(f"{found} is not ready: {standing.sentence}")

@@ -29,7 +29,7 @@ def paper(
     Args:
         runs: Number of repetitions, each with different noise and gear errors.
         seed: Seed of the first repetition.
-        figures: Folder to write figures 4, 7, 12, 13, 14 and 16 to.
+        figures: Folder to write figures 2, 4, 7, 12, 13, 14 and 16 to.
         calibration: Name of a calibration that comes with the package, or path of a calibration file.
         baselines: Run the baselines for comparison as well.
         markdown: File to write a page to, with all tables and the source of each figure.

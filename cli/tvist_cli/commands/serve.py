@@ -52,17 +52,19 @@ def serve(
         security: Folder made by tvist keys. The endpoint is then tls/ADDRESS:PORT, and clients without a role have no
             access.
         insecure: Accept remote connections without TLS and do not authenticate clients; anyone can move the robot.
-        payload: Mass of the disc on the flange in kg, both carried and declared to the controller [5].
+        payload: Mass of the disc on the flange in kg, both carried and declared to the controller [that of the robot
+            file; 5 for the ur5e].
         overload: Start even if the payload exceeds the robot's rating. The drives may not hold it; the robot then makes
             a protective stop.
         shaper: Any name that tvist shapers lists, such as none, zv or ei3; or auto, short or auto-target; or
             FILE.py:NAME, which runs that file and adds your own shaper to those that clients can choose [zv].
         calibration: Name of a calibration that comes with the package, or path of a calibration file; none for a robot
-            that is yet to be identified [ur5e_5kg].
+            that is yet to be identified [the one that comes with the package for this robot].
         clock: realtime, or lockstep, in which a client steps the simulation [realtime].
         speed: Simulation speed relative to real time [1].
         realtime_priority: Run the control loop with real-time priority (SCHED_FIFO), if the system permits it.
-        start: Pose to start in: Q1, Q2, Q3, or joint angles in rad separated by commas [Q1].
+        start: Pose to start in: a name from the robot file, such as Q1, Q2 or Q3, or joint angles in rad separated by
+            commas [Q1].
         state: TOML or JSON file with the state to start in: any of q, payload (the carried one), mode, shaper, seed.
         seed: Seed of sensor noise and gear errors [0]. With several robots, the second uses seed + 1, and so on.
         record: MCAP file to record into. With several robots, each records into a file of its own, FILE-NAME.mcap.

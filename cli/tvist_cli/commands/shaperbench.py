@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 MOVES = 100
 QUICK = 3
 """Number of moves with --quick."""
+CALIBRATION = "ur5e_modal"
+"""Calibration of the bench's arm, unless another one is named."""
 
 
 def shaperbench(
@@ -103,16 +105,11 @@ def shaperbench(
 
 
 def _calibration(name: str | None) -> "Calibration":
-    from tvist_controller.calibrations import DEFAULT, load
-    from tvist_controller.mode_source import modal_source
-    from tvist_plant.description import load as robot
+    from tvist_controller.calibrations import load
     from tvist_protocol.calibration import CalibrationError
 
     with told(CalibrationError, code=2):
-        known = load(DEFAULT if name is None else name)
-    if name is None:
-        source = modal_source(robot("ur5e"), known)
-        known = known if source is None or source.calibration is None else source.calibration
+        known = load(CALIBRATION if name is None else name)
     if known.modal is None:
         raise Failure(
             f"calibration {known.name} has no modal model: make one with tvist identify --model modal", code=2

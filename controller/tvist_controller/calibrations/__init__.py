@@ -1,5 +1,6 @@
 """Calibrations that come with the package, and estimators built from calibrations."""
 
+from functools import cache
 from importlib import resources
 from pathlib import Path
 
@@ -11,13 +12,30 @@ from tvist_protocol.values import Payload
 from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.polynomial import Polynomial
 
-DEFAULT = "ur5e_5kg"
-
 
 def available() -> tuple[str, ...]:
     """Return the names of the calibrations that come with the package."""
     files = resources.files(__name__).iterdir()
     return tuple(sorted(file.name.removesuffix(".json") for file in files if file.name.endswith(".json")))
+
+
+@cache
+def default_for(model: str) -> str | None:
+    """Name of the calibration that a robot uses unless another one is named.
+
+    It is the first, by name, of those that come with the package, are for this model and have the paper's polynomials.
+
+    Args:
+        model: The robot's model.
+
+    Returns:
+        The name; None if the package has no such calibration for this model.
+    """
+    for name in available():
+        calibration = load(name)
+        if calibration.robot == model and calibration.polynomial is not None:
+            return name
+    return None
 
 
 def load(calibration: str | Path) -> Calibration:

@@ -11,7 +11,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from tvist_client.transports.session import open_session
-from tvist_controller.api import DEFAULT_CALIBRATION, load_calibration
+from tvist_controller.api import load_calibration
 from tvist_lab.benchmark.messages import Messages
 from tvist_protocol import keys
 from tvist_protocol.codec import decode_reply, encode
@@ -30,7 +30,7 @@ def main() -> None:
     command = keys.command(ROBOT)
     taken = decode_reply(_ask(session, command, encode(TakeControl(client="sender", lease_s=3600.0))))
     assert isinstance(taken, Accepted), taken
-    source = Messages(seed, str(taken.token), load_calibration(DEFAULT_CALIBRATION))
+    source = Messages(seed, str(taken.token), load_calibration("ur5e_5kg"))
     messages = [source.next() for _ in range(MADE)]
     ended = threading.Event()
     threading.Thread(target=_until_closed, args=(ended,), daemon=True).start()

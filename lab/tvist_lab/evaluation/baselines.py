@@ -10,7 +10,7 @@ from tvist_lab.evaluation.moves import Move
 from tvist_lab.evaluation.recipes import Recipe
 from tvist_lab.recordings import Floats
 from tvist_lab.robust import robust_over
-from tvist_lab.workspace import WORKSPACE
+from tvist_lab.workspace import ranges, workspace
 from tvist_plant.description import RobotDescription
 from tvist_shaping.catalogue import shaper
 from tvist_shaping.estimators.fixed import Fixed
@@ -130,7 +130,8 @@ def _over_workspace(
     recipe: Recipe, description: RobotDescription, masses: tuple[float, float], modes: int, count: int
 ) -> Iterator[tuple[Floats, Floats]]:
     """Damped frequencies [Hz] and damping ratios [-] of the lowest modes, with the smallest and the largest payload."""
+    region = workspace(ranges(description))
     for mass in sorted(set(masses)):
         estimator = recipe.estimator(description, mass, modes)
-        for q in WORKSPACE.spread(count, description.joints, seed=0):
+        for q in region.spread(count, description.joints, seed=0):
             yield estimator.estimate(q)

@@ -12,7 +12,7 @@ from msgspec import Meta, Struct
 
 from tvist_controller.api import CollisionModel, JointLine, body, paper_payload
 from tvist_lab.recordings import Floats
-from tvist_lab.workspace import WORKSPACE, Region
+from tvist_lab.workspace import WORKSPACE, Region, ranges, workspace
 from tvist_plant.description import RobotDescription
 from tvist_plant.user_file import read_bytes
 from tvist_protocol.content import checked, parse_json
@@ -124,11 +124,15 @@ def draw_moves(
         progress: Called after each move found.
 
     Raises:
-        MovesError: Hardly any draw is free of collisions.
+        MovesError: Hardly any draw is free of collision, or the arm has no wrist to turn.
     """
+    if wrists and description.joints <= len(WORKSPACE.low):
+        raise MovesError(
+            f"wrists: a {description.robot.model} has {description.joints} joints, and a wrist begins at the fifth"
+        )
     random = np.random.default_rng(seed)
     collision = CollisionModel(description, body(paper_payload(description, masses[1])))
-    region = WITH_WRISTS if wrists else WORKSPACE
+    region = WITH_WRISTS if wrists else workspace(ranges(description))
     moves: list[Move] = []
     draws = 0
     for draws, move in enumerate(_draws(random, region, description.joints, masses), 1):

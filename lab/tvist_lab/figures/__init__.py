@@ -6,6 +6,7 @@ from tvist_lab.figures.discretisation import figure_7
 from tvist_lab.figures.evaluated import residual_by_move_figure, vibration_figure
 from tvist_lab.figures.identified import identified_figure
 from tvist_lab.figures.mean_delay import mean_delay_figure
+from tvist_lab.figures.one_joint import figure_2
 from tvist_lab.figures.pareto import pareto_figure
 from tvist_lab.figures.recorded import Recorded, motion_figure, observed_figure
 from tvist_lab.figures.residual import figure_16
@@ -16,6 +17,7 @@ __all__ = [
     "Recorded",
     "after_stop_figure",
     "catalogue_figure",
+    "figure_2",
     "figure_4",
     "figure_7",
     "figure_16",

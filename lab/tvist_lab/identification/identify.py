@@ -15,14 +15,15 @@ from tvist_lab.identification.fit import Fit, check_count, fit_polynomials, spre
 from tvist_lab.identification.ring_downs import Jog, measure
 from tvist_lab.metrics import RingDown
 from tvist_lab.recordings import Floats
-from tvist_lab.workspace import IDENTIFIED
+from tvist_lab.workspace import identified
 from tvist_protocol.calibration import Calibration, Provenance, Spread
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.info import Info
 
 CONFIGURATIONS = 160
 REPEATS = 3
-DEGREE = 2
+DEGREES = (4, 3, 2)
+"""Degree of the polynomials in one, two or three joints; the fewer joints, the more configurations for each term."""
 ANCHOR_WEIGHT = 6.0
 """Weight of a pose that the user names, relative to a configuration spread over the workspace [-]."""
 
@@ -46,8 +47,8 @@ class MeasurementPlan:
     """Additional, more important configurations, in which the robot is going to work [rad]."""
     repeats: int = REPEATS
     """Number of jogs averaged at each configuration."""
-    degree: int = DEGREE
-    """Degree of the polynomials."""
+    degree: int | None = None
+    """Degree of the polynomials; None: that of `DEGREES` for the number of joints."""
     seed: int = 0
     """Seed of the spread of configurations."""
     jog: Jog = field(default_factory=Jog)
@@ -121,10 +122,12 @@ async def identify(
     """
     info = await robot.info()
     joints = tuple(j for j in (1, 2, 3) if j < len(info.joints)) or (0,)
-    check_count(plan.configurations + len(plan.anchors), joints, plan.degree)
+    degree = DEGREES[len(joints) - 1] if plan.degree is None else plan.degree
+    check_count(plan.configurations + len(plan.anchors), joints, degree)
     await arm.set_shaper("none")
     anchors = [np.array(anchor, dtype=float) for anchor in plan.anchors]
-    spread_out = list(IDENTIFIED.spread(ATTEMPTS * plan.configurations, len(info.joints), plan.seed))
+    region = identified(info.limits.position, plan.jog.length)
+    spread_out = list(region.spread(ATTEMPTS * plan.configurations, len(info.joints), plan.seed))
     kept: list[Floats] = []
     values: list[tuple[float, float]] = []
     truths: list[tuple[float, float] | None] = []
@@ -149,7 +152,7 @@ async def identify(
     named = sum(weight > 1.0 for weight in weights)
     f_d, zeta = np.array(values).T
     configurations = np.array(kept)
-    fit = fit_polynomials(configurations, f_d, zeta, np.array(weights), joints=joints, degree=plan.degree)
+    fit = fit_polynomials(configurations, f_d, zeta, np.array(weights), joints=joints, degree=degree)
     calibration = _calibration(info, plan, fit, f_d, zeta, rejected, name=name, command=command)
     if any(truth is None for truth in truths):
         return Identification(

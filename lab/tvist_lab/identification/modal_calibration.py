@@ -21,7 +21,7 @@ from tvist_lab.identification.modal_fit import (
 from tvist_lab.identification.modal_plan import LEAST, ModalPlan
 from tvist_lab.identification.ring_downs import Ringing
 from tvist_lab.identification.unknowns import ArmModes
-from tvist_lab.workspace import IDENTIFIED
+from tvist_lab.workspace import identified, ranges
 from tvist_protocol.calibration import Calibration, ModalModel, Provenance, RingDownFit, Spread
 from tvist_protocol.info import Info
 
@@ -132,7 +132,9 @@ def _check_contradictions(arm: ArmModes, ringings: Sequence[Ringing], fit: Modal
     else:
         raise IdentificationError(
             f"the {len(ringings)} ring-downs contradict each other: no springs and drives explain them together. Was "
-            "the payload the declared one each time, is the robot the one of the file, and did nothing shake it?"
+            "the payload the declared one each time, is the robot the one of the file, and did nothing shake it? The "
+            "search begins at springs and drives of robot arms of 5 kg payload: for another kind of arm, use --model "
+            "polynomial"
         )
     if guilty:
         names = "; ".join(
@@ -176,7 +178,7 @@ def _cross_validate(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -
 def _range(arm: ArmModes, fit: ModalFit, rated: float) -> tuple[float, float]:
     """Lowest f_d and highest ζ that a filter has to support, with a margin."""
     description = arm.description
-    everywhere = IDENTIFIED.spread(WORKSPACE, description.joints, 0)
+    everywhere = identified(ranges(description)).spread(WORKSPACE, description.joints, 0)
     lowest, highest = np.inf, 0.0
     whole = ArmModes(description, (paper_payload(description, 0.0), paper_payload(description, rated)))
     for payload in range(2):

@@ -7,7 +7,7 @@ from tvist_controller.api import CollisionModel, body
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.ring_downs import Jog
 from tvist_lab.recordings import Floats
-from tvist_lab.workspace import IDENTIFIED
+from tvist_lab.workspace import identified, ranges
 from tvist_plant.description import RobotDescription
 from tvist_protocol.values import Payload
 
@@ -53,7 +53,8 @@ def free_configurations(
     models = [CollisionModel(description, body(payload)) for payload in payloads]
     jog = plan.jog.of(joints)
     found: list[Floats] = []
-    for q in IDENTIFIED.spread(20 * count, joints, plan.seed):
+    region = identified(ranges(description), plan.jog.length)
+    for q in region.spread(20 * count, joints, plan.seed):
         if len(found) == count:
             break
         if all(model.meeting(end) is None for model in models for end in (q, q - jog)):

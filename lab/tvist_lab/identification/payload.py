@@ -22,11 +22,12 @@ from tvist_lab.collect import collect
 from tvist_lab.identification.identify import IdentificationError
 from tvist_lab.identification.ring_downs import reach
 from tvist_lab.recordings import Floats, Recording
-from tvist_lab.workspace import WORKSPACE
+from tvist_lab.workspace import ranges, workspace
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
-from tvist_plant.model import rigid_model
+from tvist_plant.model import carries_weight, rigid_model
 from tvist_protocol.errors import RefusedError
+from tvist_protocol.info import Info
 from tvist_protocol.values import Payload
 
 POSES = 6
@@ -104,12 +105,7 @@ async def identify_payload(
             at rest and in motion disagree.
     """
     info = await robot.info()
-    if info.model != description.robot.model:
-        raise IdentificationError(
-            f"the robot is a {info.model}, its description of a {description.robot.model}: name its file"
-        )
-    if poses < LEAST:
-        raise IdentificationError(f"{poses} poses do not tell mass and centre of mass: at least {LEAST} do")
+    _check(info, description, poses)
     arm = _Regressor(description)
     period = 1.0 / info.rate_hz
     rows, torques, rested = [], [], 0
@@ -156,6 +152,20 @@ async def identify_payload(
         declared=info.payload,
         poses=rested,
     )
+
+
+def _check(info: Info, description: RobotDescription, poses: int) -> None:
+    """Check before the arm moves that its torques can tell the payload."""
+    if info.model != description.robot.model:
+        raise IdentificationError(
+            f"the robot is a {info.model}, its description of a {description.robot.model}: name its file"
+        )
+    if not carries_weight(description):
+        raise IdentificationError(
+            f"no joint of a {info.model} carries weight, so its torques at rest say nothing of the payload: weigh it"
+        )
+    if poses < LEAST:
+        raise IdentificationError(f"{poses} poses do not tell mass and centre of mass: at least {LEAST} do")
 
 
 class _Regressor:
@@ -250,7 +260,8 @@ def _free(description: RobotDescription, declared: Payload, seed: int) -> list[F
     ]
     rng = np.random.default_rng(seed)
     found: list[Floats] = []
-    for pose in WORKSPACE.random(20 * CANDIDATES, joints, seed):
+    region = workspace(ranges(description), ASIDE)
+    for pose in region.random(20 * CANDIDATES, joints, seed):
         if len(found) == CANDIDATES:
             break
         q = pose.copy()

@@ -1,0 +1,191 @@
+"""The numbers of the lesson: the mode as the arm folds, and what motions leave that end at 30°, 90° and 150°."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from tvist_controller.api import body, default_calibration, estimator_of, load_calibration, paper_payload
+from tvist_lab.evaluation.evaluate import measured
+from tvist_lab.evaluation.line import control_line, point_to_point, shape, simulate
+from tvist_lab.evaluation.running import sound
+from tvist_lab.one_joint.closed_form import FlexibleShoulder
+from tvist_lab.one_joint.plucked import pluck
+from tvist_lab.recordings import Floats, Recording
+from tvist_plant.description import RobotDescription, load
+from tvist_shaping import Estimator, Fixed, TvistFilter, shaper
+
+ROBOT = "one-joint"
+POSES = ("Q1", "Q2", "Q3")
+"""Poses of the robot file whose elbow is at the angles of the paper's figure."""
+DESIGN = "Q2"
+"""Pose that the fixed shaper is designed for."""
+STARTS = {"Q1": "Q3", "Q2": "Q3", "Q3": "Q1"}
+"""Pose that ends a motion, to that at which its elbow begins."""
+TURNS = tuple(np.radians([50.0, 60.0, 70.0, 80.0, 90.0]).tolist())
+"""Angles by which the shoulder turns in the motions to each pose [rad]: one alone may happen to leave little."""
+MASSES = (0.0, 1.0)
+"""Payloads of the figure [kg]."""
+ANGLES = tuple(np.radians(np.arange(0.0, 151.0, 10.0)).tolist())
+"""Elbow angles at which the arm is plucked [rad]."""
+WAYS = {
+    "unshaped": "unshaped",
+    "zv_fixed": "ZV, fixed",
+    "tvist_closed_form": "TVIST-ZV, f_d(q) in closed form",
+    "tvist_identified": "TVIST-ZV, f_d(q) as identified",
+}
+"""Ways to make a motion: in JSON, and for people."""
+
+
+@dataclass(frozen=True)
+class Plucked:
+    """The mode at one angle of the elbow."""
+
+    mass: float
+    """Of the payload [kg]."""
+    elbow: float
+    """[rad]."""
+    inertia: float
+    """About the shoulder [kg m²]."""
+    f_d: float
+    """By the formula [Hz]."""
+    zeta: float
+    """[-]."""
+    simulated_f_d: float
+    """Fitted to the accelerometer after a pluck [Hz]."""
+    simulated_zeta: float
+    """[-]."""
+
+
+@dataclass(frozen=True)
+class PoseResult:
+    """What the arm is at one of the three poses, and what motions leave that end there."""
+
+    mode: Plucked
+    peak: dict[str, float]
+    """Way to the largest |α| after the stop, the mean of the motions [m/s²]."""
+    delay: dict[str, float]
+    """Way to how much longer the shaped motion lasts, the mean of the motions [s]."""
+
+    def left(self, way: str) -> float:
+        """What a way leaves of the unshaped vibration [%]."""
+        return 100.0 * self.peak[way] / self.peak["unshaped"]
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """All of it."""
+
+    description: RobotDescription
+    curve: tuple[Plucked, ...]
+    """Over `ANGLES`, with each of `MASSES`."""
+    poses: dict[str, PoseResult]
+
+    @property
+    def worst_f_d(self) -> float:
+        """Largest deviation of the simulated f_d from the formula [%]."""
+        return max(100.0 * abs(one.simulated_f_d / one.f_d - 1.0) for one in self.curve)
+
+    @property
+    def worst_zeta(self) -> float:
+        """Largest deviation of the simulated ζ from the formula [%]."""
+        return max(100.0 * abs(one.simulated_zeta / one.zeta - 1.0) for one in self.curve)
+
+    def as_dict(self) -> dict[str, Any]:
+        """What `tvist lesson --json` prints."""
+        return {
+            "robot": self.description.robot.name,
+            "curve": [asdict(one) for one in self.curve],
+            "worst_f_d_percent": self.worst_f_d,
+            "worst_zeta_percent": self.worst_zeta,
+            "poses": {
+                name: {
+                    **asdict(result),
+                    "left_percent": {way: result.left(way) for way in result.peak},
+                }
+                for name, result in self.poses.items()
+            },
+        }
+
+
+def lesson(progress: Callable[[], None] = lambda: None) -> Lesson:
+    """Pluck the arm all over its range, then make the motions.
+
+    Args:
+        progress: Told of each pluck and each motion done; `COUNT` in all.
+    """
+    description = load(ROBOT)
+    curve = []
+    for mass in MASSES:
+        for elbow in ANGLES:
+            curve.append(plucked(description, mass, elbow))
+            progress()
+    return Lesson(
+        description, tuple(curve), {name: _pose_result(description, name, progress) for name in POSES}
+    )
+
+
+COUNT = len(MASSES) * len(ANGLES) + len(POSES) * len(TURNS) * len(WAYS)
+"""Plucks and motions."""
+
+
+def plucked(description: RobotDescription, mass: float, elbow: float) -> Plucked:
+    """Mode by the formula, and as the simulated arm rings.
+
+    Args:
+        description: The one-joint arm.
+        mass: Of the payload [kg].
+        elbow: Angle of the elbow [rad].
+    """
+    payload = body(paper_payload(description, mass))
+    formula = FlexibleShoulder.of(description, payload)
+    f_d, zeta = formula.mode(elbow)
+    ring = pluck(description, payload, elbow)
+    return Plucked(mass, elbow, formula.inertia(elbow), f_d, zeta, ring.f_d, ring.zeta)
+
+
+def _pose_result(description: RobotDescription, name: str, progress: Callable[[], None]) -> PoseResult:
+    target = np.array(description.poses[name])
+    bend = target[1] - description.poses[STARTS[name]][1]
+    peaks: dict[str, list[float]] = {way: [] for way in WAYS}
+    durations: dict[str, list[float]] = {way: [] for way in WAYS}
+    for number, turn in enumerate(TURNS):
+        # Both joints turn the same way, so that their torques about the shoulder add.
+        start = target - np.array([np.copysign(turn, bend), bend])
+        for way in WAYS:
+            made = measured(_recorded(description, way, start, target, seed=number))
+            peaks[way].append(made.peak)
+            durations[way].append(made.duration)
+            progress()
+    usual = np.array(durations["unshaped"])
+    return PoseResult(
+        mode=plucked(description, description.payload.mass, float(target[1])),
+        peak={way: float(np.mean(values)) for way, values in peaks.items()},
+        delay={way: float(np.mean(np.array(values) - usual)) for way, values in durations.items()},
+    )
+
+
+def _recorded(description: RobotDescription, way: str, start: Floats, target: Floats, seed: int) -> Recording:
+    """One motion by the control line, the arm with all its disturbances."""
+    reference = point_to_point(start, target)
+    shaped = reference
+    if way != "unshaped":
+        tvist = TvistFilter(shaper("zv"), _estimator(description, way), joints=description.joints)
+        tvist.reset(start)
+        shaped = shape(sound(tvist), reference)[0]
+    cycle = control_line(description, start, description.payload, description.payload)
+    return simulate(cycle, start, reference, shaped, seed)
+
+
+def _estimator(description: RobotDescription, way: str) -> Estimator:
+    """Where a way's filter learns the mode from."""
+    formula = FlexibleShoulder.of(description, description.payload)
+    if way == "zv_fixed":
+        f_d, zeta = formula.mode(description.poses[DESIGN][1])
+        return Fixed([f_d], [zeta])
+    if way == "tvist_closed_form":
+        return formula.estimator()
+    name = default_calibration(description.robot.model)
+    assert name is not None
+    return estimator_of(load_calibration(name))

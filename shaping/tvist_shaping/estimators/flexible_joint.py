@@ -1,0 +1,105 @@
+"""One flexible joint whose inertia depends on the configuration: its mode in closed form.
+
+The paper's Figure 2: an actuator with flexibility carries an arm that stretches and folds. With a motor that holds its
+reference q*, a spring K and a damper D beside it, the link's angle θ obeys
+
+    I θ̈ + D (θ̇ - q̇*) + K (θ - q*) = 0
+
+where the arm that it carries does not move within itself. This is a mode with (any textbook of vibrations; eq. (5))
+
+    ω_n = √(K/I),    ζ = D / (2 √(K I)),    f_d = ω_n/(2π) √(1 - ζ²)
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from tvist_shaping._types import Floats
+from tvist_shaping.errors import EstimatorError
+from tvist_shaping.estimators.base import Estimator
+
+
+def flexible_joint(inertia: float, stiffness: float, damping: float) -> tuple[float, float]:
+    """Mode of a flexible joint that carries an inertia: ω_n = √(K/I), ζ = D/(2√(K I)) and eq. (5).
+
+    Args:
+        inertia: I about the joint's axis [kg m²], > 0.
+        stiffness: K of its spring [N m/rad], > 0.
+        damping: D of the damper beside the spring [N m s/rad], >= 0.
+
+    Returns:
+        f_d [Hz] and ζ [-].
+
+    Raises:
+        EstimatorError: A value is out of range, or so much damping leaves no vibration.
+    """
+    for field, value in (("inertia", inertia), ("stiffness", stiffness)):
+        if not 0.0 < value < math.inf:
+            raise EstimatorError(field, value, "a finite number above 0")
+    critical = 2.0 * math.sqrt(stiffness * inertia)
+    if not 0.0 <= damping < critical:
+        raise EstimatorError(
+            "damping", damping, f"at least 0 and less than 2 √(K I) = {critical:g} N m s/rad"
+        )
+    zeta = damping / critical
+    return math.sqrt(stiffness / inertia) * math.sqrt(1.0 - zeta**2) / (2.0 * math.pi), zeta
+
+
+class FlexibleJoint(Estimator):
+    """Estimator of one flexible joint: f_d(q) and ζ(q) from the inertia I(q) that it carries.
+
+    Args:
+        inertia: I(q) about the joint's axis, of joint angles of shape (joints,) [kg m²].
+        inertia_range: Smallest and largest inertia [kg m²]; an inertia beyond is held there, and `clipped` says so.
+        stiffness: K of the joint's spring [N m/rad].
+        damping: D of the damper beside the spring [N m s/rad].
+
+    Raises:
+        EstimatorError: A value is out of range.
+    """
+
+    def __init__(
+        self,
+        inertia: Callable[[Floats], float],
+        inertia_range: tuple[float, float],
+        stiffness: float,
+        damping: float,
+    ) -> None:
+        low, high = inertia_range
+        if not low <= high:
+            raise EstimatorError("inertia_range", inertia_range, "the smaller value and then the larger one")
+        self._inertia, self._low, self._high = inertia, float(low), float(high)
+        self._stiffness, self._damping = float(stiffness), float(damping)
+        ends = [flexible_joint(end, self._stiffness, self._damping) for end in (self._low, self._high)]
+        # Between the ends f_d² = (K/I - D²/4I²)/4π² has a maximum at most, and ζ falls with the inertia.
+        self._f_d_min, self._zeta_max = min(f_d for f_d, _ in ends), ends[0][1]
+
+    def __repr__(self) -> str:
+        return (
+            f"FlexibleJoint({self._low:g} to {self._high:g} kg m², stiffness={self._stiffness:g}, "
+            f"damping={self._damping:g})"
+        )
+
+    @property
+    def modes(self) -> int:
+        """One."""
+        return 1
+
+    @property
+    def f_d_min(self) -> float:
+        """Lowest damped frequency over the range of inertia [Hz]."""
+        return self._f_d_min
+
+    @property
+    def zeta_max(self) -> float:
+        """Highest damping ratio, which is that of the smallest inertia [-]."""
+        return self._zeta_max
+
+    def estimate(self, q: Floats) -> tuple[Floats, Floats]:
+        """Mode at a configuration; see `Estimator.estimate`."""
+        inertia = float(self._inertia(q))
+        held = min(max(inertia, self._low), self._high)
+        self.clipped = held != inertia
+        f_d, zeta = flexible_joint(held, self._stiffness, self._damping)
+        return np.array([f_d]), np.array([zeta])

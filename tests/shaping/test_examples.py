@@ -1,0 +1,36 @@
+"""The library's examples run, and need nothing but numpy and the library."""
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).parents[2] / "shaping" / "examples"
+EXAMPLES = sorted(FOLDER.glob("*.py"))
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
+def test_an_example_imports_numpy_and_the_library_alone(example):
+    imported = set()
+    for node in ast.walk(ast.parse(example.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            imported |= {name.name.partition(".")[0] for name in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            imported.add(node.module.partition(".")[0])
+    assert imported == {"numpy", "tvist_shaping"}
+
+
+def test_the_one_joint_example_shows_that_zv_needs_the_right_frequency():
+    ended = subprocess.run(
+        [sys.executable, FOLDER / "one_joint.py"], capture_output=True, text=True, check=True, timeout=300
+    )
+    left = {
+        name.strip(): float(percent)
+        for name, percent in re.findall(r"^(.*?) +[\d.]+ mrad, +([\d.]+) %$", ended.stdout, re.MULTILINE)
+    }
+    assert left["unshaped"] == 100.0
+    assert left["ZV for 90°"] > 15.0
+    assert left["TVIST"] < 4.0

@@ -1,0 +1,90 @@
+"""The one-joint arm, as a user meets it: every command works for a robot with two joints, with nothing else given."""
+
+import json
+
+import pytest
+from tests.conformance.served import Served
+from tests.system.test_command_line import tvist
+
+from tvist_plant.description import load
+from tvist_plant.fingerprint import fingerprint
+from tvist_protocol.calibration import calibration_from_json
+
+
+@pytest.fixture(scope="module")
+def realtime(tmp_path_factory):
+    """The arm in real time, and the file that it is recorded into."""
+    path = tmp_path_factory.mktemp("one_joint") / "served.mcap"
+    with Served("--robot", "one-joint", "--truth", "--record", str(path)) as served:
+        yield served, path
+
+
+class TestServed:
+    def test_it_takes_the_names_of_its_own_poses(self, realtime):
+        served, _ = realtime
+        for pose in ("Q3", "q1"):
+            assert "moved to" in tvist("move", pose, "--endpoint", served.endpoint).assert_done().out
+
+    def test_angles_of_another_arm_are_refused(self, realtime):
+        served, _ = realtime
+        ended = tvist("move", "0,-3,0,-1.5,0,0", "--endpoint", served.endpoint)
+        ended.assert_failed(1, "q has 6 angles; the arm has 2")
+
+    def test_it_is_checked_and_watched(self, realtime):
+        served, _ = realtime
+        assert "2 joints" in tvist("check", served.endpoint).assert_done().out
+        said = tvist("watch", served.endpoint, "--seconds", 1, "--json").assert_done().out
+        states = [json.loads(line) for line in said.splitlines()]
+        assert all(len(state["actual_q"]) == 2 for state in states)
+
+    def test_it_is_recorded_analyzed_and_replayed(self, realtime, tmp_path):
+        served, path = realtime
+        tvist("record", tmp_path / "seen.mcap", "--endpoint", served.endpoint, "--seconds", 1).assert_done()
+        assert tvist("analyze", tmp_path / "seen.mcap", "--json").assert_done().json["motions"] == []
+        served.end()
+        found = tvist("analyze", path, "--figures", tmp_path, "--json").assert_done().json["motions"]
+        assert len(found) == 2
+        assert (tmp_path / "motion_2.png").exists()
+        assert tvist("replay", path, "--json").assert_done().json["equal"]
+
+
+def test_its_moves_are_evaluated_beside_every_baseline():
+    said = tvist("evaluate", "--robot", "one-joint", "--random", 3, "--json").assert_done().json
+    assert said["calibration"] == "one-joint_1kg"
+    assert {move["payload_kg"] for move in said["moves"]} == {1.0}
+    assert "fixed_ei3" in said["baselines"]
+    assert said["reduction_percent"]["median"] > 90.0
+
+
+def test_it_is_identified_at_its_own_poses(tmp_path):
+    path = tmp_path / "mine.json"
+    options = ("--configurations", 14, "--repeats", 1, "--output", path)
+    said = tvist("identify", "--robot", "one-joint", *options).assert_done().out
+    assert f"tvist serve --calibration {path} --robot one-joint" in " ".join(said.split())
+    calibration = calibration_from_json(path.read_bytes())
+    assert calibration.robot == "one-joint arm"
+    assert calibration.polynomial.joints == (1,)
+    assert calibration.provenance.configurations == 17
+    assert calibration.provenance.command.endswith("--robot one-joint")
+    assert calibration.provenance.arm == fingerprint(load("one-joint"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "named"),
+    [
+        (("identify", "--robot", "one-joint", "--payload"), 1, "no joint of a one-joint arm carries weight"),
+        (("evaluate", "--robot", "one-joint", "--random", "1", "--wrists"), 2, "wrists"),
+        (("evaluate", "--robot", "one-joint", "--random", "1", "--shaper", "auto"), 2, "needs 4 modes"),
+        (("identify", "--robot", "one-joint", "--at", "Q4"), 2, "Q1, Q2, Q3"),
+    ],
+)
+def test_what_it_cannot_do_is_a_sentence(arguments, code, named):
+    assert tvist(*arguments).assert_failed(code, named).out == ""
+
+
+def test_the_lesson_prints_its_numbers_and_draws_its_figure(tmp_path):
+    said = tvist("lesson", "--figures", tmp_path, "--json").assert_done().json
+    assert said["worst_f_d_percent"] < 0.5
+    assert said["poses"]["Q1"]["left_percent"]["zv_fixed"] > 25.0
+    assert said["poses"]["Q1"]["left_percent"]["tvist_identified"] < 2.0
+    assert (tmp_path / "figure_02.png").exists()
