@@ -9,6 +9,7 @@ import pytest
 
 from tvist_controller.trajectory import PathStop
 from tvist_lab.safety import sequences, stops
+from tvist_lab.safety.markdown import page
 from tvist_lab.safety.report import Counts, broken, search
 from tvist_plant.description import load
 
@@ -18,6 +19,27 @@ UR5E = load("ur5e")
 @pytest.mark.parametrize("number", range(12))
 def test_whatever_is_sent_the_promises_hold(number):
     sequences.Sequence(UR5E, number).run()
+
+
+@pytest.mark.parametrize(
+    ("ahead", "late", "share", "says"),
+    [
+        (
+            1e-15,
+            0,
+            -0.0061,
+            ("than 1e-6 nrad (rounding),", "none came to rest later", "stayed at least 0.61 % below"),
+        ),
+        (2e-6, 3, 0.02, ("than 2e+03 nrad,", "more than 3 ticks later", "was at most 2.00 % above")),
+    ],
+)
+def test_the_page_says_on_which_side_of_a_bound_the_worst_stop_was(ahead, late, share, says):
+    stopped = {
+        "count": 1, "broken": [], "worst_ahead_rad": ahead, "worst_off_rad": 0.0, "worst_late_ticks": late,
+        "worst_torque_share": share, "worst_penetration_of_the_flexible_arm_m": None, "kinds": {},
+    }  # fmt: skip
+    text = page({"robot": "ur5e", "stops": stopped}, "a command")
+    assert all(part in text for part in says), text
 
 
 def test_equal_numbers_are_equal_cases():

@@ -3,6 +3,7 @@
 from typing import Any
 
 from tvist_controller.api import CLEARANCE, FAR, stopping
+from tvist_lab.safety.stops import ROUNDING
 from tvist_plant.description import load
 
 
@@ -60,9 +61,9 @@ def _stops(part: dict[str, Any]) -> list[str]:
         "",
         "## Stops during a motion",
         "",
-        f"In the worst case, a stop was {1e9 * max(part['worst_ahead_rad'], 0.0):.2g} nrad ahead of the motion,",
-        f"{1e9 * part['worst_off_rad']:.2g} nrad off its line and {part['worst_late_ticks']} ticks later at rest. The",
-        f"rigid torque was {100 * part['worst_torque_share']:.2f} % above the larger of 90 % of the limit and the",
+        f"No stop was ahead of the motion by more than {_angle(part['worst_ahead_rad'])},",
+        f"or off its line by more than {_angle(part['worst_off_rad'])}, {_late(part['worst_late_ticks'])}.",
+        f"The rigid torque {_beside(part['worst_torque_share'])} the larger of 90 % of the limit and the",
         "torque that the motion would have needed.",
     ]
     if deep is not None:
@@ -80,6 +81,26 @@ def _stops(part: dict[str, Any]) -> list[str]:
         f"{100 * one['share_of_time_left']['median']:.0f} % | {one['ran_out']} |"
         for kind, one in part["kinds"].items()
     ]
+
+
+def _angle(deviation: float) -> str:
+    """Format the largest deviation of a stop [rad]."""
+    text = f"{1e9 * max(deviation, 0.0):.2g} nrad".replace("e-0", "e-")
+    return f"{text} (rounding)" if deviation <= ROUNDING else text
+
+
+def _late(ticks: int) -> str:
+    """Format by how much a stop came to rest later than the motion."""
+    if ticks > 0:
+        return f"and none came to rest more than {ticks} ticks later than the motion"
+    return "and none came to rest later than the motion"
+
+
+def _beside(share: float) -> str:
+    """Format how far the largest torque was from its bound, as a share of the bound."""
+    if share > 0.0:
+        return f"was at most {100 * share:.2f} % above"
+    return f"stayed at least {-100 * share:.2f} % below"
 
 
 def _streams(part: dict[str, Any]) -> list[str]:
