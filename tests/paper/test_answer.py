@@ -100,12 +100,12 @@ def told(tmp_path, monkeypatch, capsys):
     return tell
 
 
-def test_the_demonstration_ends_with_three_commands_that_exist(told):
+def test_the_demonstration_ends_with_commands_that_exist(told):
     text = told()
     assert "Table" not in text
     *_, rest = text.partition("next:\n")
     commands = [re.split(r"\s{2,}", line.strip())[0].split() for line in rest.splitlines()]
-    assert len(commands) == 3
+    assert len(commands) == 4
     for program, *words in commands:
         assert program.endswith("tvist")
         check_command(["tvist", *words])

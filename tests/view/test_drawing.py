@@ -16,6 +16,7 @@ from tvist_plant.model import flexible_model
 from tvist_protocol.geometry import Capsule, Geometry
 from tvist_view.chain import Chain, GeometryError
 from tvist_view.deflection import Magnification
+from tvist_view.drawn_arm import capsule, quaternion
 
 UR5E = load("ur5e")
 angles = st.floats(-3.0, 3.0)
@@ -130,3 +131,23 @@ def test_a_geometry_that_cannot_be_drawn_is_said(changes, says):
 def test_deflections_of_another_arm_are_refused(chain):
     with pytest.raises(GeometryError, match="3 link deflections for 2 bending links"):
         chain.frames(np.zeros(6), np.zeros(3))
+
+
+@pytest.mark.parametrize("end", [(0.0, 0.0, 0.4), (0.3, 0.0, 0.0), (-0.2, 0.1, 0.05), (0.1, 0.2, -0.3)])
+def test_a_capsule_reaches_from_end_to_end_and_as_far_around(end):
+    start, end = np.array([0.1, -0.2, 0.3]), np.array([0.1, -0.2, 0.3]) + end
+    mesh = capsule(start, end, 0.05)
+    axis = end - start
+    along = np.clip((mesh.vertices - start) @ axis / (axis @ axis), 0.0, 1.0)
+    distances = np.linalg.norm(mesh.vertices - (start + along[:, None] * axis), axis=1)
+    np.testing.assert_allclose(distances, 0.05, atol=1e-6)
+    assert along.min() == 0.0
+    assert along.max() == 1.0
+
+
+@given(st.lists(st.floats(-3.2, 3.2), min_size=3, max_size=3))
+def test_quaternions_turn_as_their_matrices_do(vector):
+    rotation = pin.exp3(np.array(vector))
+    w, x, y, z = quaternion(rotation)
+    np.testing.assert_allclose(pin.Quaternion(w, x, y, z).matrix(), rotation, atol=1e-9)
+    assert w * w + x * x + y * y + z * z == pytest.approx(1.0)

@@ -98,7 +98,7 @@ def test_the_film_is_slow_where_the_arm_rings_and_its_pictures_differ(tracks, tm
 @pytest.mark.slow
 def test_a_film_and_a_page_are_written_by_a_command(tmp_path):
     gif, html = tmp_path / "x.gif", tmp_path / "x.html"
-    ended = run("--compare", "none", "--compare", "zv", "--gif", gif, "--html", html)
+    ended = run("--compare", "none", "zv", "--gif", gif, "--html", html)
     assert (ended.returncode, ended.stdout) == (0, ""), ended.stderr
     with Image.open(gif) as film:
         assert sum(1 for _ in ImageSequence.Iterator(film)) > 50

@@ -14,8 +14,8 @@ CAP: Colour = (72, 132, 190)
 GHOST: Colour = (90, 90, 90)
 LOAD: Colour = (150, 110, 70)
 GHOST_OPACITY = 0.25
-CAP_SHARE = 1.08
-"""Radius of a joint's cap over that of the thinner part beside it [-]."""
+CAP_SHARE = 1.1
+"""Radius of a joint's cap over that of the thicker part beside it [-]."""
 
 
 class DrawnArm:
@@ -85,7 +85,7 @@ class DrawnArm:
         self.root.visible = visible
 
     def _caps(self) -> list[tuple[int, float]]:
-        """Joints and the radii of their caps: those of the thinner part on either side."""
+        """Joints and the radii of their caps, which stand out of the thicker part beside them."""
         radius_of: dict[int, float] = {}
         for part in self._chain.parts:
             link = -1 if part.frame == 0 else (part.frame - 1) // 2
@@ -94,7 +94,7 @@ class DrawnArm:
         for joint in range(self._chain.joints):
             sides = [radius_of[link] for link in (joint - 1, joint) if link in radius_of]
             if sides:
-                found.append((joint, CAP_SHARE * min(sides)))
+                found.append((joint, CAP_SHARE * max(sides)))
         return found
 
 
@@ -110,13 +110,14 @@ def capsule(start: Floats, end: Floats, radius: float) -> trimesh.Trimesh:
         x /= np.linalg.norm(x)
         placed[:3, :3] = np.column_stack([x, np.cross(z, x), z])
     placed[:3, 3] = start
+    mesh.apply_translation([0.0, 0.0, (length - mesh.bounds[:, 2].sum()) / 2.0])
     mesh.apply_transform(placed)
     return mesh
 
 
 def cap(radius: float) -> trimesh.Trimesh:
     """Mesh of a joint: a flat cylinder about its axis."""
-    mesh: trimesh.Trimesh = trimesh.creation.cylinder(radius=radius, height=1.3 * radius, sections=32)
+    mesh: trimesh.Trimesh = trimesh.creation.cylinder(radius=radius, height=0.8 * radius, sections=32)
     return mesh
 
 

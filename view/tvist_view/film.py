@@ -16,7 +16,7 @@ from tvist_view.track import Track
 
 RATE = 25
 """Pictures a second."""
-DPI = 100
+DPI = 80
 PANEL = 3.6
 """Width and height of one robot's picture [inch]."""
 PLOT = 1.7

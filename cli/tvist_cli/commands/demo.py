@@ -5,10 +5,19 @@ from pathlib import Path
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import out, print_json, program, progress, words
 from tvist_cli.tables import print_paper
+from tvist_cli.tracks import recorded, show_tracks
+
+MAGNIFIED, PORT = 100.0, 8080
+"""Magnification and port of the page of --view."""
 
 
 def demo(
-    *, output: Path = Path("tvist-demo"), seed: int = 0, tables: bool = False, json: bool = False
+    *,
+    output: Path = Path("tvist-demo"),
+    seed: int = 0,
+    tables: bool = False,
+    view: bool = False,
+    json: bool = False,
 ) -> None:
     """Serve a robot, run the paper's motions on it over Zenoh in real time, unshaped and shaped, and say what happened.
 
@@ -16,6 +25,7 @@ def demo(
         output: Folder for the recording and the figures.
         seed: Seed of sensor noise and gear errors.
         tables: Print the paper's tables beside those of this run as well.
+        view: Show the motions afterwards on a web page, with the arm's bending drawn 100 times larger.
         json: Print one JSON object with all results.
     """
     from tvist_lab.demo import ANSWERED, DemoError, run_demo
@@ -43,15 +53,18 @@ def demo(
             f"  ({output} also holds the paper's figures and the recording)\n", soft_wrap=True, markup=False
         )
         words({**terms(result.report, ANSWERED), **checks(result.report, result.difference)})
-        _print_next()
+        _print_next(result.recording)
     if not result.equal:
         raise Failure("the recording differs from its replay or from what the client received")
+    if view:
+        show_tracks(recorded(result.recording), MAGNIFIED, ("127.0.0.1", PORT), insecure=False)
 
 
-def _print_next() -> None:
-    """Print three commands that work as they stand; each is one line, however narrow the terminal, to be copied."""
+def _print_next(recording: Path) -> None:
+    """Print four commands that work as they stand; each is one line, however narrow the terminal, to be copied."""
     name = program()
     commands = {
+        f"{name} view {recording} --magnify 100": "plays the motions back on a web page, the bending drawn larger",
         f"{name} paper --runs 1 --no-baselines": "prints the paper's tables beside ours",
         f"{name} serve": "starts a robot: leave it running, and in a second terminal",
         f"{name} move Q3 --shaper none": "moves it, unshaped; with --shaper zv, shaped",

@@ -1,22 +1,50 @@
-"""`tvist lesson`: the paper's Figure 2, in numbers."""
+"""`tvist lesson`: one flexible joint and two impulses, on a page or in numbers."""
 
+import asyncio
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tvist_cli.failure import told
 from tvist_cli.output import err, out, print_json, progress, table
+from tvist_cli.pages import serve_page
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+    from tvist_view.lesson import Compared, OneMass
+
+MOVED = ("Q1", "Q2")
+"""The motion of the UR5e: it ends stretched out, where it is slowest."""
 
 
-def lesson(*, figures: Path | None = None, markdown: Path | None = None, json: bool = False) -> None:
-    """Show on an arm with one flexible joint why a fixed shaper is not enough; takes about ten seconds.
+def lesson(
+    *,
+    numbers: bool = False,
+    figures: Path | None = None,
+    markdown: Path | None = None,
+    address: str = "127.0.0.1",
+    port: int = 8080,
+    insecure: bool = False,
+    json: bool = False,
+) -> None:
+    """Show on a web page why an arm rings and what two impulses do about it: one mass first, then the UR5e.
 
-    The robot one-joint is simulated as fast as possible. First it is plucked at many angles of its elbow, to compare
-    its frequency and damping with their formulas; then it makes motions that end at three angles, unshaped and shaped.
+    With --numbers, --figures, --markdown or --json there is no page: the robot one-joint is simulated, which takes
+    about ten seconds. It is plucked at many angles of its elbow, to compare its frequency and damping with their
+    formulas, and makes motions that end at three angles, unshaped and shaped.
 
     Args:
+        numbers: Print the tables of the arm with one flexible joint.
         figures: Folder to write figure 2 to.
         markdown: File to write a page with the formulas and the tables to.
+        address: Address on which the page is served.
+        port: Port on which the page is served; 0 takes a free one.
+        insecure: Serve the page to other machines.
         json: Print one JSON object.
     """
+    if not (numbers or json or figures is not None or markdown is not None):
+        serve_page(_show, (address, port), "tvist lesson", insecure=insecure)
+        return
     from tvist_lab.one_joint import lesson as run
     from tvist_lab.one_joint.markdown import MODES, delays, left, modes, page
 
@@ -44,3 +72,54 @@ def lesson(*, figures: Path | None = None, markdown: Path | None = None, json: b
         left(done),
     )
     table("how much longer the motions last", ("", *ends), delays(done))
+
+
+async def _show(server: "ViserServer") -> None:
+    from tvist_view.lesson import Lesson
+
+    await Lesson(server, _one_mass(), _moved).run()
+
+
+def _one_mass() -> "OneMass":
+    """The arm with one flexible joint, with the formula for its frequency."""
+    from tvist_controller.about import geometry_of
+    from tvist_controller.setup import paper_payload
+    from tvist_lab.one_joint.closed_form import FlexibleShoulder
+    from tvist_plant.description import load
+    from tvist_protocol.values import Payload
+    from tvist_view.lesson import OneMass, frequency_to_elbow
+
+    description = load("one-joint")
+    shoulder = FlexibleShoulder.of(description, description.payload)
+    low, high = (description.poses[name][1] for name in ("Q1", "Q3"))
+    carried: Payload = paper_payload(description)
+    return OneMass(
+        geometry=geometry_of(description),
+        payload=carried,
+        f_d_range=(shoulder.mode(low)[0], shoulder.mode(high)[0]),
+        elbow=frequency_to_elbow(lambda angle: shoulder.mode(angle)[0], low, high),
+    )
+
+
+async def _moved(error: float, zeta: float) -> "Compared":
+    """The UR5e's motion, unshaped and with ZV for a frequency that is off by a share [-]."""
+    return await asyncio.to_thread(_simulated, error, zeta)
+
+
+def _simulated(error: float, zeta: float) -> "Compared":
+    from tvist_lab.compared import run_beside
+    from tvist_plant.description import load
+    from tvist_view.lesson import Compared, largest_after_stop
+    from tvist_view.track import Shown, Track
+
+    poses = load("ur5e").poses
+    way = [poses[name] for name in MOVED]
+    info, unshaped = asyncio.run(run_beside("none", way))
+    f_d = (1.0 + error) * unshaped.truths[-1].f_d[0]
+    _, shaped = asyncio.run(run_beside("zv", way, modes=(f_d, zeta)))
+    assert info.geometry is not None  # of our own server
+    first, second = (
+        Track(Shown(label, info.geometry, info.payload), run.states, run.truths)
+        for label, run in (("unshaped", unshaped), ("shaped", shaped))
+    )
+    return Compared(first, second, f_d=f_d, left=(largest_after_stop(first), largest_after_stop(second)))

@@ -1,25 +1,20 @@
 """`tvist view`: a page with a robot in three dimensions, its plots and its controls."""
 
 import asyncio
-import logging
-import os
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated
 
-from tvist_cli.failure import Failure, interrupted, told
+from cyclopts import Parameter
+
+from tvist_cli.failure import Failure, told
 from tvist_cli.output import err, progress
+from tvist_cli.pages import serve_page
+from tvist_cli.tracks import recorded, show_tracks
 
 if TYPE_CHECKING:
-    from viser import ViserServer
-
-    from tvist_lab.mcap_file import RecordingFile
-    from tvist_protocol.geometry import Geometry
-    from tvist_protocol.values import Payload
     from tvist_view.track import Track
 
-NICE = 5
-"""How much a page gives way to other programs, such as a robot's server on the same machine."""
 MAGNIFY_COMPARED = 100.0
 """Magnification where shapers are compared, unless another is given [-]."""
 
@@ -29,7 +24,7 @@ def view(
     *,
     name: str = "ur5e",
     security: Path | None = None,
-    compare: tuple[str, ...] = (),
+    compare: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
     robot: str = "ur5e",
     magnify: float | None = None,
     gif: Path | None = None,
@@ -47,7 +42,7 @@ def view(
         what: Zenoh endpoint of a served robot, or MCAP file.
         name: Name of the served robot.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
-        compare: Shaper to simulate and to show beside the others, repeatable: --compare none --compare auto.
+        compare: Two or three shapers to simulate and to show beside each other: --compare none auto.
         robot: Name of the robot to simulate with --compare, or path of a robot file.
         magnify: Factor by which bending is drawn larger at first, 1 to 300 [1; 100 with --compare].
         gif: GIF to write the comparison or the recording to, for slides, instead of showing a page.
@@ -59,7 +54,7 @@ def view(
     if magnify is not None and not 1.0 <= magnify <= 300.0:
         raise Failure(f"magnify is {magnify:g}: must be 1 to 300", code=2)
     factor = magnify if magnify is not None else MAGNIFY_COMPARED if compare else 1.0
-    tracks = _compared(compare, robot) if compare else _recorded(Path(what)) if _is_file(what) else None
+    tracks = _compared(compare, robot) if compare else recorded(Path(what)) if _is_file(what) else None
     if tracks is None:
         if gif is not None or html is not None:
             raise Failure("--gif and --html need a recording or --compare", code=2)
@@ -70,14 +65,7 @@ def view(
     if html is not None:
         _write_html(tracks, factor, html)
     if gif is None and html is None:
-        from tvist_view.playback import Playback
-
-        _serve(
-            lambda server: Playback(server, tracks, factor=factor).run(),
-            (address, port),
-            "tvist",
-            insecure=insecure,
-        )
+        show_tracks(tracks, factor, (address, port), insecure=insecure)
 
 
 def _is_file(what: str) -> bool:
@@ -89,49 +77,12 @@ def _live(
 ) -> None:
     from tvist_view.live import show_robot
 
-    _serve(
+    serve_page(
         lambda server: show_robot(server, endpoint, name, security, factor=factor),
         place,
         f"tvist {name}",
         insecure=insecure,
     )
-
-
-def _serve(
-    run: "Callable[[ViserServer], Coroutine[Any, Any, None]]",
-    place: tuple[str, int],
-    title: str,
-    *,
-    insecure: bool,
-) -> None:
-    """Serve a page until Control+C."""
-    from tvist_view.stage import StageError, close_stage, open_stage
-
-    logging.basicConfig(format="tvist: %(message)s", level=logging.WARNING)
-    if hasattr(os, "nice"):
-        os.nice(NICE)
-    with told(StageError):
-        server = open_stage(*place, title, insecure=insecure)
-    err.print(f"the page is at http://{place[0]}:{server.get_port()} (Control+C ends it)")
-    try:
-        with told():
-            asyncio.run(run(server))
-    except KeyboardInterrupt:
-        raise interrupted("the page has ended") from None
-    finally:
-        close_stage(server)
-
-
-def _recorded(file: Path) -> "list[Track]":
-    """The run in a recording."""
-    from tvist_lab.mcap_file import read
-    from tvist_lab.recordings import RecordingError
-    from tvist_view.track import Shown, Track, TrackError
-
-    with told(RecordingError, TrackError, ValueError):
-        content = read(file)
-        geometry, payload = _look_of(content)
-        return [Track(Shown(file.stem, geometry, payload), content.states, content.truths)]
 
 
 def _compared(shapers: Sequence[str], robot: str) -> "list[Track]":
@@ -160,25 +111,6 @@ def _compared(shapers: Sequence[str], robot: str) -> "list[Track]":
             tracks.append(Track(shown, collected.states, collected.truths))
             advance(1, None)
     return tracks
-
-
-def _look_of(content: "RecordingFile") -> "tuple[Geometry, Payload]":
-    """What the robot of a recording looks like: as it says, or by its robot file, which a server's recording holds."""
-    from tvist_controller.about import geometry_of
-    from tvist_plant.description import RobotDescription
-    from tvist_protocol.content import checked
-    from tvist_protocol.values import Payload
-
-    info, start = content.info, content.start or {}
-    if info is not None and info.geometry is not None:
-        return info.geometry, info.payload
-    if "description" in start:
-        geometry = geometry_of(checked(start["description"], RobotDescription))
-        nothing = Payload(mass=0.0, com=(0.0, 0.0, 0.0), inertia=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-        return geometry, nothing if info is None else info.payload
-    raise Failure(
-        "this recording does not say what its robot looks like: record it with tvist serve --record"
-    )
 
 
 def _write_gif(tracks: "list[Track]", factor: float, file: Path) -> None:

@@ -1,0 +1,45 @@
+"""The lesson: the swing of one mass against the theory of input shaping, and the page itself."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tvist_view.oscillator import STEP, leftover, leftovers, swing
+
+frequencies, dampings, errors = st.floats(3.0, 10.0), st.floats(0.0, 0.3), st.floats(-0.4, 0.4)
+
+
+@given(frequencies, dampings)
+def test_the_right_two_impulses_leave_nothing(f_d, zeta):
+    unshaped, shaped = swing(f_d, zeta, None), swing(f_d, zeta, (f_d, zeta))
+    assert shaped.left < 2e-3 * np.abs(unshaped.deflection).max()
+    assert shaped.reference[-1] == pytest.approx(unshaped.reference[-1], abs=1e-9)
+
+
+@given(st.floats(4.0, 9.0), errors)
+def test_what_wrong_ones_leave_is_what_the_formula_says(f_d, error):
+    """Without damping: the swing after the stop, shaped over unshaped."""
+    unshaped, shaped = swing(f_d, 0.0, None), swing(f_d, 0.0, (f_d * (1.0 + error), 0.0))
+    if unshaped.left > 1e-3:
+        expected = leftover(f_d, 0.0, (f_d * (1.0 + error), 0.0))
+        assert shaped.left / unshaped.left == pytest.approx(expected, abs=0.02)
+
+
+@given(frequencies, dampings)
+def test_the_swing_is_the_equations_own(f_d, zeta):
+    """δ'' + 2ζω δ' + ω² δ = -q̈ by differences, to the change of q̈ within two samples: it is constant within one."""
+    one = swing(f_d, zeta, None)
+    omega = 2.0 * np.pi * f_d / np.sqrt(1.0 - zeta**2)
+    second = np.diff(one.deflection, 2) / STEP**2
+    first = (one.deflection[2:] - one.deflection[:-2]) / (2.0 * STEP)
+    acceleration = np.diff(one.reference, 2) / STEP**2
+    rest = second + 2.0 * zeta * omega * first + omega**2 * one.deflection[1:-1] + acceleration
+    assert np.abs(rest).max() < 2.0 * np.abs(np.diff(acceleration)).max()
+
+
+def test_the_curve_is_zero_without_an_error_and_rises_to_both_sides():
+    curve = leftovers(6.0, 0.0, np.linspace(-0.3, 0.3, 61))
+    assert curve[30] == pytest.approx(0.0, abs=1e-12)
+    assert (np.diff(curve[30:]) > 0.0).all()
+    assert (np.diff(curve[:31]) < 0.0).all()
