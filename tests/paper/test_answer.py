@@ -1,6 +1,7 @@
 """The demonstration's last words say what its figures say, whatever those are."""
 
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -91,7 +92,11 @@ def told(tmp_path, monkeypatch, capsys):
     def tell(**options):
         found = report(method(0.6, 2600.0), method(0.03, 2500.0, 32.0))
         result = SimpleNamespace(
-            report=found, overview=tmp_path / "overview.png", difference=None, equal=True
+            report=found,
+            overview=tmp_path / "overview.png",
+            recording=Path("tvist-demo/demo.mcap"),
+            difference=None,
+            equal=True,
         )
         monkeypatch.setattr("tvist_lab.demo.run_demo", lambda *_: result)
         demo.demo(output=tmp_path, **options)
