@@ -12,7 +12,8 @@ with app.setup:
     from tvist_controller.api import estimator_of, load_calibration
     from tvist_lab.figures.style import INK, SHAPED, UNSHAPED, legend, note, panels, title
     from tvist_lab.paper.published import pose
-    from tvist_lab.workspace import IDENTIFIED
+    from tvist_lab.workspace import identified, ranges
+    from tvist_plant.description import load
     from tvist_shaping import residual, shaper
 
 
@@ -117,7 +118,7 @@ def _():
 
 @app.cell(hide_code=True)
 def _(estimator):
-    workspace = IDENTIFIED.spread(250, 6, seed=0)
+    workspace = identified(ranges(load("ur5e"))).spread(250, 6, seed=0)
     spread_f, spread_zeta = modes(estimator, workspace)
     return spread_f, spread_zeta
 
