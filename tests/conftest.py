@@ -25,10 +25,14 @@ def pytest_collection_modifyitems(items):
 def pytest_sessionstart(session):
     """Compile the kernels before tests run side by side: numba's cache is not made for several that write at once.
 
-    Programs that tests start hear SIGHUP also under nohup, as a handler, unlike SIG_IGN, is not inherited.
+    Programs that tests start hear signals also under nohup, as a handler, unlike SIG_IGN, is not inherited.
     """
     if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
         signal.signal(signal.SIGHUP, lambda *_: None)
+    if (
+        signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+    ):  # a shell does so for what it runs in the background
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if getattr(session.config.option, "numprocesses", None):
         compile_kernels()
 

@@ -33,11 +33,13 @@ def recorded(file: Path) -> "list[Track]":
     """The run in a recording."""
     from tvist_lab.mcap_file import read
     from tvist_lab.recordings import RecordingError
+    from tvist_view.chain import Chain
     from tvist_view.track import Shown, Track, TrackError
 
     with told(RecordingError, TrackError, ValueError):
         content = read(file)
         geometry, payload = _look_of(content)
+        Chain(geometry)  # raises where this program cannot draw it
         return [Track(Shown(file.stem, geometry, payload), content.states, content.truths)]
 
 

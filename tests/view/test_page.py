@@ -162,7 +162,7 @@ def test_on_a_phone_the_first_screen_has_a_plot_and_stop(chromium, view):
 def test_where_there_is_no_robot_the_page_and_the_terminal_say_so_and_wait(chromium):
     endpoint = free_endpoint()
     with Page(endpoint) as view:
-        view.said("no server answers")
+        view.said("no server answers.*waiting for the robot")
         page = chromium.new_page()
         page.goto(view.url)
         page.get_by_text("No robot.").wait_for(timeout=MS)

@@ -9,7 +9,10 @@ from msgspec.structs import replace
 from tvist_lab.collect import collect
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_lab.metrics.vibration import amplitude, tool_acceleration
+from tvist_plant.description import load
 from tvist_view.signals import History, rests_since
+
+TWISTS = load("ur5e").kinematics.alpha
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +31,7 @@ def collected():
 
 
 def history(collected, samples=5000, *, truth=True):
-    kept = History(6, samples)
+    kept = History(TWISTS, samples)
     for state, true in zip(collected.states, collected.truths, strict=True):
         if truth:
             kept.add_truth(true)
@@ -70,13 +73,13 @@ def test_the_shaped_reference_comes_to_rest_after_the_unshaped_one(collected):
 def test_the_acceleration_before_the_shaper_keeps_the_limit_and_none_is_made_up_over_a_hole(collected):
     signals = history(collected).signals()
     assert 1.9 < signals.unshaped.max() < 2.0 + 1e-6
-    sparse = History(6, 5000)
+    sparse = History(TWISTS, 5000)
     for state in collected.states[::7] + collected.states[-3:]:
         sparse.add(state)
     assert sparse.signals().unshaped.max() < 2.1
 
 
 def test_nothing_is_there_before_the_first_state():
-    signals = History(6, 100).signals()
+    signals = History(TWISTS, 100).signals()
     assert len(signals.time) == len(signals.alpha) == 0
     assert rests_since(signals) is None

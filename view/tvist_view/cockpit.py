@@ -10,6 +10,7 @@ from tvist_protocol.faults import FAULTS
 from tvist_protocol.info import Info
 from tvist_view import pilot as piloting
 from tvist_view.pilot import Doing, Pilot
+from tvist_view.plain import plain
 
 JOG_HZ = 20.0
 """How often a tab says that a jog button is still down [Hz]."""
@@ -24,10 +25,13 @@ class Cockpit:
         tab: Number of the tab.
         pilot: Moves the robot.
         info: The robot as it is now.
+        angles: Joint angles of the shaped reference now [rad]; None: not known yet.
         post: Runs a coroutine in the pilot's event loop, from any thread.
     """
 
-    def __init__(self, gui: GuiApi, tab: int, pilot: Pilot, info: Info, post: Post) -> None:
+    def __init__(
+        self, gui: GuiApi, tab: int, pilot: Pilot, info: Info, angles: list[float] | None, post: Post
+    ) -> None:
         self._gui, self._tab, self._pilot, self._post = gui, tab, pilot, post
         self._live: list[Any] = []  # controls that need control
         with gui.add_folder("Move the robot", order=100.0):
@@ -35,7 +39,7 @@ class Cockpit:
             self._take = gui.add_button("Take control", color="blue")
             self._take.on_click(lambda _: post(self._take_or_give()))
             self._motions(info)
-            self._jog(info)
+            self._jog(info, angles or [0.0] * len(info.joints))
             self._settings(info)
             if "simulation.inject" in info.commands:
                 self._faults()
@@ -53,7 +57,7 @@ class Cockpit:
         elif self._pilot.holder is not None:
             words, label = "Another tab has control; this one watches.", "Take control"
         elif control is not None:
-            words, label = f"Client **{control}** has control; this tab watches.", "Take control"
+            words, label = f"Client **{plain(control)}** has control; this tab watches.", "Take control"
         else:
             words, label = "Nobody has control.", "Take control"
         if self._who.content != words:
@@ -88,7 +92,7 @@ class Cockpit:
                 f"Go to {first}, if the arm is not there, then to {last}.",
             )
 
-    def _jog(self, info: Info) -> None:
+    def _jog(self, info: Info, angles: list[float]) -> None:
         gui = self._gui
         with gui.add_folder("Joints", expand_by_default=False):
             joint = gui.add_dropdown("Jog", tuple(info.joints), disabled=True)
@@ -105,8 +109,8 @@ class Cockpit:
 
                 button.on_hold(held, callback_hz=JOG_HZ)
             sliders = [
-                gui.add_slider(name, round(low, 3), round(high, 3), 0.001, 0.0, disabled=True)
-                for name, (low, high) in zip(info.joints, info.limits.position, strict=True)
+                gui.add_slider(name, low, high, 0.001, min(max(angle, low), high), disabled=True)
+                for name, (low, high), angle in zip(info.joints, info.limits.position, angles, strict=True)
             ]
             self._live += sliders
             here = gui.add_button("Sliders to where the arm is", disabled=True)
@@ -126,7 +130,7 @@ class Cockpit:
     def _settings(self, info: Info) -> None:
         gui = self._gui
         shaper = gui.add_dropdown(
-            "Shaper", tuple(info.shapers), initial_value=info.shaper, disabled=True,
+            "Shaper", tuple(dict.fromkeys((*info.shapers, info.shaper))), initial_value=info.shaper, disabled=True,
             hint="none shapes nothing, zv is the paper's, auto suppresses several modes.",
         )  # fmt: skip
         shaper.on_update(lambda event: self._changed(event, lambda arm: arm.set_shaper(str(shaper.value))))

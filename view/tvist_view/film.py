@@ -61,7 +61,8 @@ class Film:
             for track, stops in zip(tracks, self._stops, strict=True)
             for at in stops
         ]
-        self._highest = 1.3 * max(after, default=max(float(track.signals.alpha.max()) for track in tracks))
+        largest = max(float(track.signals.alpha.max()) for track in tracks)
+        self._highest = 1.3 * max(*after, 0.1) if after else max(largest, 0.1)
 
     def picture(self, time: float) -> Image.Image:
         """The picture at a simulation time [s]."""
@@ -104,7 +105,7 @@ class Film:
         found = [self.start]
         while found[-1] < self.end:
             found.append(found[-1] + 1.0 / (RATE * (SLOW if self._slow(found[-1]) else 1)))
-        return found[:-1]
+        return found[:-1] or found
 
     def _slow(self, time: float) -> bool:
         return any(at - SETTLED_S <= time < at + SLOW_S for at in self._stops[0])
@@ -112,14 +113,12 @@ class Film:
     def _seen(self) -> tuple[tuple[float, float], float]:
         """Middle of what is seen, and half its width [m]: all arms have room in it all the time."""
         points = [
-            (self._view @ (frames[part.frame] @ [*end, 1.0])[:3])[:2]
+            (self._view @ frame[:3, 3])[:2]
             for track, chain in zip(self._tracks, self._chains, strict=True)
-            for time in np.arange(track.start, track.end, 0.1)
-            for frames in (chain.frames(np.array(track.at(time).state.reference_q)),)
-            for part in chain.parts
-            for end in (part.start, part.end)
+            for time in np.arange(track.start, track.end + 0.1, 0.1)
+            for frame in chain.frames(np.array(track.at(time).state.reference_q))
         ]
-        low, high = np.min(points, axis=0) - MARGIN, np.max(points, axis=0) + MARGIN
+        low, high = np.nanmin(points, axis=0) - MARGIN, np.nanmax(points, axis=0) + MARGIN
         middle = (low + high) / 2.0
         return (float(middle[0]), float(middle[1])), float((high - low).max()) / 2.0
 

@@ -1,6 +1,7 @@
 """The page of a robot on the network: a client that takes the latest state and never holds up the robot."""
 
 import asyncio
+import contextlib
 import logging
 import os
 from collections.abc import Coroutine
@@ -9,16 +10,17 @@ from typing import Any
 
 from viser import ClientHandle, ViserServer
 
-from tvist_client.errors import ClientError
+from tvist_client.errors import AnswerTimeoutError, ClientError
 from tvist_client.robot import Robot
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.info import Info
 from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.stream import Event, State, Truth
 from tvist_view.appearance import Appearance
-from tvist_view.chain import GeometryError
+from tvist_view.chain import Chain, GeometryError
 from tvist_view.cockpit import Cockpit
 from tvist_view.pilot import Pilot
+from tvist_view.plain import plain
 from tvist_view.plots import Plots
 from tvist_view.scene import DrawnRobot, Moment
 from tvist_view.signals import History
@@ -30,8 +32,8 @@ FRAME_S = 1.0 / 30.0
 """Time between two pictures [s]."""
 PLOT_EVERY = 3
 """Pictures between two drawings of the plots."""
-INFO_EVERY = 30
-"""Pictures between two looks at who has control."""
+INFO_S = 1.0
+"""Time between two looks at who has control [s]."""
 RETRY_S = 2.0
 """Time between two attempts to find the robot [s]."""
 NO_TRUTH = (
@@ -52,48 +54,55 @@ async def show_robot(
         security: Folder with a certificate for the robot's server.
         factor: Magnification to begin with.
     """
-    status = server.gui.add_markdown(f"Looking for robot **{name}** at {endpoint} …", order=0.0)
-    said = ""
+    notice = _Notice(server, f"Looking for robot {name} at {endpoint} …")
     shown: list[LivePage] = []
     look_at(server, (0.0, 0.0, 0.45), 1.9)
 
     @server.on_client_connect
-    def _(client: ClientHandle) -> None:
+    async def _(client: ClientHandle) -> None:  # viser calls both in one loop, in order
         for page in shown:
             page.came(client)
 
     @server.on_client_disconnect
-    def _(client: ClientHandle) -> None:
+    async def _(client: ClientHandle) -> None:
         for page in shown:
             page.went(client)
 
     while True:
+        lead = "No robot"
         try:
-            robot = await Robot.connect(endpoint, name, security=security)
-        except ClientError as error:
-            if str(error) != said:
-                said = str(error)
-                log.warning("%s; waiting for it", said)
-                status.content = f"**No robot.** {said}. The page waits for it."
-            await asyncio.sleep(RETRY_S)
-            continue
-        said = ""
-        try:
-            async with robot:
-                status.visible = False
+            async with await Robot.connect(endpoint, name, security=security) as robot:
+                lead = "The robot cannot be drawn"
                 page = LivePage(server, robot, await robot.info(), factor=factor)
+                lead = "The robot has gone"
+                notice.end()
                 shown.append(page)
-                await page.run()
-        except GeometryError as error:
-            status.content, status.visible = f"**The robot cannot be drawn.** {error}", True
-            log.warning("%s", error)
-            await asyncio.sleep(RETRY_S)
-        except (ClientError, RefusedError) as error:
-            log.warning("%s; waiting for the robot", error)
-            status.content, status.visible = f"**The robot has gone.** {error}. The page waits for it.", True
-            await asyncio.sleep(RETRY_S)
-        finally:
-            shown.clear()
+                try:
+                    await page.run()
+                finally:
+                    shown.clear()
+        except (ClientError, RefusedError, GeometryError) as error:
+            notice.say(lead, str(error))
+        await asyncio.sleep(RETRY_S)
+
+
+class _Notice:
+    """A sentence at the head of the page and in the terminal, while there is no robot to show."""
+
+    def __init__(self, server: ViserServer, sentence: str) -> None:
+        self._said = sentence
+        self._words = server.gui.add_markdown(plain(sentence), order=0.0)
+
+    def say(self, lead: str, why: str) -> None:
+        """Say why there is no robot, once."""
+        if (sentence := f"**{lead}.** {plain(why)}. The page waits for it.") != self._said:
+            self._said = self._words.content = sentence
+            self._words.visible = True
+            log.warning("%s; waiting for the robot", why)
+
+    def end(self) -> None:
+        """There is a robot."""
+        self._said, self._words.visible = "", False
 
 
 class LivePage:
@@ -114,13 +123,15 @@ class LivePage:
             raise GeometryError(
                 f"its server is of version {info.version}, which does not tell the arm's geometry: update the server"
             )
+        Chain(info.geometry)  # raises before anything is on the page
         self._server, self._robot, self._info = server, robot, info
         self._loop = asyncio.get_running_loop()
         self._pilot = Pilot(robot, f"view-{os.getpid()}", self._say)
-        self._history = History(len(info.joints), 2000)
+        self._history = History(info.geometry.alpha, 2000)
         self._state: State | None = None
         self._truths: dict[int, Truth] = {}
         self._cockpits: dict[int, Cockpit] = {}
+        self._over = False
         self._posted: set[asyncio.Task[Any]] = set()
         gui = server.gui
         self._folder = gui.add_folder(None, order=10.0)
@@ -148,13 +159,17 @@ class LivePage:
         ]
         for client in server.get_clients().values():
             self.came(client)
+        asking = self._loop.create_task(self._ask())
         try:
-            await self._frames()
+            await asyncio.gather(self._frames(), asking)
         finally:
+            asking.cancel()
             for end in ends:
                 end()
             if self._pilot.holder is not None:
                 await self._pilot.give_back(self._pilot.holder)
+            self._over = True
+            self._cockpits.clear()
             self._folder.remove()
             for client in server.get_clients().values():
                 client.gui.reset()
@@ -163,27 +178,36 @@ class LivePage:
     async def _frames(self) -> None:
         count, due = 0, self._loop.time()
         while True:
-            if self._state is not None:
+            if self._state is not None and self._server.get_clients():  # nothing is drawn for nobody
                 truth = self._truth_of(self._state)
                 with self._server.atomic():
                     self._drawn.show(Moment(self._state, truth), self._appearance)
                 if count % PLOT_EVERY == 0:
                     self._plots.show((self._history.signals(),), self._state.timestamp)
                     self._tell(self._state)
-            if count % INFO_EVERY == 0:
-                self._info = await self._robot.info()
-                for cockpit in self._cockpits.values():
-                    cockpit.refresh(self._info.control)
             count += 1
             due = max(due + FRAME_S, self._loop.time())
             await asyncio.sleep(due - self._loop.time())
 
+    async def _ask(self) -> None:
+        """Ask once a second who has control, and which shaper is in use."""
+        while True:
+            with contextlib.suppress(AnswerTimeoutError):  # slow is not gone
+                self._info = await self._robot.info()
+                await self._pilot.heard(self._info.control)
+                self._refresh()
+            await asyncio.sleep(INFO_S)
+
+    def _refresh(self) -> None:
+        for cockpit in self._cockpits.values():
+            cockpit.refresh(self._info.control)
+
     def _tell(self, state: State) -> None:
         robot, safety = _word(RobotMode, state.robot_mode), _word(SafetyMode, state.safety_mode)
         stop = self._info.stop
-        why = f" — {stop.why}" if stop is not None and safety != "NORMAL" else ""
+        why = f" — {plain(stop.why)}" if stop is not None and safety != "NORMAL" else ""
         words = (
-            f"**{self._info.name}** {robot}, {safety}{why} · shaper **{self._info.shaper}** · "
+            f"**{self._info.name}** {robot}, {safety}{why} · shaper **{plain(self._info.shaper)}** · "
             f"{state.timestamp:.1f} s"
         )
         if self._status.content != words:
@@ -200,7 +224,9 @@ class LivePage:
         self._history.add(state)
 
     def _on_truth(self, truth: Truth) -> None:
-        if not self._truths:
+        if self._truths and truth.tick < max(self._truths):  # a robot that has started anew
+            self._truths.clear()
+        elif not self._truths:
             self._appearance.truth_has_come(self._factor)
         self._truths[truth.tick] = truth
         self._history.add_truth(truth)
@@ -208,7 +234,7 @@ class LivePage:
             del self._truths[min(self._truths)]
 
     def _on_event(self, event: Event) -> None:
-        if event.kind in {"protective_stop", "safety_stop", "warning", "control_lost"} and event.why:
+        if event.kind in {"protective_stop", "safety_stop", "warning", "lease_lost"} and event.why:
             self._say(event.why)
 
     def _say(self, sentence: str) -> None:
@@ -221,8 +247,9 @@ class LivePage:
         self._loop.call_soon_threadsafe(self._open, tab, client)
 
     def _open(self, tab: int, client: ClientHandle) -> None:
-        if tab not in self._cockpits:
-            self._cockpits[tab] = Cockpit(client.gui, tab, self._pilot, self._info, self._post)
+        if not self._over and tab not in self._cockpits:
+            angles = None if self._state is None else self._state.target_q
+            self._cockpits[tab] = Cockpit(client.gui, tab, self._pilot, self._info, angles, self._post)
             self._cockpits[tab].refresh(self._info.control)
 
     def went(self, client: ClientHandle) -> None:
@@ -243,8 +270,7 @@ class LivePage:
         self._posted.discard(task)
         if not task.cancelled() and (error := task.exception()) is not None:
             log.error("the page: %s", error, exc_info=error)
-        for cockpit in self._cockpits.values():
-            cockpit.refresh(self._info.control)
+        self._refresh()
 
 
 def _word(kind: type[RobotMode] | type[SafetyMode], number: int) -> str:

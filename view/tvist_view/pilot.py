@@ -7,7 +7,7 @@ from contextlib import AsyncExitStack
 from typing import Any
 
 from tvist_client.arm import Arm
-from tvist_client.errors import ClientError, StreamStoppedError
+from tvist_client.errors import ClientError, MisuseError, StreamStoppedError
 from tvist_client.payload import make_payload
 from tvist_client.readiness import look
 from tvist_client.robot import Robot
@@ -37,51 +37,66 @@ class Pilot:
         say: Called with a sentence for people when something was refused or lost.
 
     Attributes:
+        client: Name under which control is taken.
         holder: Number of the tab that has control; None: no tab.
     """
 
     holder: int | None
 
     def __init__(self, robot: Robot, client: str, say: Say) -> None:
-        self._robot, self._client, self._say = robot, client, say
+        self._robot, self.client, self._say = robot, client, say
         self.holder = None
         self._arm: Arm | None = None
         self._held: AsyncExitStack | None = None
         self._task: asyncio.Task[None] | None = None
         self._jog = (0, 0.0)
-        self._jog_until = 0.0
+        self._jog_until = self._jog_heard = 0.0
+        self._jog_barred = False  # until the button is let go
         self._jogging: asyncio.Task[None] | None = None
+        self._changing = asyncio.Lock()
 
     async def take(self, tab: int) -> bool:
         """Take control for a tab; tell if it has it now."""
-        if self.holder == tab:
+        async with self._changing:
+            if self.holder is not None:
+                if self.holder != tab:
+                    self._say("another tab has control: give it back there first")
+                return self.holder == tab
+            stack = AsyncExitStack()
+            try:
+                if await self._robot.clock() != "realtime":
+                    raise MisuseError(
+                        "a client steps the time of this robot, and the page never does: it only watches"
+                    )
+                self._arm = await stack.enter_async_context(self._robot.control(self.client))
+            except (RefusedError, ClientError, ProtocolError) as error:
+                self._say(str(error))
+                return False
+            self.holder, self._held = tab, stack
             return True
-        if self.holder is not None:
-            self._say("another tab has control: give it back there first")
-            return False
-        self.holder = tab  # no other tab may ask meanwhile
-        stack = AsyncExitStack()
-        try:
-            self._arm = await stack.enter_async_context(self._robot.control(self._client))
-        except (RefusedError, ClientError, ProtocolError) as error:
-            self.holder = None
-            self._say(str(error))
-            return False
-        self._held = stack
-        return True
 
     async def give_back(self, tab: int) -> None:
         """Stop what this tab moves, and give control back. Another tab's control stays."""
-        if self.holder != tab:
-            return
-        if self.busy:
-            await self.stop()
-        await self._end(self._jogging)
-        await self._end(self._task)
-        held, self._held, self._arm, self.holder = self._held, None, None, None
-        if held is not None:
-            with contextlib.suppress(RefusedError, ClientError):
-                await held.aclose()
+        async with self._changing:  # waits for control that is being taken
+            if self.holder != tab:
+                return
+            if self.busy:
+                await self.stop()
+            await self._end(self._jogging)
+            await self._end(self._task)
+            held, self._held, self._arm, self.holder = self._held, None, None, None
+            if held is not None:
+                await _close(held)
+
+    async def heard(self, control: str | None) -> None:
+        """Compare with who has control by the robot's word: it may have taken it away.
+
+        Args:
+            control: Client that has control; None: nobody.
+        """
+        if self.holder is not None and not self._changing.locked() and control != self.client:
+            self._say("the robot has ended this page's control")
+            await self.give_back(self.holder)
 
     @property
     def busy(self) -> bool:
@@ -90,7 +105,9 @@ class Pilot:
 
     async def stop(self) -> None:
         """Stop the arm, whoever moves it: that needs no control."""
-        self._jog_until = 0.0
+        self._jog_until, self._jog_barred = 0.0, True
+        if self._task is not None:
+            self._task.cancel()  # a motion may have a further leg
         try:
             await self._robot.stop()
         except (RefusedError, ClientError) as error:
@@ -127,14 +144,21 @@ class Pilot:
             joint: Number of the joint.
             direction: 1 or -1.
         """
-        loop = asyncio.get_running_loop()
         if (
             self.holder != tab or self._arm is None
         ):  # the page shows that; many sentences a second help nobody
             return
-        if self._task is not None and not self._task.done():
+        now = asyncio.get_running_loop().time()
+        pressed = now - self._jog_heard > DEADMAN_S or self._jog != (joint, direction)
+        self._jog_heard, self._jog = now, (joint, direction)
+        if (
+            pressed
+        ):  # the next message moves the arm: a hidden tab, whose messages are a second apart, never does
+            self._jog_barred = False
             return
-        self._jog, self._jog_until = (joint, direction), loop.time() + DEADMAN_S
+        if self._jog_barred or (self._task is not None and not self._task.done()):
+            return
+        self._jog_until = now + DEADMAN_S
         if self._jogging is None or self._jogging.done():
             self._jogging = self._begin(self._play_jog(self._arm))
 
@@ -160,10 +184,8 @@ class Pilot:
     async def _told(self, doing: Awaitable[Any]) -> None:
         try:
             await doing
-        except StreamStoppedError as error:
-            if self._jog_until > 0.0:  # not by our own stop
-                self._say(str(error))
         except (RefusedError, ClientError, ProtocolError) as error:
+            self._jog_barred = True
             self._say(str(error))
 
     async def _end(self, task: asyncio.Task[None] | None) -> None:
@@ -179,19 +201,30 @@ class Pilot:
         q = list((await self._robot.state()).target_q)
         low, high = info.limits.position[joint]
         most, speed = JOG_SPEED * info.limits.velocity[joint], 0.0
-        async with arm.servo(period=JOG_PERIOD) as servo:
-            due = loop.time()
-            while loop.time() < self._jog_until and self._jog == (joint, direction):
-                speed = min(speed + JOG_ACCELERATION * JOG_PERIOD, most)
-                q[joint] = min(max(q[joint] + direction * speed * JOG_PERIOD, low), high)
-                servo.set(q)
-                due += JOG_PERIOD
-                await asyncio.sleep(max(due - loop.time(), 0.0))
-            self._jog_until = 0.0
-            await self._robot.stop()
-            # The stop has ended the stream, which the block hears of now.
-            await asyncio.sleep(10 * JOG_PERIOD)
-            servo.check()
+        stopped = False
+        try:
+            async with arm.servo(period=JOG_PERIOD) as servo:
+                due = loop.time()
+                while loop.time() < self._jog_until and self._jog == (joint, direction):
+                    speed = min(speed + JOG_ACCELERATION * JOG_PERIOD, most)
+                    q[joint] = min(max(q[joint] + direction * speed * JOG_PERIOD, low), high)
+                    servo.set(q)
+                    due += JOG_PERIOD
+                    await asyncio.sleep(max(due - loop.time(), 0.0))
+                stopped = True
+                await self._robot.stop()
+                while True:  # the stop ends the stream, of which the block hears by an event
+                    await asyncio.sleep(JOG_PERIOD)
+                    servo.check()
+        except StreamStoppedError:
+            if not stopped:
+                raise
+
+
+async def _close(held: AsyncExitStack) -> None:
+    """Give control back, if it is still there to be given."""
+    with contextlib.suppress(RefusedError, ClientError):
+        await held.aclose()
 
 
 def motion(poses: Sequence[Sequence[float]]) -> Doing:

@@ -81,12 +81,15 @@ class Playback:
     def show(self, time: float) -> None:
         """Draw the robots at a time since the start [s]."""
         now = self.start + time
-        with self._server.atomic():
-            for drawn, track in zip(self._drawn, self._tracks, strict=True):
-                drawn.show(track.at(now), self._appearance)
+        self._draw(now)
         if self._frame % PLOT_EVERY == 0:
             self._plots.show(tuple(track.signals for track in self._tracks), now)
         self._frame += 1
+
+    def _draw(self, now: float) -> None:
+        with self._server.atomic():
+            for drawn, track in zip(self._drawn, self._tracks, strict=True):
+                drawn.show(track.at(now), self._appearance)
 
     async def run(self) -> None:
         """Play until cancelled, over and over."""
@@ -106,7 +109,7 @@ class Playback:
         time = 0.0
         self._scrubbed()
         while time <= self.end - self.start:
-            self.show(time)
+            self._draw(self.start + time)
             serializer.insert_sleep(FRAME_S)
             time += FRAME_S
         return serializer.as_html()

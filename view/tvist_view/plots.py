@@ -76,7 +76,7 @@ class Plots:
             if not len(signals.time):
                 continue
             name = f'<b style="color:{colour}">{label}</b>: ' if label else ""
-            peak = f"{name}largest {signals.alpha.max():.2f} m/s²"
+            peak = f"{name}largest {np.nan_to_num(signals.alpha).max():.2f} m/s²"
             words = f"{name}mean delay of the shaper {1e3 * signals.delay[-1]:.0f} ms"
             rests = rests_since(signals)
             if rests is not None:

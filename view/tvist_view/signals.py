@@ -1,5 +1,6 @@
 """Signals of a robot over time, for plots: the newest are kept, the oldest are forgotten."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,13 +43,14 @@ class History:
     """The newest signals of one robot.
 
     Args:
-        joints: Number of joints.
+        twists: Denavit-Hartenberg twists of the arm, one per joint [rad].
         samples: Number of samples kept.
     """
 
-    def __init__(self, joints: int, samples: int) -> None:
-        self._joints = joints
-        self._rows = np.full((samples, 10 + 2 * joints), np.nan)
+    def __init__(self, twists: Sequence[float], samples: int) -> None:
+        self._twists, self._joints = tuple(twists), len(twists)
+        joints = self._joints
+        self._rows = np.full((samples, 7 + 3 * joints), np.nan)
         self._truths = np.full((samples, 7), np.nan)
         self._count = self._truth_count = 0
 
@@ -61,12 +63,12 @@ class History:
         self._rows[self._count % len(self._rows)] = (
             state.timestamp,
             *state.actual_tool_accelerometer,
-            *state.actual_TCP_pose[3:],
             state.estimated_f_d[0] if state.estimated_f_d else np.nan,
             state.estimated_zeta[0] if state.estimated_zeta else np.nan,
             state.shaper_delay,
             *state.target_qdd,
             *state.reference_q,
+            *state.actual_q,
         )
         self._count += 1
 
@@ -87,20 +89,20 @@ class History:
         """Everything that is kept."""
         rows = _in_order(self._rows, self._count)
         time, n = rows[:, 0], self._joints
-        alpha = _alpha(rows[:, 1:4], rows[:, 4:7])
+        alpha = _length(rows[:, 1:4] - GRAVITY * up_in_flange(rows[:, 7 + 2 * n : 7 + 3 * n], self._twists))
         truths = _in_order(self._truths, self._truth_count)
         if len(truths):
             place = np.clip(np.searchsorted(truths[:, 0], time), 0, len(truths) - 1)
             same = np.abs(truths[place, 0] - time) < 1e-9
-            alpha[same] = _alpha(truths[place, 1:4], truths[place, 4:7])[same]
+            alpha[same] = _length(truths[:, 1:4] - GRAVITY * _up(truths[:, 4:7]))[place][same]
         return Signals(
             time=time,
             alpha=alpha,
-            acceleration=np.abs(rows[:, 10 : 10 + n]).max(axis=1, initial=0.0),
-            unshaped=_second_difference(time, rows[:, 10 + n :]),
-            f_d=rows[:, 7],
-            zeta=rows[:, 8],
-            delay=rows[:, 9],
+            acceleration=np.abs(rows[:, 7 : 7 + n]).max(axis=1, initial=0.0),
+            unshaped=_second_difference(time, rows[:, 7 + n : 7 + 2 * n]),
+            f_d=rows[:, 4],
+            zeta=rows[:, 5],
+            delay=rows[:, 6],
         )
 
 
@@ -120,19 +122,38 @@ def _in_order(ring: Floats, count: int) -> Floats:
     return np.roll(ring, -(count % len(ring)), axis=0)
 
 
-def _alpha(force: Floats, rotation: Floats) -> Floats:
-    """|f - Rᵀ (0, 0, g)| of specific forces, shape (T, 3), and rotation vectors, shape (T, 3)."""
+def up_in_flange(q: Floats, twists: Sequence[float]) -> Floats:
+    """The upward direction in the frame of the flange, shape (T, 3).
+
+    Args:
+        q: Joint angles, shape (T, joints) [rad].
+        twists: Denavit-Hartenberg twists, one per joint [rad].
+    """
+    up = np.tile([0.0, 0.0, 1.0], (len(q), 1))
+    for angle, twist in zip(q.T, twists, strict=True):
+        c, s = np.cos(angle), np.sin(angle)
+        x, y, z = c * up[:, 0] + s * up[:, 1], c * up[:, 1] - s * up[:, 0], up[:, 2]
+        c, s = np.cos(twist), np.sin(twist)
+        up = np.stack([x, c * y + s * z, c * z - s * y], axis=1)
+    return up
+
+
+def _up(rotation: Floats) -> Floats:
+    """The upward direction in frames with rotation vectors, both of shape (T, 3)."""
     angle = np.linalg.norm(rotation, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         axis = np.where(angle[:, None] > 0.0, rotation / angle[:, None], 0.0)
-    up = np.array([0.0, 0.0, GRAVITY])
+    up = np.array([0.0, 0.0, 1.0])
     # Rodrigues' formula for the rotation by -angle.
-    turned = (
+    return np.asarray(
         np.cos(angle)[:, None] * up
         - np.sin(angle)[:, None] * np.cross(axis, up)
         + ((1.0 - np.cos(angle)) * (axis @ up))[:, None] * axis
     )
-    return np.asarray(np.linalg.norm(force - turned, axis=1))
+
+
+def _length(vectors: Floats) -> Floats:
+    return np.asarray(np.linalg.norm(vectors, axis=1))
 
 
 def _second_difference(time: Floats, q: Floats) -> Floats:

@@ -4,8 +4,11 @@ import contextlib
 import io
 import ipaddress
 import socket
+from urllib.parse import urlsplit
 
 from viser import ClientHandle, ViserServer
+from viser._messages import ShareUrlRequest
+from viser.infra import WebsockClientConnection
 
 UPRIGHT = 0.8
 """Width over height below which a window is a phone's [-]."""
@@ -48,6 +51,7 @@ def open_stage(address: str, port: int, title: str, *, insecure: bool = False) -
         io.StringIO()
     ):  # it would print a banner; the caller says where the page is
         server = ViserServer(host=address, port=port, label=title, verbose=False)
+    _only_this_site(server, anywhere=insecure)
     server.gui.configure_theme(
         control_layout="floating",
         control_width="medium",
@@ -63,6 +67,28 @@ def open_stage(address: str, port: int, title: str, *, insecure: bool = False) -
     scene.add_light_directional("/lights/sky", intensity=1.0, position=(-2.0, 1.5, 2.0))
     scene.add_grid("/floor", 4.0, 4.0, cell_size=0.25, section_size=1.0, shadow_opacity=0.25)
     return server
+
+
+def _only_this_site(server: ViserServer, *, anywhere: bool) -> None:
+    """Turn away other web sites in this machine's browsers, and requests for a public tunnel to the page.
+
+    A browser lets any site open a WebSocket to this machine, and names the site in the header Origin.
+    """
+    sockets = server._websock_server  # noqa: SLF001  viser has no public way to do either
+    sockets.unregister_handler(ShareUrlRequest)
+
+    async def check(client: WebsockClientConnection) -> None:
+        connection = sockets._live_connections[client.client_id]  # noqa: SLF001
+        if connection.request is None:
+            return
+        origin, host = (connection.request.headers.get(name) for name in ("Origin", "Host"))
+        if origin is None:  # no browser
+            return
+        site = urlsplit(origin)
+        if site.netloc != host or not (anywhere or _is_local(site.hostname or "")):
+            await connection.close(1008, "another site")
+
+    sockets.on_client_connect(check)
 
 
 def close_stage(server: ViserServer) -> None:

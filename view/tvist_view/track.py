@@ -44,7 +44,7 @@ class Track:
         self._moments = [Moment(state, by_tick.get(state.tick)) for state in states]
         self._times = [state.timestamp for state in states]
         self.has_truth = any(moment.truth is not None for moment in self._moments)
-        history = History(len(states[0].actual_q), len(states))
+        history = History(shown.geometry.alpha, len(states))
         for moment in self._moments:
             if moment.truth is not None:
                 history.add_truth(moment.truth)

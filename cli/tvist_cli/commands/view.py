@@ -15,6 +15,8 @@ from tvist_cli.tracks import recorded, show_tracks
 if TYPE_CHECKING:
     from tvist_view.track import Track
 
+LONGEST_S = 120.0
+"""Longest recording that is written as GIF or HTML [s]: a second takes about a megabyte."""
 MAGNIFY_COMPARED = 100.0
 """Magnification where shapers are compared, unless another is given [-]."""
 
@@ -60,6 +62,11 @@ def view(
             raise Failure("--gif and --html need a recording or --compare", code=2)
         _live(what, name, security, factor, (address, port), insecure=insecure)
         return
+    lasts = max(track.end for track in tracks) - min(track.start for track in tracks)
+    if (gif or html) and lasts > LONGEST_S:
+        raise Failure(
+            f"the recording lasts {lasts:.0f} s: --gif and --html take at most {LONGEST_S:.0f} s", code=2
+        )
     if gif is not None:
         _write_gif(tracks, factor, gif)
     if html is not None:
