@@ -9,7 +9,7 @@ import pytest
 from tvist_client import AnswerTimeoutError, NotConnectedError
 from tvist_client.feed import Feed
 from tvist_client.stream import Stream
-from tvist_client.transports.mailbox import MAX_WAITING, Mailbox
+from tvist_client.transports.inbox import MAX_WAITING, Inbox
 from tvist_protocol.codec import decode_event, decode_state, encode
 from tvist_protocol.stream import Event
 
@@ -142,7 +142,7 @@ async def test_two_readers_of_one_stream_both_end():
 
 async def test_messages_from_threads_reach_the_loop_in_order_and_none_is_lost():
     seen, ended = [], asyncio.Event()
-    mailbox = Mailbox(asyncio.get_running_loop())
+    mailbox = Inbox(asyncio.get_running_loop())
 
     def receive(data):
         seen.append(int(data))
@@ -162,7 +162,7 @@ async def test_messages_from_threads_reach_the_loop_in_order_and_none_is_lost():
 async def test_a_busy_loop_loses_states_but_no_events(caplog):
     caplog.set_level(logging.WARNING)
     states, events, ended = [], [], asyncio.Event()
-    mailbox = Mailbox(asyncio.get_running_loop())
+    mailbox = Inbox(asyncio.get_running_loop())
     for number in range(MAX_WAITING + 10):
         mailbox.put(states.append, b"%d" % number, droppable=True)
     mailbox.put(events.append, b"event", droppable=False)
@@ -174,6 +174,6 @@ async def test_a_busy_loop_loses_states_but_no_events(caplog):
 
 async def test_a_message_for_a_loop_that_is_closed_goes_nowhere():
     loop = asyncio.new_event_loop()
-    mailbox = Mailbox(loop)
+    mailbox = Inbox(loop)
     loop.close()
     mailbox.put(print, b"", droppable=False)

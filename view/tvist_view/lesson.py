@@ -73,7 +73,7 @@ Run = Callable[[float, float], Awaitable[Compared]]
 """Makes the motion of the UR5e for an error of the frequency [-] and a damping ratio [-]."""
 
 
-class Lesson:
+class LessonPage:
     """The page of the lesson.
 
     Args:

@@ -75,9 +75,9 @@ def lesson(
 
 
 async def _show(server: "ViserServer") -> None:
-    from tvist_view.lesson import Lesson
+    from tvist_view.lesson import LessonPage
 
-    await Lesson(server, _one_mass(), _moved).run()
+    await LessonPage(server, _one_mass(), _moved).run()
 
 
 def _one_mass() -> "OneMass":

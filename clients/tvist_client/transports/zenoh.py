@@ -16,7 +16,7 @@ from zenoh.handlers import Callback
 from tvist_client.errors import AnswerTimeoutError, ClientError, NotConnectedError, UnexpectedReplyError
 from tvist_client.transports.base import Topic, Transport
 from tvist_client.transports.certificates import Folder
-from tvist_client.transports.mailbox import Mailbox, wake
+from tvist_client.transports.inbox import Inbox, wake
 from tvist_client.transports.session import close_session, open_session
 from tvist_protocol import keys
 
@@ -48,7 +48,7 @@ class ZenohTransport(Transport):
         self._endpoint = endpoint
         self._robot = robot
         self._loop = asyncio.get_running_loop()
-        self._mailbox = Mailbox(self._loop)
+        self._mailbox = Inbox(self._loop)
         self._alive = asyncio.Event()
         self._closed = False
         self._pending: set[asyncio.Future[bytes]] = set()

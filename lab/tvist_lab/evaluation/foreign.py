@@ -29,7 +29,7 @@ class CandidateError(ValueError):
 
 
 @dataclass(frozen=True)
-class Info:
+class TickInfo:
     """Information that a shaper gets at every tick."""
 
     period: float
@@ -62,7 +62,7 @@ class FromFile(Candidate):
         """Return a new shaper, reset."""
         description, move = task.description, task.move
         estimator = self.recipe.estimator(description, move.mass, MODES)
-        info = Info(
+        info = TickInfo(
             period=PERIOD,
             joints=description.joints,
             limits=PAPER,
@@ -94,7 +94,7 @@ class Foreign:
         ShaperFaultError: Its `reset` raises an exception.
     """
 
-    def __init__(self, made: Any, info: Info, estimator: Estimator, start: Floats, reach: Floats) -> None:
+    def __init__(self, made: Any, info: TickInfo, estimator: Estimator, start: Floats, reach: Floats) -> None:
         self._made, self._info, self._estimator, self._reach = made, info, estimator, reach
         self._q_star, self._tick = start.copy(), 0
         if hasattr(made, "reset"):

@@ -13,7 +13,7 @@ MAX_WAITING = 10_000
 """Messages that may wait while the loop is busy: 20 s of states, about 10 MB."""
 
 
-class Mailbox:
+class Inbox:
     """Passes messages to callbacks on the loop, in the order of their arrival.
 
     There is one mailbox for all topics, since their order matters: events of a tick come before its state. The loop
