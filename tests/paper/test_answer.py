@@ -36,9 +36,9 @@ def test_the_answer_comes_first_and_is_short():
     lines = answer(report(method(0.6, 2600.0), method(0.03, 2500.0, 32.0)), "Q1-Q3")
     assert len(lines) == 4
     assert "0.60 m/s²" in lines[1]
-    assert "0.03: 95 % less." in lines[1]
+    assert "0.030: 95 % less." in lines[1]
     assert lines[2] == "The shaped motion took 32 ms longer, and yet its tool came to rest 100 ms earlier."
-    assert "50 % less, came to rest 50 ms earlier (Q1-Q2)" in lines[3]
+    assert "Q1-Q2: 50 % less, came to rest 50 ms earlier" in lines[3]
 
 
 def test_a_shaper_that_does_harm_is_said_to():

@@ -133,7 +133,16 @@ class Cockpit:
             "Shaper", tuple(dict.fromkeys((*info.shapers, info.shaper))), initial_value=info.shaper, disabled=True,
             hint="none shapes nothing, zv is the paper's, auto suppresses several modes.",
         )  # fmt: skip
-        shaper.on_update(lambda event: self._changed(event, lambda arm: arm.set_shaper(str(shaper.value))))
+        modes = gui.add_slider(
+            "Modes", 1, max(len(info.joints), info.modes, 2), 1, info.modes, disabled=True,
+            hint="How many modes a shaper such as zv suppresses; more than one takes a modal calibration.",
+        )  # fmt: skip
+
+        def shape(arm: Arm) -> Any:
+            return arm.set_shaper(str(shaper.value), modes=int(modes.value))
+
+        for handle in (shaper, modes):
+            handle.on_update(lambda event: self._changed(event, shape))
         speed = gui.add_slider("Speed %", 10.0, 100.0, 1.0, 100.0, disabled=True)
         speed.on_update(
             lambda event: self._changed(event, lambda arm: arm.set_speed(float(speed.value) / 100.0))
@@ -150,7 +159,7 @@ class Cockpit:
             "Carried kg", 0.0, 2.0 * rated, 0.1, min(round(info.payload.mass, 1), rated), disabled=True,
             hint="What the simulated arm carries; changing it puts the arm at rest.",
         )  # fmt: skip
-        self._live += [shaper, speed, declared, carried]
+        self._live += [shaper, modes, speed, declared, carried]
         self._button("Carry this mass", lambda: piloting.carry(float(carried.value)))
 
     def _changed(self, event: GuiEvent[Any], doing: Doing, *, settled: bool = False) -> None:  # noqa: ARG002

@@ -14,7 +14,7 @@ BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#8A8A8A"
 HEIGHT = 150
 """Height of a plot [px]."""
 BRAKES_S = 0.02
-"""Time after the reference has stopped within which the tool still brakes [s]."""
+"""Time after the shaped reference has stopped within which the tool still brakes [s]."""
 SMALL = 0.1
 """Least upper end of an axis, so that noise does not fill a plot [m/s², rad/s², Hz]."""
 
@@ -41,9 +41,9 @@ class Plots:
 
     def _add_more(self, gui: GuiApi, named: list[tuple[str, str]]) -> None:
         lines = [(f"{n}q̈ shaped", c, False) for n, c in named]
-        grey = ", grey: before the shaper" if len(named) == 1 else ""
+        grey = ", grey: before the shaper, green: its delay" if len(named) == 1 else ""
         if len(named) == 1:
-            lines.insert(0, ("q̈ before the shaper", GREY, False))
+            lines = [("q̈ before the shaper", GREY, False), *lines, ("delay of the stop", GREEN, True)]
         self._acceleration = _plot(gui, f"Largest joint acceleration |q̈| [rad/s²]{grey}", lines)
         self._f_d = _plot(gui, "Estimated frequency f_d [Hz]", [(f"{n}f_d", c, False) for n, c in named])
         self._zeta = _plot(gui, "Estimated damping ratio ζ [-]", [(f"{n}ζ", c, False) for n, c in named])
@@ -65,6 +65,7 @@ class Plots:
         qdd = [_peaks(signals.time, signals.acceleration, grid) for signals in shown]
         if len(shown) == 1:
             qdd.insert(0, _peaks(shown[0].time, shown[0].unshaped, grid))
+            qdd.append(_delayed(shown[0], grid, max(float(qdd[0].max()), SMALL)))
         self._acceleration.data = (seconds, *qdd, least)
         self._f_d.data = (seconds, *(_held(signals.time, signals.f_d, grid) for signals in shown), least)
         self._zeta.data = (seconds, *(_held(signals.time, signals.zeta, grid) for signals in shown), least)
@@ -80,7 +81,7 @@ class Plots:
             words = f"{name}mean delay of the shaper {1e3 * signals.delay[-1]:.0f} ms"
             rests = rests_since(signals)
             if rests is not None:
-                rest = signals.between(rests[0] + BRAKES_S, signals.time[-1]).alpha
+                rest = signals.between(rests[1] + BRAKES_S, signals.time[-1]).alpha
                 peak += f", {rest.max(initial=0.0):.2f} m/s² after the stop"
                 words += f"; came to rest {1e3 * (rests[1] - rests[0]):.0f} ms after its reference"
             peaks.append(peak)
@@ -112,6 +113,14 @@ def _plot(gui: GuiApi, title: str, lines: list[tuple[str, str, bool]]) -> GuiUpl
         height=HEIGHT,
         legend=uplot.Legend(show=False),
     )
+
+
+def _delayed(signals: Signals, grid: Floats, height: float) -> Floats:
+    """A block from the stop of the reference to that of the shaped reference."""
+    rests = rests_since(signals)
+    if rests is None:
+        return np.zeros(len(grid))
+    return np.where((grid >= rests[0]) & (grid <= rests[1]), height, 0.0)
 
 
 def _peaks(time: Floats, values: Floats, grid: Floats) -> Floats:

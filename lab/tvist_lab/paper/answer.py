@@ -18,7 +18,7 @@ def answer(report: dict[str, Any], motion: str) -> list[str]:
     start, end = motion.split("-")
     unshaped, shaped = _pair(report, motion)
     before, after = unshaped["peak_m_s2"], shaped["peak_m_s2"]
-    others = [f"{_in_short(*_pair(report, name))} ({name})" for name in report["baselines"] if name != motion]
+    others = [f"{name}: {_in_short(*_pair(report, name))}" for name in report["baselines"] if name != motion]
     shook = f"Unshaped, its tool shook with {_number(before)} m/s² after the motion; shaped, with "
     took = f"The shaped motion took {shaped['delay_ms']:.0f} ms longer, "
     gain = _gain(unshaped, shaped)
@@ -34,8 +34,9 @@ def terms(report: dict[str, Any], motion: str) -> dict[str, str]:
     """Words of the answer to what they mean."""
     start, end = (report["table_1"][name]["f_d_hz"] for name in motion.split("-"))
     shaped = (
-        "The robot splits its command in two, half a period of the arm's vibration apart, so that the vibration of "
-        "the second part cancels that of the first. It follows the arm's frequency on the way, here from "
+        "To keep the arm from shaking, the robot splits its command in two, half a period of the arm's vibration apart, "
+        "so that the vibration of the second part cancels that of the first. It follows the arm's frequency on the way, "
+        "here from "
     )
     return {
         "shaped": f"{shaped}{start:.1f} to {end:.1f} Hz.",
@@ -79,7 +80,7 @@ def _pair(report: dict[str, Any], motion: str) -> tuple[dict[str, Any], dict[str
 
 
 def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.2f}"
+    return "–" if value is None else f"{value:.2f}" if value >= 0.1 else f"{value:.3f}"
 
 
 def _changed(before: float | None, after: float | None) -> str:
