@@ -34,9 +34,9 @@ def terms(report: dict[str, Any], motion: str) -> dict[str, str]:
     """Words of the answer to what they mean."""
     start, end = (report["table_1"][name]["f_d_hz"] for name in motion.split("-"))
     shaped = (
-        "To keep the arm from shaking, the robot splits its command in two, half a period of the arm's vibration apart, "
-        "so that the vibration of the second part cancels that of the first. It follows the arm's frequency on the way, "
-        "here from "
+        "To keep the arm from shaking, the robot splits its command in two, half a period of the arm's vibration "
+        "apart, so that the vibration of the second part cancels that of the first. It follows the arm's frequency "
+        "on the way, here from "
     )
     return {
         "shaped": f"{shaped}{start:.1f} to {end:.1f} Hz.",
