@@ -24,7 +24,7 @@ from tvist_view.plain import plain
 from tvist_view.plots import Plots
 from tvist_view.scene import DrawnRobot, Moment
 from tvist_view.signals import History
-from tvist_view.stage import look_at
+from tvist_view.stage import is_watched, look_at
 
 log = logging.getLogger("tvist.view")
 
@@ -178,7 +178,7 @@ class LivePage:
     async def _frames(self) -> None:
         count, due = 0, self._loop.time()
         while True:
-            if self._state is not None and self._server.get_clients():  # nothing is drawn for nobody
+            if self._state is not None and is_watched(self._server):  # nothing is drawn for nobody
                 truth = self._truth_of(self._state)
                 with self._server.atomic():
                     self._drawn.show(Moment(self._state, truth), self._appearance)

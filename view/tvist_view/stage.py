@@ -91,6 +91,11 @@ def _only_this_site(server: ViserServer, *, anywhere: bool) -> None:
     sockets.on_client_connect(check)
 
 
+def is_watched(server: ViserServer) -> bool:
+    """Whether anybody is connected to the page, also one who draws nothing."""
+    return bool(server._websock_server._live_connections)  # noqa: SLF001  viser counts only those with a camera
+
+
 def close_stage(server: ViserServer) -> None:
     """End the page."""
     with contextlib.redirect_stdout(io.StringIO()):
