@@ -13,11 +13,10 @@ from tvist_view.chain import Chain, Floats
 from tvist_view.deflection import Magnification
 from tvist_view.drawn_arm import DrawnArm
 from tvist_view.oscillator import LENGTH_S, STEP, TURN, Swing, impulses_in_words, leftover, leftovers, swing
+from tvist_view.pictures import FRAME_S, pictures
 from tvist_view.stage import look_at
 from tvist_view.track import Track
 
-FRAME_S = 1.0 / 30.0
-"""Time between two pictures [s]."""
 SLOW = 0.25
 """Speed of what is shown, to simulation time: an eye follows a swing of a few hertz [-]."""
 ORANGE, BLUE = (213, 94, 0), (0, 114, 178)
@@ -134,14 +133,12 @@ class LessonPage:
 
     async def run(self) -> None:
         """Show it until cancelled, over and over."""
-        time, due = 0.0, self._loop.time()
-        while True:
+        time = 0.0
+        async for _ in pictures():
             self.show(time)
             time += SLOW * FRAME_S
             if time >= self._length():
                 time = 0.0
-            due = max(due + FRAME_S, self._loop.time())
-            await asyncio.sleep(due - self._loop.time())
 
     def show(self, time: float) -> None:
         """Draw a time since the beginning of the motion [s]."""

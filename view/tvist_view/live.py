@@ -19,6 +19,7 @@ from tvist_protocol.stream import Event, State, Truth
 from tvist_view.appearance import Appearance
 from tvist_view.chain import Chain, GeometryError
 from tvist_view.cockpit import Cockpit
+from tvist_view.pictures import PLOT_EVERY, pictures
 from tvist_view.pilot import Pilot
 from tvist_view.plain import plain
 from tvist_view.plots import Plots
@@ -28,10 +29,6 @@ from tvist_view.stage import is_watched, look_at
 
 log = logging.getLogger("tvist.view")
 
-FRAME_S = 1.0 / 30.0
-"""Time between two pictures [s]."""
-PLOT_EVERY = 3
-"""Pictures between two drawings of the plots."""
 INFO_S = 1.0
 """Time between two looks at who has control [s]."""
 RETRY_S = 2.0
@@ -159,11 +156,12 @@ class LivePage:
         ]
         for client in server.get_clients().values():
             self.came(client)
-        asking = self._loop.create_task(self._ask())
+        tasks = [self._loop.create_task(doing) for doing in (self._frames(), self._ask())]
         try:
-            await asyncio.gather(self._frames(), asking)
+            await asyncio.gather(*tasks)
         finally:
-            asking.cancel()
+            for task in tasks:  # one that fails does not end the other
+                task.cancel()
             for end in ends:
                 end()
             if self._pilot.holder is not None:
@@ -176,8 +174,7 @@ class LivePage:
             server.scene.remove_by_name("/robot")
 
     async def _frames(self) -> None:
-        count, due = 0, self._loop.time()
-        while True:
+        async for count in pictures():
             if self._state is not None and is_watched(self._server):  # nothing is drawn for nobody
                 truth = self._truth_of(self._state)
                 with self._server.atomic():
@@ -185,16 +182,17 @@ class LivePage:
                 if count % PLOT_EVERY == 0:
                     self._plots.show((self._history.signals(),), self._state.timestamp)
                     self._tell(self._state)
-            count += 1
-            due = max(due + FRAME_S, self._loop.time())
-            await asyncio.sleep(due - self._loop.time())
 
     async def _ask(self) -> None:
         """Ask once a second who has control, and which shaper is in use."""
         while True:
             with contextlib.suppress(AnswerTimeoutError):  # slow is not gone
+                holder = self._pilot.holder
                 self._info = await self._robot.info()
-                await self._pilot.heard(self._info.control)
+                if (
+                    holder == self._pilot.holder
+                ):  # control that was taken since the question is not in the answer
+                    await self._pilot.heard(self._info.control)
                 self._refresh()
             await asyncio.sleep(INFO_S)
 

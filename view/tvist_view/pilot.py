@@ -144,16 +144,14 @@ class Pilot:
             joint: Number of the joint.
             direction: 1 or -1.
         """
-        if (
-            self.holder != tab or self._arm is None
-        ):  # the page shows that; many sentences a second help nobody
+        # The page shows who has control; a sentence for each message would be too many.
+        if self.holder != tab or self._arm is None:
             return
         now = asyncio.get_running_loop().time()
         pressed = now - self._jog_heard > DEADMAN_S or self._jog != (joint, direction)
         self._jog_heard, self._jog = now, (joint, direction)
-        if (
-            pressed
-        ):  # the next message moves the arm: a hidden tab, whose messages are a second apart, never does
+        # The next message moves the arm, so that a hidden tab, whose messages are a second apart, never does.
+        if pressed:
             self._jog_barred = False
             return
         if self._jog_barred or (self._task is not None and not self._task.done()):

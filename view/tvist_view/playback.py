@@ -1,21 +1,17 @@
 """The page of recorded runs: one robot, or several beside each other at the same tick."""
 
-import asyncio
 from collections.abc import Sequence
 
 from viser import ViserServer
 
 from tvist_view.appearance import Appearance
 from tvist_view.drawn_arm import CAP, Colour
+from tvist_view.pictures import FRAME_S, PLOT_EVERY, pictures
 from tvist_view.plots import Plots
 from tvist_view.scene import DrawnRobot
 from tvist_view.stage import look_at
 from tvist_view.track import Track
 
-FRAME_S = 1.0 / 30.0
-"""Time between two pictures [s]."""
-PLOT_EVERY = 3
-"""Pictures between two drawings of the plots."""
 APART = 0.9
 """Distance between two bases [m]."""
 COLOURS: tuple[Colour, ...] = ((213, 94, 0), (0, 114, 178), (0, 158, 115))
@@ -93,15 +89,13 @@ class Playback:
 
     async def run(self) -> None:
         """Play until cancelled, over and over."""
-        loop, due = asyncio.get_running_loop(), 0.0
-        while True:
-            time = float(self._time.value)
-            self.show(time)
-            due = max(due + FRAME_S, loop.time())
-            await asyncio.sleep(due - loop.time())
-            if self._play.value and float(self._time.value) == time:
+        time: float | None = None  # that of the last picture
+        async for _ in pictures():
+            if time is not None and self._play.value and float(self._time.value) == time:
                 time += FRAME_S * float(self._pace.value)
                 self._time.value = 0.0 if time > self.end - self.start else round(time, 3)  # type: ignore[misc]
+            time = float(self._time.value)
+            self.show(time)
 
     def html(self) -> str:
         """The whole run as one page that needs no server: the arms with their ghosts, without plots."""
