@@ -22,11 +22,12 @@ from tvist_protocol.codec import Envelope, decode_command, decode_envelope, deco
 from tvist_protocol.commands import Command, ReleaseClock, SetEstimator, Setpoint, TakeClock, TakeControl
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.explain import EXPLAINED_BYTES
+from tvist_protocol.motions import MovePath
 from tvist_protocol.replies import Refused
 from tvist_protocol.simulation import SimulationStep
 
 STEP = tag(SimulationStep)
-LONG = frozenset((tag(SetEstimator), STEP))
+LONG = frozenset((tag(SetEstimator), tag(MovePath), STEP))
 """Types of commands that may be longer than `EXPLAINED_BYTES`."""
 
 

@@ -43,9 +43,25 @@ from tvist_protocol.commands import (
 from tvist_protocol.errors import ProtocolError, RefusedError, TvistError
 from tvist_protocol.info import CalibrationInfo, Clock, Info, Limits, Stopping, StopReason
 from tvist_protocol.io import Bank, Io, SetIo, SetRegisters, SetTcp, SimulationSetInputs
+from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_protocol.motions import (
+    ArcSegment,
+    JointSegment,
+    LineSegment,
+    MoveC,
+    MoveL,
+    MovePath,
+    ProcessSegment,
+    Segment,
+    ServoJ,
+    SpeedJ,
+    SpeedL,
+    StopJ,
+    StopL,
+)
 from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramState, ProgramStop
-from tvist_protocol.replies import CODE_MEANINGS, Accepted, Code, Done, Refused, Reply
+from tvist_protocol.replies import CODE_MEANINGS, Accepted, Code, Done, Posture, Refused, Reply, ToolPose
 from tvist_protocol.simulation import SimulationInject, SimulationReset, SimulationStep, StepSetpoint
 from tvist_protocol.stream import EVENT_MEANINGS, Event, EventKind, State, Telemetry, Truth
 from tvist_protocol.values import PROTOCOL_VERSION, Payload
@@ -56,6 +72,7 @@ __all__ = [
     "MAX_BYTES",
     "PROTOCOL_VERSION",
     "Accepted",
+    "ArcSegment",
     "Bank",
     "CalibrationInfo",
     "Clock",
@@ -64,17 +81,26 @@ __all__ = [
     "Done",
     "Event",
     "EventKind",
+    "ForwardKinematics",
     "HandOver",
     "Info",
+    "InverseKinematics",
     "Io",
+    "JointSegment",
     "KeepAlive",
     "Limits",
+    "LineSegment",
     "Message",
+    "MoveC",
     "MoveJ",
+    "MoveL",
+    "MovePath",
     "Pause",
     "Payload",
+    "Posture",
     "PowerOff",
     "PowerOn",
+    "ProcessSegment",
     "ProgramLoad",
     "ProgramPause",
     "ProgramPlay",
@@ -91,6 +117,8 @@ __all__ = [
     "RobotMode",
     "RuntimeState",
     "SafetyMode",
+    "Segment",
+    "ServoJ",
     "ServoStart",
     "ServoStop",
     "SetEstimator",
@@ -105,14 +133,19 @@ __all__ = [
     "SimulationReset",
     "SimulationSetInputs",
     "SimulationStep",
+    "SpeedJ",
+    "SpeedL",
     "State",
     "StepSetpoint",
     "Stop",
+    "StopJ",
+    "StopL",
     "StopReason",
     "Stopping",
     "TakeClock",
     "TakeControl",
     "Telemetry",
+    "ToolPose",
     "Truth",
     "TvistError",
     "UnlockProtectiveStop",

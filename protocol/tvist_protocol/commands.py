@@ -9,6 +9,8 @@ from typing import Any
 from tvist_protocol.client_message import ClientMessage
 from tvist_protocol.errors import ProtocolError, short
 from tvist_protocol.io import SetIo, SetRegisters, SetTcp, SimulationSetInputs
+from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
+from tvist_protocol.motions import MoveC, MoveL, MovePath, ServoJ, SpeedJ, SpeedL, StopJ, StopL
 from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramStop
 from tvist_protocol.simulation import SimulationInject, SimulationReset, SimulationStep
 from tvist_protocol.values import (
@@ -16,6 +18,7 @@ from tvist_protocol.values import (
     Acceleration,
     ClientName,
     DampingRatios,
+    Duration,
     Fraction,
     Frequencies,
     Inertia6,
@@ -100,6 +103,9 @@ class MoveJ(ClientMessage, frozen=True, kw_only=True, tag="move_j"):
     """Largest acceleration of any joint [rad/s²]."""
     jerk: Jerk = 100.0
     """Largest jerk of any joint [rad/s³]."""
+    duration: Duration | None = None
+    """Duration of the motion before shaping [s], instead of `velocity`, `acceleration` and `jerk`; one too short for
+    the arm takes longer."""
 
 
 class ServoStart(ClientMessage, frozen=True, kw_only=True, tag="servo_start"):
@@ -243,6 +249,14 @@ Command = (
     | TakeClock
     | ReleaseClock
     | MoveJ
+    | MoveL
+    | MoveC
+    | MovePath
+    | ServoJ
+    | SpeedJ
+    | SpeedL
+    | StopJ
+    | StopL
     | ServoStart
     | ServoStop
     | Stop
@@ -255,6 +269,8 @@ Command = (
     | SetIo
     | SetRegisters
     | SetTcp
+    | InverseKinematics
+    | ForwardKinematics
     | ProgramLoad
     | ProgramPlay
     | ProgramPause

@@ -4,6 +4,8 @@ from typing import Literal
 
 from msgspec import Struct
 
+from tvist_protocol.values import Joints, Pose
+
 Code = Literal[
     "malformed",
     "unknown_type",
@@ -18,6 +20,9 @@ Code = Literal[
     "limit_velocity",
     "limit_acceleration",
     "limit_torque",
+    "no_solution",
+    "singular",
+    "blend_skipped",
     "collision",
     "unknown_shaper",
     "unknown_estimator",
@@ -44,6 +49,9 @@ CODE_MEANINGS: dict[Code, str] = {
     "limit_velocity": "a velocity exceeds the limit of a joint",
     "limit_acceleration": "an acceleration exceeds the limit of a joint",
     "limit_torque": "a torque exceeds the limit of a joint",
+    "no_solution": "no joint positions reach a pose",
+    "singular": "the arm passes a singular posture, in which no joint motion moves the tool as required",
+    "blend_skipped": "two blends of a path overlap, so the path stops at the point of the second",
     "collision": "arm, payload or surroundings would collide or have collided",
     "unknown_shaper": "there is no shaper of this name; `info` lists them",
     "unknown_estimator": "there is no estimator of this name",
@@ -88,4 +96,18 @@ class Refused(Struct, frozen=True, kw_only=True, tag_field="type", tag="refused"
     """Limit that was exceeded, in the field's unit; null if there is none."""
 
 
-Reply = Accepted | Done | Refused
+class Posture(Struct, frozen=True, kw_only=True, tag_field="type", tag="posture", gc=False):
+    """Answer to `inverse_kinematics`."""
+
+    q: Joints
+    """Joint positions at which the tool has the pose, the nearest of all [rad]."""
+
+
+class ToolPose(Struct, frozen=True, kw_only=True, tag_field="type", tag="tool_pose", gc=False):
+    """Answer to `forward_kinematics`."""
+
+    pose: Pose
+    """Pose of the tool centre point: x y z [m] and rotation vector [rad]."""
+
+
+Reply = Accepted | Done | Refused | Posture | ToolPose

@@ -12,6 +12,7 @@ from tvist_protocol.faults import FAULTS, Fault
 from tvist_protocol.info import CalibrationInfo, Info, Limits, Stopping, StopReason
 from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
+from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment
 from tvist_protocol.replies import CODE_MEANINGS
 from tvist_protocol.schema import components, field_docs
 from tvist_protocol.simulation import StepSetpoint
@@ -35,7 +36,7 @@ def tables() -> dict[str, str]:
         "keys": _table(("key", "kind", "by", "carries", "what"), map(_channel_row, CHANNELS)),
         "commands": _messages(COMMANDS),
         "setpoint": _messages((Setpoint,)),
-        "parts": _messages((Payload, StepSetpoint)),
+        "parts": _messages((Payload, StepSetpoint, JointSegment, LineSegment, ProcessSegment, ArcSegment)),
         "replies": _messages(REPLIES),
         "codes": _table(("code", "meaning"), ((f"`{code}`", text) for code, text in CODE_MEANINGS.items())),
         "streams": _messages((State, Event, Truth, Telemetry, Io)),

@@ -25,6 +25,8 @@ class Activity(StrEnum):
     """A point-to-point motion is paused: the arm slows down or is at rest on its path."""
     STREAMING = "STREAMING"
     """The arm follows a stream of set-points."""
+    GUIDED = "GUIDED"
+    """The arm follows `servo_j`, `speed_j` or `speed_l`, each of which replaces the one before."""
     ENDING = "ENDING"
     """A stream has ended, and the arm comes to rest through the filter."""
     STOPPING = "STOPPING"
@@ -102,6 +104,7 @@ _MOVING = frozenset(
         _A.MOVING,
         _A.PAUSED,
         _A.STREAMING,
+        _A.GUIDED,
         _A.ENDING,
         _A.STOPPING,
         _A.POWERING_OFF,
@@ -119,8 +122,10 @@ for _activity in Activity:
     _activity.robot_mode = _ROBOT_MODES.get(_activity, RobotMode.RUNNING)
     _activity.moving = _activity in _MOVING
     _activity.protective = _activity in {_A.PROTECTIVE_STOPPING, _A.PROTECTIVE_STOP}
-_FREE_TO_END = (_A.MOVING, _A.PAUSED, _A.STREAMING, _A.ENDING, _A.STOPPING)
+_FREE_TO_END = (_A.MOVING, _A.PAUSED, _A.STREAMING, _A.GUIDED, _A.ENDING, _A.STOPPING)
 """Activities in which a motion can still be stopped."""
+_GUIDABLE = (_A.REST, _A.MOVING, _A.PAUSED, _A.GUIDED, _A.ENDING)
+"""Activities that `servo_j`, `speed_j` and `speed_l` take over."""
 _STANDING = (_A.POWER_OFF, _A.IDLE, _A.REST, _A.PROTECTIVE_STOP)
 _LOSING_POWER = (_A.POWERING_OFF, _A.BRAKING)
 _DRIVEN = tuple(a for a in _A if a not in {_A.POWER_OFF, _A.IDLE, *_LOSING_POWER})
@@ -137,12 +142,20 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition("power", (_A.POWER_OFF, _A.IDLE), _A.IDLE),
     Transition("power", (_A.REST,), _A.REST),
     Transition("move_j", (_A.REST,), _A.MOVING),
+    Transition("move_l", (_A.REST,), _A.MOVING),
+    Transition("move_c", (_A.REST,), _A.MOVING),
+    Transition("move_path", (_A.REST,), _A.MOVING),
+    Transition("servo_j", _GUIDABLE, _A.GUIDED),
+    Transition("speed_j", _GUIDABLE, _A.GUIDED),
+    Transition("speed_l", _GUIDABLE, _A.GUIDED),
     Transition("pause", (_A.MOVING, _A.PAUSED), _A.PAUSED),
     Transition("resume", (_A.PAUSED,), _A.MOVING),
     Transition("servo_start", (_A.REST,), _A.STREAMING),
     Transition("servo_stop", (_A.STREAMING,), _A.ENDING),
-    Transition("at_rest", (_A.MOVING, _A.ENDING, _A.STOPPING), _A.REST),
+    Transition("at_rest", (_A.MOVING, _A.GUIDED, _A.ENDING, _A.STOPPING), _A.REST),
     Transition("stop", _FREE_TO_END, _A.STOPPING),
+    Transition("stop_j", _FREE_TO_END, _A.STOPPING),
+    Transition("stop_l", _FREE_TO_END, _A.STOPPING),
     Transition("interruption", _FREE_TO_END, _A.STOPPING),
     Transition("power_off", _STANDING, _A.POWER_OFF),
     Transition("power_off", (*_FREE_TO_END, _A.POWERING_OFF, _A.PROTECTIVE_STOPPING), _A.POWERING_OFF),

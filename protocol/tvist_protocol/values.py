@@ -41,6 +41,12 @@ Jerk = Annotated[float, Meta(gt=0, le=1e7)]
 """[rad/s³]"""
 Period = Annotated[float, Meta(ge=0.002, le=0.1)]
 """[s], between one tick and 10 Hz"""
+JointSpeed = Annotated[float, Meta(ge=-1e3, le=1e3)]
+"""[rad/s]"""
+JointSpeeds = Annotated[tuple[JointSpeed, ...], Meta(min_length=1, max_length=7)]
+"""One velocity per joint [rad/s]"""
+Duration = Annotated[float, Meta(gt=0, le=3600)]
+"""[s]"""
 Fraction = Annotated[float, Meta(ge=0, le=1)]
 """[-]"""
 Lease = Annotated[float, Meta(ge=0.1, le=3600)]
@@ -62,6 +68,22 @@ Offset = Annotated[float, Meta(ge=-2, le=2)]
 """[m]"""
 Vec3 = tuple[Offset, Offset, Offset]
 """x y z in the flange frame [m]"""
+Coordinate = Annotated[float, Meta(ge=-1e3, le=1e3)]
+"""[m]"""
+Pose = tuple[Coordinate, Coordinate, Coordinate, Angle, Angle, Angle]
+"""x y z [m] and rotation vector [rad]"""
+ToolSpeed = Annotated[float, Meta(gt=0, le=1e3)]
+"""[m/s]"""
+ToolAcceleration = Annotated[float, Meta(gt=0, le=1e5)]
+"""[m/s²]"""
+ToolJerk = Annotated[float, Meta(gt=0, le=1e7)]
+"""[m/s³]"""
+Component = Annotated[float, Meta(ge=-1e3, le=1e3)]
+"""[m/s]"""
+Twist = tuple[Component, Component, Component, JointSpeed, JointSpeed, JointSpeed]
+"""Velocity [m/s] and angular velocity [rad/s]"""
+Blend = Annotated[float, Meta(ge=0, le=10)]
+"""[m]"""
 Moment = Annotated[float, Meta(ge=-10, le=10)]
 """[kg m²]"""
 Inertia6 = tuple[Moment, Moment, Moment, Moment, Moment, Moment]

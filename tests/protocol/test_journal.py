@@ -96,4 +96,5 @@ def test_a_message_in_an_entry_is_plain():
         "velocity": 1.5,
         "acceleration": 2.0,
         "jerk": 100.0,
+        "duration": None,
     }

@@ -1,0 +1,228 @@
+"""Commands for motions of the tool and of joints: lines, arcs, paths, speeds, servoing. `move_j` is in `commands`."""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+from tvist_protocol.client_message import ClientMessage
+from tvist_protocol.values import (
+    Acceleration,
+    Blend,
+    Duration,
+    Joints,
+    JointSpeeds,
+    Pose,
+    Token,
+    ToolAcceleration,
+    ToolJerk,
+    ToolSpeed,
+    Twist,
+    Velocity,
+)
+
+Orientation = Literal["interpolated", "tangent"]
+"""Orientation of the tool on an arc."""
+
+MAX_SEGMENTS = 500
+"""Largest number of segments of a path."""
+
+
+class MoveL(ClientMessage, frozen=True, kw_only=True, tag="move_l"):
+    """Move the tool centre point on a straight line and turn it by the shortest way; answered as `move_j` is."""
+
+    token: Token
+    """Token of the lease."""
+    pose: Pose
+    """Target of the tool centre point: x y z [m] and rotation vector [rad]."""
+    frame: Pose | None = None
+    """Frame in which `pose` is given, as a pose in the base frame; null: the base frame."""
+    velocity: ToolSpeed = 0.25
+    """Largest speed of the tool [m/s]; a turn of 1 rad counts as 0.25 m."""
+    acceleration: ToolAcceleration = 1.2
+    """Largest acceleration of the tool [m/s²]."""
+    jerk: ToolJerk = 60.0
+    """Largest jerk of the tool [m/s³]."""
+    duration: Duration | None = None
+    """Duration of the motion before shaping [s], instead of `velocity`, `acceleration` and `jerk`; one too short for
+    the arm takes longer."""
+
+
+class MoveC(ClientMessage, frozen=True, kw_only=True, tag="move_c"):
+    """Move the tool centre point on the circular arc through `via` and `pose`; answered as `move_j` is."""
+
+    token: Token
+    """Token of the lease."""
+    via: Pose
+    """A pose on the arc, of which only the position counts: x y z [m] and rotation vector [rad]."""
+    pose: Pose
+    """Target of the tool centre point: x y z [m] and rotation vector [rad]."""
+    frame: Pose | None = None
+    """Frame in which `via` and `pose` are given, as a pose in the base frame; null: the base frame."""
+    orientation: Orientation = "interpolated"
+    """`interpolated`: turn to the orientation of `pose` by the shortest way; `tangent`: keep the tool's orientation
+    relative to the arc's tangent, and ignore that of `pose`."""
+    velocity: ToolSpeed = 0.25
+    """Largest speed of the tool [m/s]; a turn of 1 rad counts as 0.25 m."""
+    acceleration: ToolAcceleration = 1.2
+    """Largest acceleration of the tool along the arc [m/s²]."""
+    jerk: ToolJerk = 60.0
+    """Largest jerk of the tool [m/s³]."""
+
+
+class PathSegment(
+    Struct,
+    frozen=True,
+    kw_only=True,
+    forbid_unknown_fields=True,
+    tag_field="type",
+    omit_defaults=True,
+    gc=False,
+):
+    """Base of the parts of a path."""
+
+
+class JointSegment(PathSegment, frozen=True, kw_only=True, tag="joint"):
+    """A part of a path on which all joints move in phase, as in `move_j`."""
+
+    q: Joints
+    """Posture at its end, one angle per joint [rad]."""
+    velocity: Velocity = 1.5
+    """Largest velocity of any joint [rad/s]."""
+    acceleration: Acceleration = 2.0
+    """Largest acceleration of any joint [rad/s²]."""
+    duration: Duration | None = None
+    """Duration of this part [s], instead of `velocity` and `acceleration`; one too short for the arm takes longer."""
+    blend: Blend = 0.0
+    """Distance of the tool from the end of this part within which the path may leave it for the next part [m];
+    it has no effect at the end of the path."""
+
+
+class LineSegment(PathSegment, frozen=True, kw_only=True, tag="line"):
+    """A part of a path on which the tool moves as in `move_l`."""
+
+    pose: Pose
+    """Pose at its end: x y z [m] and rotation vector [rad]."""
+    velocity: ToolSpeed = 0.25
+    """Largest speed of the tool [m/s]; a turn of 1 rad counts as 0.25 m."""
+    acceleration: ToolAcceleration = 1.2
+    """Largest acceleration of the tool, also in the blend at its end [m/s²]."""
+    duration: Duration | None = None
+    """Duration of this part [s], instead of `velocity` and `acceleration`; one too short for the arm takes longer."""
+    blend: Blend = 0.0
+    """Distance of the tool from the end of this part within which the path may leave it for the next part [m];
+    it has no effect at the end of the path."""
+
+
+class ProcessSegment(PathSegment, frozen=True, kw_only=True, tag="process"):
+    """A part of a path on which the tool moves as in `move_l`, at a constant speed also in the blend at its end."""
+
+    pose: Pose
+    """Pose at its end: x y z [m] and rotation vector [rad]."""
+    velocity: ToolSpeed = 0.25
+    """Speed of the tool [m/s]; a turn of 1 rad counts as 0.25 m."""
+    acceleration: ToolAcceleration = 1.2
+    """Largest acceleration of the tool along the path [m/s²]."""
+    blend: Blend = 0.0
+    """Distance of the tool from the end of this part within which the path may leave it for the next part [m];
+    it has no effect at the end of the path."""
+
+
+class ArcSegment(PathSegment, frozen=True, kw_only=True, tag="arc"):
+    """A part of a path on which the tool moves as in `move_c`."""
+
+    via: Pose
+    """A pose on the arc, of which only the position counts: x y z [m] and rotation vector [rad]."""
+    pose: Pose
+    """Pose at its end: x y z [m] and rotation vector [rad]."""
+    orientation: Orientation = "interpolated"
+    """`interpolated` or `tangent`, as in `move_c`."""
+    velocity: ToolSpeed = 0.25
+    """Largest speed of the tool [m/s]; a turn of 1 rad counts as 0.25 m."""
+    acceleration: ToolAcceleration = 1.2
+    """Largest acceleration of the tool along the path [m/s²]."""
+    blend: Blend = 0.0
+    """Distance of the tool from the end of this part within which the path may leave it for the next part [m];
+    it has no effect at the end of the path."""
+
+
+Segment = JointSegment | LineSegment | ProcessSegment | ArcSegment
+
+
+class MovePath(ClientMessage, frozen=True, kw_only=True, tag="move_path", omit_defaults=True):
+    """Move along a path of several parts without stopping where they are blended; answered as `move_j` is."""
+
+    token: Token
+    """Token of the lease."""
+    segments: Annotated[tuple[Segment, ...], Meta(min_length=1, max_length=MAX_SEGMENTS)]
+    """Parts of the path in their order; each begins where the previous one ends."""
+    frame: Pose | None = None
+    """Frame in which all poses are given, as a pose in the base frame; null: the base frame."""
+    jerk: ToolJerk = 60.0
+    """Largest jerk of the tool [m/s³]; of the joints on joint segments, twice the number [rad/s³]."""
+
+
+class ServoJ(ClientMessage, frozen=True, kw_only=True, tag="servo_j"):
+    """Follow a posture with a lag, until another command comes; send one after the other to follow a moving posture.
+
+    It begins at rest or takes over any motion at once. Answered by `accepted` with the `id` that it shares with its
+    successors until the arm rests.
+    """
+
+    token: Token
+    """Token of the lease."""
+    q: Joints
+    """Posture, one angle per joint [rad]."""
+    lookahead: Annotated[float, Meta(gt=0, le=10)] = 0.1
+    """Time constant with which the arm approaches the posture [s]; the range is 0.03 to 0.2, and others are clipped."""
+    gain: Annotated[float, Meta(gt=0, le=1e6)] = 300.0
+    """Proportional gain of the approach [-]; the range is 100 to 2000, and others are clipped."""
+    shaped: bool = False
+    """Whether the shaper is used; only for a motion that begins at rest."""
+
+
+class SpeedJ(ClientMessage, frozen=True, kw_only=True, tag="speed_j"):
+    """Accelerate to velocities of the joints and keep them, until another command comes; see `servo_j`."""
+
+    token: Token
+    """Token of the lease."""
+    qd: JointSpeeds
+    """Velocities, one per joint [rad/s]."""
+    acceleration: Acceleration = 1.4
+    """Acceleration of the joint whose velocity changes most [rad/s²]; the others change in phase."""
+    shaped: bool = False
+    """Whether the shaper is used; only for a motion that begins at rest."""
+
+
+class SpeedL(ClientMessage, frozen=True, kw_only=True, tag="speed_l"):
+    """Accelerate to a velocity of the tool and keep it, until another command comes; see `servo_j`."""
+
+    token: Token
+    """Token of the lease."""
+    xd: Twist
+    """Velocity [m/s] and angular velocity [rad/s] of the tool centre point in the base frame."""
+    acceleration: ToolAcceleration = 1.2
+    """Acceleration of the tool [m/s²]."""
+    angular_acceleration: Acceleration | None = None
+    """Angular acceleration of the tool [rad/s²]; null: the number of `acceleration`."""
+    shaped: bool = False
+    """Whether the shaper is used; only for a motion that begins at rest."""
+
+
+class StopJ(ClientMessage, frozen=True, kw_only=True, tag="stop_j"):
+    """Come to rest with a deceleration of the joints; a planned motion stays on its path."""
+
+    token: Token
+    """Token of the lease."""
+    acceleration: Acceleration = 2.0
+    """Deceleration of the joint that is fastest [rad/s²]."""
+
+
+class StopL(ClientMessage, frozen=True, kw_only=True, tag="stop_l"):
+    """Come to rest with a deceleration of the tool; a planned motion stays on its path."""
+
+    token: Token
+    """Token of the lease."""
+    acceleration: ToolAcceleration = 1.2
+    """Deceleration of the tool [m/s²]."""
+    angular_acceleration: Acceleration | None = None
+    """Angular deceleration of the tool [rad/s²]; null: the number of `acceleration`."""
