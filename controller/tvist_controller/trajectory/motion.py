@@ -100,12 +100,16 @@ class PlannedMotion(Trajectory):
         else:
             time = self.time
             ends = (time, time + LOOK_AHEAD * self._period)
-            curve = [np.array(self._law.at(end)[1:3]) for end in ends]
+            curve = [self._paced(end) for end in ends]
             step = self._pace.advance(self.speed, curve)
             self._since, self._ticks = time + step, 0
         if self.finished:
             return self.path.end
         return np.array(self._law.at(self.time)[0])
+
+    def _paced(self, time: float) -> Floats:
+        x, xd, xdd = (np.array(values) for values in self._law.at(time))
+        return self.path.paced(x, xd, xdd, self.limits.acceleration)
 
     @property
     def rate(self) -> float:

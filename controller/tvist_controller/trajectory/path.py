@@ -24,12 +24,12 @@ class Path(ABC):
     """Joint positions q(x) as a function of a parameter x.
 
     Time laws, the TVIST filter and stops act on the parameter, so their results stay on the path, however it curves.
-    The parameter has shape (m,) and moves straight from `start` to `end`. No joint turns farther than the leading
-    entry of the parameter moves, so its unit is that of the joint that turns most [rad].
+    The parameter has shape (m,) and moves straight from `start` to `end`. Its unit is that of the path: radians for a
+    straight line in joint space, metres for a path of the tool.
 
     Args:
-        start: Parameter at the start, shape (m,) [rad].
-        end: Parameter at the end, shape (m,) [rad].
+        start: Parameter at the start, shape (m,).
+        end: Parameter at the end, shape (m,).
     """
 
     posture_of: Posture | None
@@ -37,7 +37,7 @@ class Path(ABC):
 
     def __init__(self, start: Floats, end: Floats) -> None:
         self.start, self.end = start, np.array(end, dtype=float)
-        """Parameter at the start and at the end, each of shape (m,) [rad]."""
+        """Parameter at the start and at the end, each of shape (m,)."""
         way = self.end - start
         farthest = float(np.abs(way).max())
         self.direction = way / farthest if farthest > 0.0 else np.zeros(len(start))
@@ -51,12 +51,26 @@ class Path(ABC):
         """Return the joints' state of motion for a state of the parameter.
 
         Args:
-            x: Parameter, shape (m,), or (k, m) for k states [rad].
-            xd: Its velocity, same shape [rad/s].
-            xdd: Its acceleration, same shape [rad/s^2].
+            x: Parameter, shape (m,), or (k, m) for k states.
+            xd: Its velocity, same shape [1/s].
+            xdd: Its acceleration, same shape [1/s^2].
 
         Returns:
             q [rad], q̇ [rad/s] and q̈ [rad/s^2], each of shape (n,) or (k, n).
+        """
+
+    @abstractmethod
+    def paced(self, x: Floats, xd: Floats, xdd: Floats, acceleration: float) -> Floats:
+        """Return the velocities and accelerations that a change of the motion's rate has to consider.
+
+        Args:
+            x: Parameter, shape (m,).
+            xd: Its velocity at full rate, same shape [1/s].
+            xdd: Its acceleration at full rate, same shape [1/s^2].
+            acceleration: Limit of the parameter's acceleration [1/s^2].
+
+        Returns:
+            Array of shape (2, k), scaled so that this limit is that of every column.
         """
 
     @abstractmethod
@@ -64,12 +78,13 @@ class Path(ABC):
         """Return limits for the parameter of a motion that keep every joint within its own limits on the whole path."""
 
     @abstractmethod
-    def keeping(self, limits: MotionLimits, velocity: float) -> MotionLimits | None:
-        """Return limits for the parameter's acceleration and jerk at velocities up to this [rad/s].
+    def keeping(self, limits: MotionLimits, velocity: float, x: Floats) -> MotionLimits | None:
+        """Return limits for the parameter's acceleration and jerk in a stop.
 
         Args:
             limits: Limits for every joint; the velocity is ignored.
-            velocity: Velocity of the parameter [rad/s].
+            velocity: Largest velocity of the parameter in the stop [1/s].
+            x: Parameter at which the stop begins, shape (m,).
 
         Returns:
             None if the curve alone uses up the limits of the joints.
@@ -80,8 +95,8 @@ class Path(ABC):
         """Return a part of the path, to be checked for collisions.
 
         Args:
-            start: Parameter at the start, shape (m,) [rad].
-            end: Parameter at the end, shape (m,) [rad].
+            start: Parameter at the start, shape (m,).
+            end: Parameter at the end, shape (m,).
         """
 
     @property
@@ -114,11 +129,15 @@ class JointLine(Path):
         """Return the states of the parameter unchanged."""
         return x, xd, xdd
 
+    def paced(self, x: Floats, xd: Floats, xdd: Floats, acceleration: float) -> Floats:  # noqa: ARG002  one limit for all
+        """Return the derivatives of the parameter."""
+        return np.array((xd, xdd))
+
     def planned(self, limits: MotionLimits) -> MotionLimits:
         """Return the limits of the joints unchanged."""
         return limits
 
-    def keeping(self, limits: MotionLimits, velocity: float) -> MotionLimits:  # noqa: ARG002  the line has no curvature
+    def keeping(self, limits: MotionLimits, velocity: float, x: Floats) -> MotionLimits:  # noqa: ARG002  no curvature
         """Return the limits of the joints unchanged."""
         return limits
 

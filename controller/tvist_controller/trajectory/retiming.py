@@ -1,0 +1,182 @@
+"""Time laws along curves whose limits change on the way: as fast as these permit, with bounded jerk.
+
+In the phase plane of s and b = ṡ², a constant acceleration is a straight line, db/ds = 2 s̈. A pass backwards and one
+forwards through the cells of the curve find the largest b that the limits permit (Bobrow, Dubowsky and Gibson 1985,
+with bounds that do not depend on the sign of s̈). Its motion has steps of the acceleration; the mean of s(t) over the
+last `ramp` seconds has none, and bounded jerk.
+
+Such a mean, and every shaper behind it, mixes moments of the motion, so it passes a place at speeds that belong to
+its neighbourhood. The limits of a cell therefore hold for all cells that the motion is in within a window of time.
+"""
+
+from bisect import bisect_right
+from dataclasses import dataclass
+
+import numpy as np
+
+from tvist_controller._compiled import compiled
+from tvist_controller.trajectory.limits import Floats, MotionLimits
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Limits along a curve, constant in each of c cells: ṡ ≤ fastest, and p |s̈| + q ṡ² ≤ 1 for each of r rows."""
+
+    edges: Floats
+    """Ends of the cells, rising from 0, shape (c + 1,)."""
+    fastest: Floats
+    """Largest ṡ in each cell, shape (c,) [1/s]."""
+    p: Floats
+    """Shape (c, r) [s^2 per unit of s]."""
+    q: Floats
+    """Shape (c, r) [s^2 per unit of s, squared]."""
+
+
+@compiled
+def passes(edges: Floats, highest: Floats, p: Floats, q: Floats) -> Floats:  # pragma: no cover  compiled
+    """Return the largest b = ṡ² at the edges, zero at both ends.
+
+    Args:
+        edges: Ends of the cells, shape (c + 1,).
+        highest: Largest b in each cell, shape (c,).
+        p: See `Cells`.
+        q: See `Cells`.
+    """
+    count, rows = p.shape
+    b = np.zeros(count + 1)
+    for number in range(1, count):
+        b[number] = min(highest[number - 1], highest[number])
+    for number in range(count - 1, 0, -1):
+        twice = 2.0 * (edges[number + 1] - edges[number])
+        for row in range(rows):
+            share = p[number, row] / twice
+            b[number] = min(b[number], (1.0 + share * b[number + 1]) / (share + q[number, row]))
+    for number in range(count):
+        twice = 2.0 * (edges[number + 1] - edges[number])
+        for row in range(rows):
+            share = p[number, row] / twice
+            b[number + 1] = min(b[number + 1], (1.0 + share * b[number]) / (share + q[number, row]))
+    return b
+
+
+@compiled
+def widened(times: Floats, window: float, values: Floats, lowest: bool) -> Floats:  # pragma: no cover  compiled
+    """Return for each cell the largest value, or the lowest, of all cells that are passed within a window of time.
+
+    Args:
+        times: Times at the edges, shape (c + 1,) [s].
+        window: The window, to either side [s].
+        values: A value for each cell and row, shape (c, r).
+        lowest: Whether the lowest value is returned.
+    """
+    count, rows = values.shape
+    out = values.copy()
+    first, last = 0, 0
+    for number in range(count):
+        while times[first + 1] < times[number] - window:
+            first += 1
+        while last < count - 1 and times[last + 1] <= times[number + 1] + window:
+            last += 1
+        for other in range(first, last + 1):
+            for row in range(rows):
+                if (values[other, row] < out[number, row]) == lowest:
+                    out[number, row] = values[other, row]
+    return out
+
+
+class RetimedLaw:
+    """The time law of a curve's parameter: the mean over `ramp` seconds of a motion with constant accelerations.
+
+    Args:
+        edges: Places at which the acceleration may change, shape (c + 1,).
+        b: ṡ² there, shape (c + 1,), zero at both ends only.
+        ramp: Time over which the mean is taken [s].
+        rate: Rate of its time relative to the clock's, above 0 [-].
+    """
+
+    def __init__(self, edges: Floats, b: Floats, ramp: float, rate: float = 1.0) -> None:
+        self._edges, self._b, self._ramp, self._rate = edges, b, ramp, rate
+        speeds = np.sqrt(b)
+        lengths = np.diff(edges)
+        times = arrivals(edges, b)
+        spans = np.diff(times)
+        accelerations = 0.5 * np.diff(b) / lengths
+        areas = np.cumsum(spans * (edges[:-1] + spans * (speeds[:-1] / 2.0 + spans * accelerations / 6.0)))
+        self._times, self._last = times.tolist(), len(lengths) - 1
+        self._pieces = list(
+            zip([0.0, *areas[:-1].tolist()], edges.tolist(), speeds.tolist(), accelerations.tolist(), strict=False)
+        )
+        self._end = float(areas[-1]), float(edges[-1])
+        self.duration = (self._times[-1] + ramp) / rate
+        """Duration from rest to rest [s]."""
+        braking = np.flatnonzero(accelerations < 0.0)
+        self.brakes_at = self._times[int(braking[0])] / rate
+        """Time at which it begins to slow down [s]."""
+        most = float(np.abs(accelerations).max())
+        self.limits = MotionLimits(float(speeds.max()) * rate, most * rate**2, self._harshest() * rate**3)
+        """Limits that it keeps."""
+
+    def slowed(self, duration: float) -> "RetimedLaw":
+        """Return the same law in a longer duration [s]; this one if it takes as long already."""
+        if duration <= self.duration:
+            return self
+        return RetimedLaw(self._edges, self._b, self._ramp, self._rate * self.duration / duration)
+
+    def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
+        """Parameter, its velocity [1/s] and its acceleration [1/s^2] at a time [s]."""
+        rate, ramp = self._rate, self._ramp
+        late, early = self._before(time * rate), self._before(time * rate - ramp)
+        s, sd, sdd = (
+            (after - before) / ramp for after, before in zip(late[:3], early[:3], strict=True)
+        )
+        return [s], [sd * rate], [sdd * rate * rate]
+
+    def _before(self, time: float) -> tuple[float, float, float, float]:
+        """∫s, s, ṡ and s̈ of the motion before the mean."""
+        if time <= 0.0:
+            return 0.0, 0.0, 0.0, 0.0
+        if time >= self._times[-1]:
+            area, length = self._end
+            return area + length * (time - self._times[-1]), length, 0.0, 0.0
+        number = min(bisect_right(self._times, time) - 1, self._last)
+        area, s, sd, sdd = self._pieces[number]
+        t = time - self._times[number]
+        return area + t * (s + t * (sd / 2.0 + t * sdd / 6.0)), s + t * (sd + 0.5 * t * sdd), sd + t * sdd, sdd
+
+    def _harshest(self) -> float:
+        """Largest jerk at full rate."""
+        moments = [time + shift for time in self._times for shift in (1e-9, self._ramp - 1e-9)]
+        return max(
+            abs(self._before(time)[3] - self._before(time - self._ramp)[3]) for time in moments
+        ) / self._ramp
+
+
+def arrivals(edges: Floats, b: Floats) -> Floats:
+    """Times at which a motion is at the edges of its cells, shape (c + 1,) [s]; arguments as of `RetimedLaw`."""
+    speeds = np.sqrt(b)
+    return np.concatenate(([0.0], np.cumsum(2.0 * np.diff(edges) / (speeds[:-1] + speeds[1:]))))
+
+
+def quickest_law(cells: Cells, jerk: float, window: float) -> RetimedLaw:
+    """Return the quickest law within the limits of the cells.
+
+    Args:
+        cells: Limits along the curve.
+        jerk: Jerk limit of s [1/s^3].
+        window: Time over which a shaper mixes moments of the motion [s].
+    """
+    highest = cells.fastest**2
+    b = passes(cells.edges, highest, cells.p, cells.q)
+    hardest = float(np.abs(0.5 * np.diff(b) / np.diff(cells.edges)).max())
+    ramp = hardest / jerk
+    law = _law(cells, b, ramp, window)
+    if law.limits.jerk > jerk * (1.0 + 1e-6):  # it changes from speeding up to braking within a ramp
+        law = _law(cells, b, ramp * law.limits.jerk / jerk, window)
+    return law
+
+
+def _law(cells: Cells, b: Floats, ramp: float, window: float) -> RetimedLaw:
+    times, around = arrivals(cells.edges, b), window + ramp
+    fastest = widened(times, around, cells.fastest[:, None], True)[:, 0]
+    p, q = widened(times, around, cells.p, False), widened(times, around, cells.q, False)
+    return RetimedLaw(cells.edges, passes(cells.edges, fastest**2, p, q), ramp)

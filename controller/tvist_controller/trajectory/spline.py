@@ -1,0 +1,136 @@
+"""Curves in joint space as splines of degree five through known derivatives."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tvist_controller._compiled import compiled
+from tvist_controller.trajectory.curve import Bends, Curve
+from tvist_controller.trajectory.limits import Floats
+
+SAMPLES = np.linspace(0.0, 1.0, 9)
+"""Places in each interval at which derivatives are sampled for their bounds."""
+ENOUGH = 1.05
+"""Factor from the largest sample of a derivative to a bound of it [-]."""
+
+
+class Knots(NamedTuple):
+    """Places of a curve with its first two derivatives there."""
+
+    s: Floats
+    """Parameters, rising from 0, shape (k,)."""
+    q: Floats
+    """Joint positions, shape (k, n) [rad]."""
+    slope: Floats
+    """dq/ds, shape (k, n)."""
+    second: Floats
+    """d²q/ds², shape (k, n)."""
+
+
+def hermite(
+    length: float, start: tuple[Floats, Floats, Floats], end: tuple[Floats, Floats, Floats]
+) -> Floats:
+    """Coefficients of the polynomial of degree five with given values and first two derivatives at both ends.
+
+    Args:
+        length: Distance of the ends.
+        start: Value and two derivatives at 0, each of shape (..., m).
+        end: The same at the length.
+
+    Returns:
+        Coefficients of rising powers of the distance from the start, shape (6, ..., m).
+    """
+    h = length
+    p0, v0, a0 = start
+    d0 = end[0] - p0 - v0 * h - 0.5 * a0 * h * h
+    d1 = (end[1] - v0 - a0 * h) * h
+    d2 = (end[2] - a0) * h * h
+    c3 = 10.0 * d0 - 4.0 * d1 + 0.5 * d2
+    c4 = -15.0 * d0 + 7.0 * d1 - d2
+    c5 = 6.0 * d0 - 3.0 * d1 + 0.5 * d2
+    return np.stack((p0, v0, 0.5 * a0, c3 / h**3, c4 / h**4, c5 / h**5))
+
+
+@compiled
+def evaluate(knots: Floats, coefficients: Floats, s: Floats, out: Floats) -> None:  # pragma: no cover  compiled
+    """Evaluate a spline and its first three derivatives.
+
+    Args:
+        knots: Ends of its intervals, shape (k + 1,).
+        coefficients: Coefficients of rising powers, shape (k, 6, n).
+        s: Parameters, shape (p,); beyond the ends the outermost polynomial continues.
+        out: Receives value and derivatives, shape (4, p, n).
+    """
+    last = len(knots) - 2
+    joints = coefficients.shape[2]
+    for number in range(len(s)):
+        x = s[number]
+        low, high = 0, last + 1
+        while high - low > 1:
+            middle = (low + high) // 2
+            if knots[middle] <= x:
+                low = middle
+            else:
+                high = middle
+        u = x - knots[low]
+        for joint in range(joints):
+            c0, c1, c2 = coefficients[low, 0, joint], coefficients[low, 1, joint], coefficients[low, 2, joint]
+            c3, c4, c5 = coefficients[low, 3, joint], coefficients[low, 4, joint], coefficients[low, 5, joint]
+            out[0, number, joint] = c0 + u * (c1 + u * (c2 + u * (c3 + u * (c4 + u * c5))))
+            out[1, number, joint] = c1 + u * (2.0 * c2 + u * (3.0 * c3 + u * (4.0 * c4 + u * 5.0 * c5)))
+            out[2, number, joint] = 2.0 * c2 + u * (6.0 * c3 + u * (12.0 * c4 + u * 20.0 * c5))
+            out[3, number, joint] = 6.0 * c3 + u * (24.0 * c4 + u * 60.0 * c5)
+
+
+class SplineCurve(Curve):
+    """A curve through knots whose positions and first two derivatives are known.
+
+    Args:
+        knots: The knots, at least two.
+        most: Largest acceleration of each joint, see `Curve`.
+
+    Raises:
+        ValueError: The knots are not finite, or do not move any joint.
+    """
+
+    def __init__(self, knots: Knots, most: Floats | None = None) -> None:
+        self._knots = np.ascontiguousarray(knots.s)
+        ends = [(knots.q[part], knots.slope[part], knots.second[part]) for part in (slice(-1), slice(1, None))]
+        lengths = np.diff(knots.s)
+        coefficients = hermite(lengths[:, None], ends[0], ends[1])
+        self._coefficients = np.ascontiguousarray(np.moveaxis(coefficients, 0, 1))
+        self._one = np.empty((4, 1, knots.q.shape[1]))
+        s = (knots.s[:-1, None] + lengths[:, None] * SAMPLES * (1.0 - 1e-9)).reshape(-1)
+        sizes = np.abs(self._evaluate(s)).reshape(4, len(lengths), len(SAMPLES), -1).max(axis=2)
+        self._slope = ENOUGH * sizes[1]
+        self._second, self._third = ENOUGH * sizes[2].max(axis=1), ENOUGH * sizes[3].max(axis=1)
+        super().__init__(float(knots.s[-1]), self._bends(0, len(lengths)), most)
+
+    def derivatives(self, s: Floats) -> tuple[Floats, Floats, Floats]:
+        """Evaluate the spline."""
+        q, slope, second, _ = self._evaluate(s)
+        return q, slope, second
+
+    def bends_within(self, start: float, end: float) -> Bends:
+        """Bounds of the derivatives between two parameters."""
+        last = len(self._slope)
+        low = min(max(int(np.searchsorted(self._knots, start, side="right")) - 1, 0), last - 1)
+        high = min(max(int(np.searchsorted(self._knots, end, side="left")), low + 1), last)
+        return self._bends(low, high)
+
+    def _posture(self, x: Floats) -> Floats:
+        evaluate(self._knots, self._coefficients, x, self._one)
+        q: Floats = self._one[0, 0].copy()
+        return q
+
+    def _evaluate(self, s: Floats) -> Floats:
+        out = np.empty((4, len(s), self._coefficients.shape[2]))
+        evaluate(self._knots, self._coefficients, np.ascontiguousarray(s), out)
+        return out
+
+    def _bends(self, low: int, high: int) -> Bends:
+        return Bends(
+            self._slope[low:high].max(axis=0),
+            float(self._second[low:high].max()),
+            float(self._third[low:high].max()),
+        )
