@@ -1,20 +1,13 @@
-"""Compile functions with numba, or use them as plain Python if numba is not installed."""
+"""Compile functions with numba."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
+
+from numba import njit
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 def compiled(function: F) -> F:
-    """Compile a function; its Python source remains available as `.py_func`. The cache outlives the process.
-
-    numba detects changes of the file that contains a kernel, but not of the files with functions that it calls. A
-    kernel and the functions that it calls are therefore in the same file.
-    """
-    try:
-        from numba import njit
-    except ImportError:  # pragma: no cover
-        function.py_func = function  # type: ignore[attr-defined]
-        return function
+    """Compile `function`; its Python source remains available as `.py_func`; the cache outlives the process."""
     return cast("F", njit(cache=True)(function))

@@ -1,0 +1,1 @@
+"""Kinematics of the rigid arm from its Denavit-Hartenberg parameters, compiled: forward, differential, inverse."""
