@@ -103,7 +103,7 @@ class Controller:
         self._told_program = self.programs.progress
         self.filters = Filters(self.motion, source, setup.payload, self._emit)
         self._payload = DeclaredPayload(setup.payload, self.motion, self.filters, self._emit)
-        self.peripherals = Peripherals(self._reporter.set_tcp)
+        self.peripherals = Peripherals(self._set_tcp)
         parts = (
             self._authority, MotionCommands(self.motion, safety, self.programs), self.filters, self._payload,
             self.peripherals, self._faults, self.programs, self,
@@ -304,6 +304,10 @@ class Controller:
         """Plan and start a motion of the program; return its number."""
         self.motion.check_move()
         return self.motion.move(self._found(self._planner.plan(command, self.basis)))
+
+    def _set_tcp(self, offset: tuple[float, ...]) -> None:
+        self._reporter.set_tcp(offset)
+        self.motion.tcp = offset
 
     def _found(self, plan: Plan) -> Any:
         if isinstance(plan.found, RefusalError):

@@ -42,6 +42,7 @@ class Filters:
         before = self.source
         self.source, tvist = chosen
         self._cycle.use(tvist)
+        self._motion.motions.keep_rate()
         self._emit("shaper_changed", why=f"{tvist.name} with estimator {self.source.name}")
         if self.source is not before:
             self._warn_of_arm()
@@ -65,6 +66,7 @@ class Filters:
         self._declared = payload
         if tvist is not None:
             self._cycle.use(tvist)
+            self._motion.motions.keep_rate()
         self._warn_of_payload()
 
     def _warn_of_payload(self) -> None:

@@ -48,6 +48,8 @@ class MotionControl:
         self.collisions = collisions
         self.activity = PUT[mode]
         """Present activity of the robot."""
+        self.tcp: tuple[float, ...] = (0.0,) * 6
+        """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
         self.safety = SafetySystem()
         """The safety system."""
         self._emit = emit
@@ -57,7 +59,8 @@ class MotionControl:
         """Collision check of that motion."""
         self._protection = Protection(cycle)
         self.motions = Motions(cycle, self.safety, emit)
-        """Point-to-point motions and their speed."""
+        """Planned motions and their speed."""
+        self.ahead.coming = lambda: self.motions.coming
         self.streams = Streaming()
         """The present stream of set-points, if there is one."""
 
@@ -93,18 +96,23 @@ class MotionControl:
             speed=self.motions.wanted_speed,
             slowest=self.motions.slowest,
             excess=cycle.tvist.excess,
+            tcp=self.tcp,
             carried=self.collisions.carried,
             bodies=cycle.inverse_dynamics.bodies,
             filter=on,
         )
 
-    def move(self, planned: PlannedMove) -> int:
-        """Start a point-to-point motion whose plan holds for the present state; return its number.
+    def move(self, planned: PlannedMove, trigger: str = "move_j") -> int:
+        """Start a motion whose plan holds for the present state; return its number.
+
+        Args:
+            planned: The plan.
+            trigger: `type` of the command that it carries out.
 
         Raises:
             RefusalError: See `check_move`.
         """
-        self._go("move_j")
+        self._go(trigger)
         return self.motions.begin(planned)
 
     def pause(self) -> None:
@@ -335,12 +343,17 @@ class MotionControl:
         if refused or (self.cycle.stopping and self.activity is Activity.ENDING):
             self.end("interruption", str(self.ahead.met), "collision")
         if self.cycle.at_rest and self.activity.moving and (target := after(self.activity, "at_rest")):
-            self.activity = target
-            self.motions.done()
+            self._rest(target)
         if self.activity.robot_mode is RobotMode.RUNNING:
             for danger in self._protection.dangers(sample):
                 self.protect(danger.why, danger.code)
         return sample
+
+    def _rest(self, target: Activity) -> None:
+        if self.activity is Activity.MOVING and self.motions.go_on():
+            return
+        self.activity = target
+        self.motions.done()
 
     def _end_stream(self, why: str, code: Code | None = None, **told: Unpack[Told]) -> None:
         if self.streams.end():

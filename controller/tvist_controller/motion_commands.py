@@ -1,12 +1,16 @@
 """Commands that move, stop and power the arm."""
 
+from typing import Any
+
 from tvist_controller.command_row import Call, Row
 from tvist_controller.motion import MotionControl
+from tvist_controller.planning.planner import MOTIONS
 from tvist_controller.programs.player import ProgramPlayer
 from tvist_controller.refusal import check_content, check_motion
 from tvist_controller.safety_control import SafetyControl
 from tvist_controller.trajectory import MotionLimits
 from tvist_protocol import commands as c
+from tvist_protocol.channels import tag
 from tvist_protocol.replies import Accepted, Reply
 
 
@@ -23,7 +27,7 @@ class MotionCommands:
         self._motion, self._safety, self._programs = motion, safety, programs
         self._description = motion.cycle.description
         self.rows = (
-            Row(c.MoveJ, self._move_j),
+            *(Row(kind, self._move) for kind in MOTIONS),
             Row(c.ServoStart, self._servo_start),
             Row(c.ServoStop, lambda _: motion.end_stream()),
             Row(c.Stop, self._stop, lease="if named"),
@@ -36,10 +40,10 @@ class MotionCommands:
             Row(c.RestartSafety, lambda _: motion.safety.restart()),
         )
 
-    def _move_j(self, call: Call[c.MoveJ]) -> Reply:
+    def _move(self, call: Call[Any]) -> Reply:
         check_content(call.command, self._description)
         self._motion.check_move()
-        return Accepted(id=self._motion.move(call.planned()))
+        return Accepted(id=self._motion.move(call.planned(), tag(type(call.command))))
 
     def _servo_start(self, call: Call[c.ServoStart]) -> None:
         command = call.command

@@ -8,6 +8,7 @@ from tvist_controller.moving import RunningMove
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.safety import REDUCED_SHARE, rate_of
 from tvist_controller.safety_system import SafetySystem
+from tvist_controller.trajectory import PlannedMotion
 from tvist_protocol.replies import Code
 
 
@@ -45,15 +46,27 @@ class Motions:
 
     def begin(self, planned: PlannedMove) -> int:
         """Start a motion and return its number."""
-        trajectory = planned.trajectory
-        self._cycle.start(trajectory)
-        self._cycle.tvist.aim(trajectory.path.end)
         self._started += 1
-        move = self._move = RunningMove(self._started, trajectory, planned.velocity, self._cycle)
+        move = self._move = RunningMove(self._started, planned, self._cycle)
         self._emit("motion_started", id=move.number)
+        for why in planned.skipped:
+            self._emit("warning", id=move.number, code="blend_skipped", why=why)
         if planned.excess_of_torque is not None:
             self._emit("warning", id=move.number, code="limit_torque", why=planned.excess_of_torque)
         return move.number
+
+    def go_on(self) -> bool:
+        """Start the next part of the running motion, since one has come to rest; return whether there was one."""
+        move = self._move
+        if move is None or not move.coming:
+            return False
+        move.go_on(self._rate(move))
+        return True
+
+    @property
+    def coming(self) -> tuple[PlannedMotion, ...]:
+        """Parts of the running motion that have not begun."""
+        return () if self._move is None else self._move.coming
 
     def set_speed(self, fraction: float) -> None:
         """Scale the time of the running motion and of later ones."""
@@ -89,4 +102,4 @@ class Motions:
 
     def _rate(self, move: RunningMove) -> float:
         """Rate of a motion's time [-]."""
-        return rate_of(self.wanted_speed, move.velocity, self.slowest)
+        return min(rate_of(self.wanted_speed, move.velocity, self.slowest), move.highest_rate)

@@ -1,8 +1,9 @@
-"""A point-to-point motion in progress: its rate and its pause."""
+"""A planned motion in progress: its parts, its rate and its pause."""
 
 import numpy as np
 
 from tvist_controller.cycle import STILL, ControlCycle
+from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.safety import acceleration_on_way
 from tvist_controller.trajectory import PlannedMotion
 
@@ -17,15 +18,35 @@ class RunningMove:
 
     Args:
         number: Number of the motion.
-        trajectory: Its trajectory, which has just been started on the line.
-        velocity: Requested velocity limit [rad/s].
+        planned: Its plan, whose first part begins now.
         cycle: The control line.
     """
 
-    def __init__(self, number: int, trajectory: PlannedMotion, velocity: float, cycle: ControlCycle) -> None:
-        self.number, self.velocity = number, velocity
-        self._trajectory, self._cycle = trajectory, cycle
+    def __init__(self, number: int, planned: PlannedMove, cycle: ControlCycle) -> None:
+        self.number, self.velocity = number, planned.velocity
+        self._window, self._cycle = planned.window, cycle
         self._held = False
+        self._trajectory, *coming = planned.parts
+        self.coming: tuple[PlannedMotion, ...] = tuple(coming)
+        """Parts that have not begun."""
+        self._begin()
+
+    def go_on(self, rate: float) -> None:
+        """Begin the next part at a rate [-]."""
+        self._trajectory, *coming = self.coming
+        self.coming, self._held = tuple(coming), False
+        self._trajectory.speed = rate
+        self._begin()
+
+    def _begin(self) -> None:
+        self._cycle.start(self._trajectory)
+        self._cycle.tvist.aim(self._trajectory.path.end)
+
+    @property
+    def highest_rate(self) -> float:
+        """Highest rate at which a shaper that was chosen after the motion began keeps the limits in bends [-]."""
+        delay = self._cycle.tvist.delay
+        return 1.0 if delay <= self._window else self._window / delay
 
     @property
     def rate(self) -> float:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from tvist_plant.description import RobotDescription, is_real_body
 from tvist_protocol.commands import Command, MoveJ, SetPayload
+from tvist_protocol.motions import JointSegment, MoveC, MoveL, MovePath
 from tvist_protocol.replies import Code, Refused
 from tvist_protocol.simulation import SimulationReset
 from tvist_protocol.transitions import Activity
@@ -64,19 +65,22 @@ def check_joints(q: Sequence[float], description: RobotDescription, where: str =
             raise RefusalError("limit_position", field, why, limit)
 
 
-def check_motion(velocity: float, acceleration: float, jerk: float, description: RobotDescription) -> None:
+def check_motion(
+    velocity: float, acceleration: float, jerk: float, description: RobotDescription, prefix: str = ""
+) -> None:
     """Refuse limits of a motion above those of the arm, or so low that it would hardly move."""
     limits = description.limits
     code: Code
-    for code, where, value, highest, unit in (
+    for code, name, value, highest, unit in (
         ("limit_velocity", "velocity", velocity, min(limits.velocity), "rad/s"),
         ("limit_acceleration", "acceleration", acceleration, min(limits.acceleration), "rad/s²"),
         ("out_of_range", "jerk", jerk, min(limits.jerk), "rad/s³"),
     ):
+        where = f"{prefix}{name}"
         if value > highest:
             why = f"{where} is {value:g} {unit}; the arm's limit is {highest:g}"
             raise RefusalError(code, where, why, highest)
-        if value < (lowest := SLOWEST[where]):
+        if value < (lowest := SLOWEST[name]):
             why = f"{where} is {value:g} {unit}; it must be at least {lowest:g}"
             raise RefusalError("out_of_range", where, why, lowest)
 
@@ -94,12 +98,43 @@ def check_body(payload: Payload, where: str = "", rated: float = math.inf) -> No
         raise RefusalError("out_of_range", field, why)
 
 
+def check_pace(velocity: float, acceleration: float, jerk: float, where: str = "") -> None:
+    """Refuse limits of a motion of the tool that are so low that it would hardly move."""
+    for name, value, unit in (
+        ("velocity", velocity, "m/s"),
+        ("acceleration", acceleration, "m/s²"),
+        ("jerk", jerk, "m/s³"),
+    ):
+        if value < (lowest := SLOWEST[name]):
+            field = f"{where}{name}"
+            why = f"{field} is {value:g} {unit}; it must be at least {lowest:g}"
+            raise RefusalError("out_of_range", field, why, lowest)
+
+
+def check_path(command: MovePath, description: RobotDescription) -> None:
+    """Refuse a path with a part that no state of the robot permits."""
+    for number, segment in enumerate(command.segments):
+        where = f"segments[{number}]."
+        if isinstance(segment, JointSegment):
+            check_joints(segment.q, description, f"{where}q")
+            check_motion(
+                segment.velocity, segment.acceleration, min(description.limits.jerk), description, where
+            )
+        else:
+            check_pace(segment.velocity, segment.acceleration, command.jerk, where)
+    check_pace(SLOWEST["velocity"], SLOWEST["acceleration"], command.jerk)
+
+
 def check_content(command: Command, description: RobotDescription) -> None:
     """Refuse a command that such a robot cannot carry out in any state."""
     match command:
         case MoveJ():
             check_joints(command.q, description)
             check_motion(command.velocity, command.acceleration, command.jerk, description)
+        case MoveL() | MoveC():
+            check_pace(command.velocity, command.acceleration, command.jerk)
+        case MovePath():
+            check_path(command, description)
         case SetPayload():
             check_body(payload_of(command), rated=description.limits.payload)
         case SimulationReset():

@@ -222,9 +222,7 @@ class StopPlanner:
         """
         speed, rise = abs(forecast.path.forwards(state.qd)), abs(forecast.path.forwards(state.qdd))
         fastest = speed + self.period * rise + rise * rise / self.jerk
-        return forecast.path.keeping(
-            MotionLimits(fastest, acceleration, self.jerk), fastest, state.q
-        )
+        return forecast.path.keeping(MotionLimits(fastest, acceleration, self.jerk), fastest, state.q)
 
     def _ladder(self, wanted: float | None) -> Iterator[float]:
         """Decelerations in the order in which they are tried: down from the requested one, then up from it."""

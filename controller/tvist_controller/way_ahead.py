@@ -1,5 +1,7 @@
 """Check of the remaining motion: whether it stays clear, and how long it lasts."""
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
 from tvist_controller.ahead import resting_after
@@ -11,7 +13,7 @@ from tvist_controller.outlook import Outlook
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety import StreamTorqueRoom
 from tvist_controller.stops import StopPlan
-from tvist_controller.trajectory import JointStop, Way
+from tvist_controller.trajectory import JointStop, PlannedMotion, Way
 from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
@@ -29,6 +31,8 @@ class WayAhead:
     def __init__(self, cycle: ControlCycle, outlook: Outlook, collisions: CollisionModel) -> None:
         self._cycle, self._collisions = cycle, collisions
         self._outlook = outlook
+        self.coming: Callable[[], Sequence[PlannedMotion]] = tuple
+        """Returns the parts of the present motion that have not begun."""
         room = StreamTorqueRoom(cycle.description, cycle.inverse_dynamics)
         self._guard = LookAhead(collisions, outlook.stops, room)
 
@@ -88,8 +92,9 @@ class WayAhead:
         forecast = trajectory.forecast
         if forecast is None:
             return self._on(self._outlook.foresee(tvist))
-        found = collisions.on_way(forecast.path.way(cycle.along.position, forecast.end))
-        return None if found is None else found[1]
+        ways = [forecast.path.way(cycle.along.position, forecast.end)]
+        ways += [part.path.whole for part in self.coming()]
+        return next((found[1] for way in ways if (found := collisions.on_way(way))), None)
 
     def check_payload(self, payload: Payload, tvist: Filter | None) -> None:
         """Check the rest of the motion with another payload, and put the payload into the collision model.

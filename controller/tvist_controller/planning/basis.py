@@ -35,6 +35,8 @@ class MotionBasis(Struct, frozen=True, eq=False, gc=False):
     """Velocity limit of reduced speed [rad/s]; None if the speed is not reduced."""
     excess: float
     """Share by which the filter may exceed the reference's acceleration, see `Filter.excess` [-]."""
+    tcp: tuple[float, ...]
+    """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
     carried: Body
     """Payload in the collision model."""
     bodies: tuple[Floats, ...]
@@ -46,6 +48,7 @@ class MotionBasis(Struct, frozen=True, eq=False, gc=False):
         return (
             np.array_equal(self.q, other.q)
             and (self.speed, self.slowest, self.excess) == (other.speed, other.slowest, other.excess)
+            and self.tcp == other.tcp
             and self.carried is other.carried
             and len(self.bodies) == len(other.bodies)
             and all(own is another for own, another in zip(self.bodies, other.bodies, strict=True))

@@ -1,5 +1,6 @@
 """Planning of point-to-point motions, with checks for collisions and torque."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,12 +30,16 @@ BLUNTED = 1.05
 class PlannedMove:
     """A motion that may begin."""
 
-    trajectory: PlannedMotion
-    """Trajectory of its reference."""
+    parts: tuple[PlannedMotion, ...]
+    """Trajectories of its reference, each from rest to rest, in their order."""
     velocity: float
-    """Requested velocity limit [rad/s]."""
+    """Largest velocity of any joint [rad/s]."""
     excess_of_torque: str | None
     """By how much the motion will exceed a torque limit, in words; None if it will not."""
+    skipped: tuple[str, ...] = ()
+    """A sentence for each blend that is left out."""
+    window: float = math.inf
+    """Longest delay of a shaper with which the limits hold at full rate [s]."""
 
 
 class MovePlanner:
@@ -58,8 +63,23 @@ class MovePlanner:
         Raises:
             RefusalError: There is no such motion, or it would lead to a collision.
         """
+        path = JointLine(basis.q, np.array(command.q, dtype=float))
         limits = MotionLimits(command.velocity, command.acceleration, command.jerk)
-        return self.along(JointLine(basis.q, np.array(command.q, dtype=float)), limits, basis)
+        if command.duration is not None:
+            limits = self._lasting(path, command.duration, basis)
+        return self.along(path, limits, basis)
+
+    def _lasting(self, path: JointLine, duration: float, basis: MotionBasis) -> MotionLimits:
+        """Limits with which a motion takes a duration [s], or those of the arm if it takes longer with these."""
+        most = self._description.limits
+        limits = MotionLimits(min(most.velocity), min(most.acceleration), min(most.jerk))
+        spared = replace(limits, acceleration=limits.acceleration * (1.0 - basis.excess))
+        slower = min(quickest_motion(path, spared, PERIOD).duration / duration, 1.0)
+        if slower == 0.0:
+            return limits
+        return MotionLimits(
+            limits.velocity * slower, limits.acceleration * slower**2, limits.jerk * slower**3
+        )
 
     def along(self, path: Path, limits: MotionLimits, basis: MotionBasis) -> PlannedMove:
         """Plan a motion along a path, from rest to rest.
@@ -78,19 +98,35 @@ class MovePlanner:
             motion = quickest_motion(path, spared, PERIOD, rate)
         except ValueError as error:
             raise RefusalError("out_of_range", "velocity", str(error)) from error
-        self._check_clear(motion, basis)
-        return PlannedMove(motion, limits.velocity, self._excess_of_torque(motion, basis))
+        self.check_clear(motion, basis)
+        return PlannedMove((motion,), limits.velocity, self.excess_of_torque(motion, basis))
 
-    def _check_clear(self, motion: PlannedMotion, basis: MotionBasis) -> None:
+    def check_clear(
+        self, motion: PlannedMotion, basis: MotionBasis, shares: tuple[float, float] | None = None
+    ) -> None:
+        """Check that nothing is in the way of a motion.
+
+        Args:
+            motion: The motion.
+            basis: State that it depends on.
+            shares: Shares of the whole way at its start and end, for a motion along a path; None for a joint move.
+
+        Raises:
+            RefusalError: It would lead to a collision.
+        """
         if self._collisions.carried is not basis.carried:
             self._collisions.carry(basis.carried)
         found = self._collisions.on_way(motion.path.whole)
         if found is not None:
             share, meeting = found
-            time = motion.time_at(share)
-            raise RefusalError("collision", "q", f"{meeting} {time:.2f} s after the start", CLEARANCE)
+            when = f"{motion.time_at(share):.2f} s after the start"
+            if shares is not None:
+                whole = shares[0] + share * (shares[1] - shares[0])
+                when = f"after {100.0 * whole:.0f} % of the way"
+            raise RefusalError("collision", "q" if shares is None else "", f"{meeting} {when}", CLEARANCE)
 
-    def _excess_of_torque(self, motion: PlannedMotion, basis: MotionBasis) -> str | None:
+    def excess_of_torque(self, motion: PlannedMotion, basis: MotionBasis) -> str | None:
+        """Say by how much a motion will exceed a torque limit; None if it will not."""
         dynamics, allowed, limits = self._dynamics, self._torque, motion.limits
         dynamics.believe(basis.bodies)
         bound = largest_torque(dynamics, motion.path, limits.velocity, limits.acceleration)
@@ -117,7 +153,8 @@ class MovePlanner:
     def _shaped(self, motion: PlannedMotion, basis: MotionBasis) -> Floats | None:
         """References of the shaped motion, shape (k, n) [rad]; None if it lasts too long to simulate."""
         tvist = self._filters.present(basis.filter)
-        path, shaped = motion.path, ShapedReference(basis.q, PERIOD)
+        path = motion.path
+        shaped = ShapedReference(path.posture(path.start), PERIOD)
         shaped.enter(path.posture_of, path.start)
         line_filter = LineFilter(tvist, motion.limits)
         line_filter.begin(tvist, path.start, path.posture_of)

@@ -5,14 +5,18 @@ from dataclasses import dataclass
 from tvist_controller.planning.basis import FilterBasis, MotionBasis, PlanBasis
 from tvist_controller.planning.filter_planner import FilterPlanner, PlannedFilter
 from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
+from tvist_controller.planning.path_planner import PathPlanner
 from tvist_controller.refusal import RefusalError, check_content, payload_of
 from tvist_controller.setup import Setup
 from tvist_protocol import commands as c
+from tvist_protocol.motions import MoveC, MoveL, MovePath
 from tvist_protocol.simulation import SimulationReset
 from tvist_shaping.base import Filter
 
-PLANNED = (c.MoveJ, c.SetShaper, c.SetEstimator, c.SetPayload, SimulationReset)
+PLANNED = (c.MoveJ, MoveL, MoveC, MovePath, c.SetShaper, c.SetEstimator, c.SetPayload, SimulationReset)
 """Commands that are planned."""
+MOTIONS = (c.MoveJ, MoveL, MoveC, MovePath)
+"""Those of them that are planned on the state at rest."""
 
 
 @dataclass(frozen=True)
@@ -46,21 +50,27 @@ class Planner:
         self._description = setup.description
         self.filters = FilterPlanner(setup)
         self._moves = MovePlanner(setup, self.filters)
+        self._paths = PathPlanner(setup, self.filters, self._moves)
 
     def plan(self, command: c.Command, basis: PlanBasis) -> Plan:
         """Plan a command; a refusal is a plan, too."""
-        on = basis.motion if isinstance(command, c.MoveJ) else basis.filter
+        on = basis.motion if isinstance(command, MOTIONS) else basis.filter
         try:
             return Plan(on, self._find(command, basis))
         except RefusalError as refusal:
             return Plan(on, refusal)
 
+    def _motion(self, command: c.MoveJ | MoveL | MoveC | MovePath, basis: MotionBasis) -> PlannedMove:
+        if isinstance(command, c.MoveJ):
+            return self._moves.move(command, basis)
+        return self._paths.plan(command, basis)
+
     def _find(self, command: c.Command, basis: PlanBasis) -> PlannedMove | PlannedFilter | Filter | None:
         check_content(command, self._description)
         on, filters = basis.filter, self.filters
         match command:
-            case c.MoveJ() if basis.motion is not None:
-                return self._moves.move(command, basis.motion)
+            case c.MoveJ() | MoveL() | MoveC() | MovePath():
+                return None if basis.motion is None else self._motion(command, basis.motion)
             case c.SetShaper():
                 return filters.choose(command.name, command.modes, on.source, on.declared, "name")
             case c.SetEstimator():

@@ -60,7 +60,9 @@ def passes(edges: Floats, highest: Floats, p: Floats, q: Floats) -> Floats:  # p
 
 
 @compiled
-def widened(times: Floats, window: float, values: Floats, lowest: bool) -> Floats:  # pragma: no cover  compiled
+def widened(
+    times: Floats, window: float, values: Floats, lowest: bool
+) -> Floats:  # pragma: no cover  compiled
     """Return for each cell the largest value, or the lowest, of all cells that are passed within a window of time.
 
     Args:
@@ -104,7 +106,13 @@ class RetimedLaw:
         areas = np.cumsum(spans * (edges[:-1] + spans * (speeds[:-1] / 2.0 + spans * accelerations / 6.0)))
         self._times, self._last = times.tolist(), len(lengths) - 1
         self._pieces = list(
-            zip([0.0, *areas[:-1].tolist()], edges.tolist(), speeds.tolist(), accelerations.tolist(), strict=False)
+            zip(
+                [0.0, *areas[:-1].tolist()],
+                edges.tolist(),
+                speeds.tolist(),
+                accelerations.tolist(),
+                strict=False,
+            )
         )
         self._end = float(areas[-1]), float(edges[-1])
         self.duration = (self._times[-1] + ramp) / rate
@@ -126,9 +134,7 @@ class RetimedLaw:
         """Parameter, its velocity [1/s] and its acceleration [1/s^2] at a time [s]."""
         rate, ramp = self._rate, self._ramp
         late, early = self._before(time * rate), self._before(time * rate - ramp)
-        s, sd, sdd = (
-            (after - before) / ramp for after, before in zip(late[:3], early[:3], strict=True)
-        )
+        s, sd, sdd = ((after - before) / ramp for after, before in zip(late[:3], early[:3], strict=True))
         return [s], [sd * rate], [sdd * rate * rate]
 
     def _before(self, time: float) -> tuple[float, float, float, float]:
@@ -141,14 +147,20 @@ class RetimedLaw:
         number = min(bisect_right(self._times, time) - 1, self._last)
         area, s, sd, sdd = self._pieces[number]
         t = time - self._times[number]
-        return area + t * (s + t * (sd / 2.0 + t * sdd / 6.0)), s + t * (sd + 0.5 * t * sdd), sd + t * sdd, sdd
+        return (
+            area + t * (s + t * (sd / 2.0 + t * sdd / 6.0)),
+            s + t * (sd + 0.5 * t * sdd),
+            sd + t * sdd,
+            sdd,
+        )
 
     def _harshest(self) -> float:
         """Largest jerk at full rate."""
         moments = [time + shift for time in self._times for shift in (1e-9, self._ramp - 1e-9)]
-        return max(
-            abs(self._before(time)[3] - self._before(time - self._ramp)[3]) for time in moments
-        ) / self._ramp
+        return (
+            max(abs(self._before(time)[3] - self._before(time - self._ramp)[3]) for time in moments)
+            / self._ramp
+        )
 
 
 def arrivals(edges: Floats, b: Floats) -> Floats:

@@ -28,12 +28,12 @@ class Knots(NamedTuple):
 
 
 def hermite(
-    length: float, start: tuple[Floats, Floats, Floats], end: tuple[Floats, Floats, Floats]
+    length: float | Floats, start: tuple[Floats, Floats, Floats], end: tuple[Floats, Floats, Floats]
 ) -> Floats:
     """Coefficients of the polynomial of degree five with given values and first two derivatives at both ends.
 
     Args:
-        length: Distance of the ends.
+        length: Distance of the ends; an array for several polynomials at once.
         start: Value and two derivatives at 0, each of shape (..., m).
         end: The same at the length.
 
@@ -52,7 +52,9 @@ def hermite(
 
 
 @compiled
-def evaluate(knots: Floats, coefficients: Floats, s: Floats, out: Floats) -> None:  # pragma: no cover  compiled
+def evaluate(
+    knots: Floats, coefficients: Floats, s: Floats, out: Floats
+) -> None:  # pragma: no cover  compiled
     """Evaluate a spline and its first three derivatives.
 
     Args:
@@ -95,7 +97,9 @@ class SplineCurve(Curve):
 
     def __init__(self, knots: Knots, most: Floats | None = None) -> None:
         self._knots = np.ascontiguousarray(knots.s)
-        ends = [(knots.q[part], knots.slope[part], knots.second[part]) for part in (slice(-1), slice(1, None))]
+        ends = [
+            (knots.q[part], knots.slope[part], knots.second[part]) for part in (slice(-1), slice(1, None))
+        ]
         lengths = np.diff(knots.s)
         coefficients = hermite(lengths[:, None], ends[0], ends[1])
         self._coefficients = np.ascontiguousarray(np.moveaxis(coefficients, 0, 1))

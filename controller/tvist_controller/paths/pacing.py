@@ -1,0 +1,139 @@
+"""Time laws of runs: the limits of tool and joints along a run, and the quickest law within them."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from tvist_controller.paths.legs import Pacing
+from tvist_controller.paths.route import Piece, Run
+from tvist_controller.paths.tool_curves import PER_RADIAN
+from tvist_controller.trajectory.limits import Floats
+from tvist_controller.trajectory.retiming import Cells, RetimedLaw, quickest_law
+from tvist_controller.trajectory.spline import Knots, SplineCurve
+
+FINEST, CELLS = 5e-4, 400
+"""Smallest length of a cell [m], and the number of cells that a run is divided into if they are not smaller."""
+MARGIN = 1.01
+"""Factor by which a derivative may exceed its samples within a cell [-]."""
+FASTEST = 1e3
+"""Factor beyond which a motion is not hurried for its duration, since the joints limit it by far [-]."""
+LEAST = 1e-3
+"""Smallest derivative that a speed is divided by [-]."""
+CLOSE = 1e-6
+"""Share by which a duration may be missed [-]."""
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Limits of each joint on a path."""
+
+    velocity: Floats
+    """Shape (n,) [rad/s]."""
+    acceleration: Floats
+    """Shape (n,) [rad/s^2]."""
+    jerk: float
+    """Smallest of all joints [rad/s^3]."""
+
+
+def joined(run: Run) -> Knots:
+    """Return the knots of a whole run."""
+    first, *rest = (piece.knots for piece in run)
+    s, parts = [first.s], [first[1:]]
+    for knots in rest:
+        s.append(s[-1][-1] + knots.s[1:])
+        parts.append(tuple(values[1:] for values in knots[1:]))  # type: ignore[arg-type]
+    return Knots(np.concatenate(s), *(np.concatenate(values) for values in zip(*parts, strict=True)))
+
+
+def law_of(run: Run, curve: SplineCurve, limits: JointLimits, jerk: float, window: float) -> RetimedLaw:
+    """Return the quickest time law of a run, or the one of the duration that was asked for.
+
+    Args:
+        run: The run.
+        curve: The joints' way along it.
+        limits: Limits of the joints.
+        jerk: Largest jerk along the path [m/s^3].
+        window: Time over which the shaper mixes moments of the motion [s].
+    """
+    softest = limits.jerk / float(curve.bends.slope.max())
+    asked = [piece.pacing.duration for piece in run]
+    if not any(asked):
+        return quickest_law(_cells(run, curve, limits, 1.0), min(jerk, softest), window)
+    law = quickest_law(_cells(run, curve, limits, 1.0), softest, window)
+    if not all(asked):
+        return law
+    wanted, hurry = sum(_share(piece) for piece in run), 1.0
+    while law.duration > wanted * (1.0 + CLOSE) and hurry < FASTEST:
+        hurry *= 1.05 * law.duration / wanted
+        law = quickest_law(_cells(run, curve, limits, hurry), softest, window)
+    return law.slowed(wanted)
+
+
+def _share(piece: Piece) -> float:
+    """Time that a piece has of the duration that was asked for [s]."""
+    return 1.5 * float(piece.knots.s[-1]) / piece.pacing.velocity
+
+
+def _cells(run: Run, curve: SplineCurve, limits: JointLimits, hurry: float) -> Cells:
+    length = float(curve.end[0])
+    largest = max(length / CELLS, FINEST)
+    starts = np.concatenate(([0.0], np.cumsum([piece.knots.s[-1] for piece in run])))
+    edges, speeds, tool_p, tool_q = [np.zeros(1)], [], [], []
+    for piece, (start, end) in zip(run, pairwise(starts.tolist()), strict=True):
+        count = max(int(np.ceil((end - start) / largest)), 2)
+        places = np.linspace(0.0, end - start, count + 1)
+        edges.append(start + places[1:])
+        along, bent = _joints(curve, start + places) if piece.by_joints else _tool(piece, places)
+        pacing = piece.pacing
+        speeds.append(hurry * pacing.velocity / along)
+        tool_p.append(along / (hurry**2 * pacing.acceleration))
+        tool_q.append(bent / (hurry**2 * pacing.acceleration))
+    places = np.concatenate(edges)
+    slope, second = (_largest(np.abs(values)) for values in curve.derivatives(_looks(places))[1:])
+    fastest = np.minimum(np.concatenate(speeds), (limits.velocity / np.maximum(slope, 1e-9)).min(axis=1))
+    p, q = slope / limits.acceleration, second / limits.acceleration
+    return Cells(
+        places,
+        fastest,
+        np.column_stack((p, np.concatenate(tool_p))),
+        np.column_stack((q, np.concatenate(tool_q))),
+    )
+
+
+def _tool(piece: Piece, places: Floats) -> tuple[Floats, Floats]:
+    """Speed and curvature of the tool per unit of the parameter in each cell: on legs 1 and 0."""
+    count = len(places) - 1
+    if piece.bent is None:
+        return np.ones(count), np.zeros(count)
+    along, bent = (_largest(values[:, None])[:, 0] for values in piece.bent.shape(_looks(places)))
+    return np.maximum(along, LEAST), bent
+
+
+def _joints(curve: SplineCurve, places: Floats) -> tuple[Floats, Floats]:
+    """The same for the joints' way, in the lengths that turns count as."""
+    _, slope, second = curve.derivatives(_looks(places))
+    along, bent = (PER_RADIAN * _largest(np.abs(values)).max(axis=1) for values in (slope, second))
+    return np.maximum(along, LEAST), bent
+
+
+def _looks(places: Floats) -> Floats:
+    """Both ends and the middle of each cell, shape (2 c + 1,)."""
+    looks = np.empty(2 * len(places) - 1)
+    looks[::2], looks[1::2] = places, 0.5 * (places[:-1] + places[1:])
+    return looks
+
+
+def _largest(values: Floats) -> Floats:
+    """Bounds of values sampled at `_looks`, for each cell, shape (c, m)."""
+    ends = np.maximum(values[:-1:2], values[2::2])
+    found: Floats = MARGIN * np.maximum(ends, values[1::2])
+    return found
+
+
+def timed(pacing: Pacing, length: float) -> Pacing:
+    """Return the pacing of a leg; for a duration, that of a trapezoid which speeds up and brakes for a third of it."""
+    if pacing.duration is None:
+        return pacing
+    velocity = 1.5 * length / pacing.duration
+    return Pacing(velocity, 3.0 * velocity / pacing.duration, pacing.duration, pacing.even)

@@ -1,0 +1,50 @@
+"""Poses as rotation matrix and position, and their form on the wire: x y z [m] and rotation vector [rad]."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from tvist_controller.trajectory.limits import Floats
+
+
+class Placement(NamedTuple):
+    """A pose: rotation matrix, shape (3, 3), and position, shape (3,) [m]."""
+
+    rotation: Floats
+    position: Floats
+
+    def __matmul__(self, other: "Placement") -> "Placement":
+        """Return a pose that is given in this frame, in the frame that this one is given in."""
+        return Placement(self.rotation @ other.rotation, self.rotation @ other.position + self.position)
+
+    @property
+    def inverse(self) -> "Placement":
+        """The pose of this frame's reference, seen from this frame."""
+        back = self.rotation.T
+        return Placement(back, -back @ self.position)
+
+    @property
+    def vector(self) -> tuple[float, ...]:
+        """X y z [m] and rotation vector [rad]."""
+        return (*self.position.tolist(), *np.asarray(pin.log3(self.rotation)).tolist())
+
+
+def placement(pose: Sequence[float] | None) -> Placement:
+    """Return the placement of a pose on the wire; of None, that of the frame itself."""
+    if pose is None:
+        return Placement(np.eye(3), np.zeros(3))
+    return Placement(np.asarray(pin.exp3(np.array(pose[3:], dtype=float))), np.array(pose[:3], dtype=float))
+
+
+def turn(start: Floats, end: Floats) -> Floats:
+    """Rotation vector in the base frame that turns one orientation into another by the shortest way, [rad]."""
+    vector: Floats = np.asarray(pin.log3(end @ start.T))
+    return vector
+
+
+def turned(rotation: Floats, vector: Floats) -> Floats:
+    """Return an orientation, turned by a rotation vector in the base frame [rad]."""
+    result: Floats = np.asarray(pin.exp3(vector)) @ rotation
+    return result

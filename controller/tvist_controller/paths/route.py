@@ -1,0 +1,163 @@
+"""Paths of several legs: blends between them, and stops where there are none."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tvist_controller.paths.by_length import EvenBlend, evenly
+from tvist_controller.paths.legs import JointWay, Leg, Pacing
+from tvist_controller.paths.tool_curves import ToolBlend, ToolPart, ToolState
+from tvist_controller.paths.tracking import Tracker
+from tvist_controller.trajectory.limits import Floats
+from tvist_controller.trajectory.spline import Knots, hermite
+
+INSIDE, CLOSE = 1.0 + 1e-9, 1e-6
+"""Factor by which rounding, and length by which the joints' interpolation, may exceed a blend's radius [-, m]."""
+SHARPEST = 0.15
+"""Smallest ratio of a blend's chord to its radius for its length; it is 0 where the tool goes back as it came [-]."""
+SHRINK, TRIES = 0.85, 12
+"""Factor by which a blend that leaves its radius begins closer to the corner, and how often that is tried."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A leg without what its blends replace, or a blend."""
+
+    knots: Knots
+    """The joints' way."""
+    pacing: Pacing
+    bent: ToolBlend | EvenBlend | None
+    """Blend of the tool whose curvature counts for the acceleration."""
+    by_joints: bool
+    """Whether the joints' acceleration counts rather than the tool's."""
+    where: str
+    """Field of the command that it comes from."""
+
+
+Run = list[Piece]
+"""Pieces without a stop between them."""
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """A blend between two legs."""
+
+    before: float
+    """Length of the first leg that it replaces [m]."""
+    after: float
+    """Length of the second leg that it replaces [m]."""
+    piece: Piece
+
+
+def runs_of(legs: Sequence[Leg], tracker: Tracker) -> tuple[list[Run], list[str]]:
+    """Divide a path into runs.
+
+    Args:
+        legs: The path.
+        tracker: Kinematics of the arm.
+
+    Returns:
+        The runs, and a sentence for each blend that is left out.
+
+    Raises:
+        WayError: The joints cannot follow a blend.
+    """
+    runs, skipped, begun = [Run()], list[str](), 0.0
+    for number, leg in enumerate(legs):
+        cut, length = None, leg.way.length
+        if leg.blend > 0.0 and number + 1 < len(legs):
+            cut = _cut(leg, legs[number + 1], length - begun, tracker)
+            if cut is None:
+                skipped.append(
+                    f"{leg.where}: the blend of {leg.blend:g} m does not fit between those beside it and the ends "
+                    "of its parts, so the arm stops there"
+                )
+        end = length - (0.0 if cut is None else cut.before)
+        if end - begun > 1e-9 * length:
+            runs[-1].append(_rest_of(leg, begun, end, runs[-1], tracker))
+        if cut is None:
+            runs.append(Run())
+            begun = 0.0
+        else:
+            runs[-1].append(cut.piece)
+            begun = cut.after
+    return [run for run in runs if run], skipped
+
+
+def _rest_of(leg: Leg, start: float, end: float, before: Run, tracker: Tracker) -> Piece:
+    """The part of a leg that its blends leave."""
+    if isinstance(leg.way, JointWay):
+        return Piece(leg.way.part(start, end), leg.pacing, None, True, leg.where)
+    q = before[-1].knots.q[-1] if before else leg.q
+    return Piece(tracker.follow(ToolPart(leg.way, start, end), q), leg.pacing, None, False, leg.where)
+
+
+def _cut(leg: Leg, then: Leg, left: float, tracker: Tracker) -> _Cut | None:
+    """The blend between two legs; None if it does not fit."""
+    radius = leg.blend
+    for _ in range(TRIES):
+        before = _within(leg, radius, tracker, from_end=True)
+        after = _within(then, radius, tracker, from_end=False)
+        if before > left * INSIDE or after > then.way.length * INSIDE:
+            return None
+        before, after = min(before, left), min(after, then.way.length)
+        piece = _blend(leg, then, before, after, tracker)
+        postures = _middle(piece.knots)
+        off = [np.linalg.norm(tracker.pose(q).position - leg.corner.position) for q in postures]
+        if max(off) <= leg.blend * INSIDE + CLOSE:
+            return _Cut(before, after, piece)
+        radius *= SHRINK
+    return None
+
+
+def _blend(leg: Leg, then: Leg, before: float, after: float, tracker: Tracker) -> Piece:
+    pacing, start = leg.pacing.meeting(then.pacing), leg.way.length - before
+    if isinstance(leg.way, JointWay) or isinstance(then.way, JointWay):
+        ends = (_joints(leg, start, leg.end, tracker), _joints(then, after, then.q, tracker))
+        s = np.array([0.0, before + after])
+        knots = Knots(s, *(np.array(pair) for pair in zip(*ends, strict=True)))
+        return Piece(knots, pacing, None, True, leg.where)
+    states = leg.way.at(start), then.way.at(after)
+    curve = evenly(ToolBlend(*states, leg.corner.rotation, _rounding(leg, *states) * (before + after)))
+    q, _, _ = _joints(leg, start, leg.end, tracker)
+    return Piece(tracker.follow(curve, q), pacing, None if pacing.even else curve, False, leg.where)
+
+
+def _rounding(leg: Leg, start: ToolState, end: ToolState) -> float:
+    """Length of a blend, as a share of what it replaces, with which its polynomial is curved least.
+
+    Found by trial for corners of 20° to 170°: its largest curvature is then 1.1 to 1.2 times that of an arc.
+    """
+    places = [state.pose.position for state in (start, end)]
+    away = sum(float(np.linalg.norm(place - leg.corner.position)) for place in places)
+    chord = float(np.linalg.norm(places[1] - places[0]))
+    if away <= 0.0:
+        return 1.0
+    return 0.625 * max(2.0 * chord / away, SHARPEST) ** 0.55
+
+
+def _joints(leg: Leg, s: float, near: Floats, tracker: Tracker) -> tuple[Floats, Floats, Floats]:
+    """Joint positions on a leg and their derivatives, followed from the posture at its corner."""
+    if isinstance(leg.way, JointWay):
+        return leg.way.at(s)
+    corner = leg.way.length if near is leg.end else 0.0
+    knots = tracker.follow(ToolPart(leg.way, corner, s), near)
+    sign = 1.0 if s >= corner else -1.0
+    return knots.q[-1], sign * knots.slope[-1], knots.second[-1]
+
+
+def _within(leg: Leg, radius: float, tracker: Tracker, *, from_end: bool) -> float:
+    if isinstance(leg.way, JointWay):
+        return leg.way.within(radius, lambda q: tracker.pose(q).position, from_end=from_end)
+    return leg.way.within(radius)
+
+
+def _middle(knots: Knots) -> list[Floats]:
+    """Postures at the knots and between them."""
+    found = []
+    for number, length in enumerate(np.diff(knots.s)):
+        ends = [(knots.q[at], knots.slope[at], knots.second[at]) for at in (number, number + 1)]
+        c = hermite(float(length), ends[0], ends[1])
+        found += [(share * length) ** np.arange(6) @ c for share in np.linspace(0.0, 1.0, 9)]
+    return found

@@ -1,0 +1,212 @@
+"""Lines and arcs of the tool centre point."""
+
+from abc import ABC, abstractmethod
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from tvist_controller.paths.poses import Placement, turn, turned
+from tvist_controller.trajectory.limits import Floats
+from tvist_controller.trajectory.spline import hermite
+
+PER_RADIAN = 0.25
+"""Length that a turn by one radian counts as [m]."""
+SHORTEST = 1e-6
+"""Length below which a part of a path counts as no motion [m]."""
+STRAIGHT = 1e-6
+"""Sine of an angle below which three points count as points on a line [-]."""
+STEP = 1e-5
+"""Step of numerical differences, as a share of a blend's length [-]."""
+
+
+class ToolState(NamedTuple):
+    """Pose of the tool at a place of its path, with derivatives with respect to the length."""
+
+    pose: Placement
+    first: Floats
+    """Velocity and angular velocity per unit of length, base frame, shape (6,) [-, rad/m]."""
+    second: Floats
+    """Derivative of `first`, shape (6,) [1/m, rad/m^2]."""
+
+
+class ToolCurve(ABC):
+    """Way of the tool from s = 0 to its length [m]."""
+
+    length: float
+
+    @abstractmethod
+    def at(self, s: float) -> ToolState:
+        """Return the state at a length from the start [m]."""
+
+    def within(self, radius: float) -> float:
+        """Return the length from either end within which the tool is no farther from that end than this [m].
+
+        It may exceed the curve's length, or be infinite for one that does not move the tool centre point.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no blends at its ends")
+
+
+class ToolLine(ToolCurve):
+    """Straight line, on which the tool turns evenly by the shortest way.
+
+    Args:
+        start: Pose at the start.
+        end: Pose at the end.
+    """
+
+    def __init__(self, start: Placement, end: Placement) -> None:
+        self._start, self._end = start, end
+        way, angle = end.position - start.position, turn(start.rotation, end.rotation)
+        self.length = max(float(np.linalg.norm(way)), PER_RADIAN * float(np.linalg.norm(angle)))
+        self._first = np.concatenate((way, angle)) / max(self.length, SHORTEST)
+
+    def within(self, radius: float) -> float:
+        """Return the length from either end within which the tool is no farther from that end than this [m]."""
+        speed = float(np.linalg.norm(self._first[:3]))
+        return radius / speed if speed > 0.0 else np.inf
+
+    def at(self, s: float) -> ToolState:
+        """Return the state at a length from the start [m]."""
+        moved = s * self._first
+        pose = Placement(turned(self._start.rotation, moved[3:]), self._start.position + moved[:3])
+        return ToolState(pose, self._first, np.zeros(6))
+
+
+class ToolArc(ToolCurve):
+    """Arc of the circle through three points.
+
+    Args:
+        start: Pose at the start.
+        via: A point on the arc, shape (3,) [m].
+        end: Pose at the end.
+        tangent: Whether the tool turns with the tangent, so that the orientation of `end` does not matter; otherwise
+            it turns evenly to that, by the shortest way.
+
+    Raises:
+        ValueError: There is no such circle: the points are on a line, or two of them are the same.
+    """
+
+    def __init__(self, start: Placement, via: Floats, end: Placement, *, tangent: bool) -> None:
+        self._start = start
+        a, b = via - start.position, end.position - start.position
+        normal = np.cross(a, b)
+        sizes = (float(np.linalg.norm(a)), float(np.linalg.norm(b)), float(np.linalg.norm(b - a)))
+        if min(sizes) < SHORTEST:
+            raise ValueError("two of its three points are the same")
+        if np.linalg.norm(normal) <= STRAIGHT * sizes[0] * sizes[1]:
+            raise ValueError("its three points are on a line")
+        square = float(normal @ normal)
+        centre = (np.cross(normal, a) * sizes[1] ** 2 - np.cross(normal, b) * sizes[0] ** 2) / (2.0 * square)
+        self._centre = start.position + centre
+        self._axis = normal / np.sqrt(square)
+        self._out = -centre
+        self._along = np.cross(self._axis, self._out)
+        angle = self._angle_of(end.position)  # the axis is chosen so that the arc passes via before its end
+        radius = float(np.linalg.norm(self._out))
+        turning = angle * self._axis if tangent else turn(start.rotation, end.rotation)
+        self.length = max(radius * angle, PER_RADIAN * float(np.linalg.norm(turning)))
+        self._rate, self._turning = angle / self.length, turning / self.length
+
+    def within(self, radius: float) -> float:
+        """Return the length from either end within which the tool is no farther from that end than this [m]."""
+        share = radius / (2.0 * float(np.linalg.norm(self._out)))
+        return 2.0 * float(np.arcsin(share)) / self._rate if share < 1.0 else np.inf
+
+    def _angle_of(self, point: Floats) -> float:
+        out = point - self._centre
+        return float(np.arctan2(out @ self._along, out @ self._out) % (2.0 * np.pi))
+
+    def at(self, s: float) -> ToolState:
+        """Return the state at a length from the start [m]."""
+        rate, angle = self._rate, self._rate * s
+        out = self._out * np.cos(angle) + self._along * np.sin(angle)
+        along = self._along * np.cos(angle) - self._out * np.sin(angle)
+        pose = Placement(turned(self._start.rotation, s * self._turning), self._centre + out)
+        return ToolState(
+            pose,
+            np.concatenate((rate * along, self._turning)),
+            np.concatenate((-rate * rate * out, np.zeros(3))),
+        )
+
+
+class ToolPart(ToolCurve):
+    """A part of a path of the tool, in its direction or against it.
+
+    Args:
+        whole: The path.
+        start: Length of it at which the part begins [m].
+        end: Length of it at which the part ends [m].
+    """
+
+    def __init__(self, whole: ToolCurve, start: float, end: float) -> None:
+        self._whole, self._from = whole, start
+        self._sign, self.length = (1.0 if end >= start else -1.0), abs(end - start)
+
+    def at(self, s: float) -> ToolState:
+        """Return the state at a length from the start [m]."""
+        state = self._whole.at(self._from + self._sign * s)
+        return state._replace(first=self._sign * state.first)
+
+
+class ToolBlend(ToolCurve):
+    """Smooth way from one state of the tool to another: position and turn are polynomials of degree five.
+
+    Args:
+        start: State at the start.
+        end: State at the end.
+        corner: Orientation near both, from which the turn is counted, shape (3, 3).
+        length: Length that it counts as [m].
+    """
+
+    def __init__(self, start: ToolState, end: ToolState, corner: Floats, length: float) -> None:
+        self.length, self._corner = length, corner
+        self._coefficients = hermite(length, _at_corner(start, corner), _at_corner(end, corner))
+
+    def at(self, s: float) -> ToolState:
+        """Return the state at a length from the start [m]."""
+        value, first, second = self._polynomial(s)
+        step = STEP * self.length
+        angular = (self._angular(s + step) - self._angular(s - step)) / (2.0 * step)
+        pose = Placement(turned(self._corner, value[3:]), value[:3])
+        return ToolState(
+            pose,
+            np.concatenate((first[:3], self._angular(s))),
+            np.concatenate((second[:3], angular)),
+        )
+
+    def moved(self, s: Floats) -> tuple[Floats, Floats]:
+        """Return dp/ds and d²p/ds² of the tool centre point at k lengths, each of shape (k, 3) [-, 1/m]."""
+        _, first, second = self._polynomials(s)
+        return first[:, :3], second[:, :3]
+
+    def shape(self, s: Floats) -> tuple[Floats, Floats]:
+        """Return the sizes of dp/ds and d²p/ds² at k lengths, each of shape (k,) [-, 1/m]."""
+        first, second = self.moved(s)
+        return np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
+
+    def _angular(self, s: float) -> Floats:
+        value, first, _ = self._polynomial(s)
+        angular: Floats = np.asarray(pin.Jexp3(-value[3:])) @ first[3:]
+        return angular
+
+    def _polynomial(self, s: float) -> tuple[Floats, Floats, Floats]:
+        value, first, second = self._polynomials(np.array([s]))
+        return value[0], first[0], second[0]
+
+    def _polynomials(self, s: Floats) -> tuple[Floats, Floats, Floats]:
+        n = np.arange(6)
+        powers, c = s[:, None] ** n, self._coefficients
+        value: Floats = powers @ c
+        first: Floats = (n[1:] * powers[:, :-1]) @ c[1:]
+        second: Floats = (n[2:] * n[1:-1] * powers[:, :-2]) @ c[2:]
+        return value, first, second
+
+
+def _at_corner(state: ToolState, corner: Floats) -> tuple[Floats, Floats, Floats]:
+    """Position and turn from the corner, with derivatives, each of shape (6,).
+
+    On lines and arcs the tool turns evenly about one axis, so the turn from the corner is about that axis, too.
+    """
+    value = np.concatenate((state.pose.position, turn(corner, state.pose.rotation)))
+    return value, state.first, np.concatenate((state.second[:3], np.zeros(3)))

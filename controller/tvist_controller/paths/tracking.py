@@ -1,0 +1,147 @@
+"""The joints' way along a path of the tool: inverse kinematics from one knot to the next."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tvist_controller.kinematics.denavit_hartenberg import bias, dh_table, kinematics
+from tvist_controller.paths.poses import Placement, placement, turn
+from tvist_controller.paths.tool_curves import ToolCurve, ToolState
+from tvist_controller.trajectory.limits import Floats
+from tvist_controller.trajectory.spline import Knots, hermite
+from tvist_plant.description import RobotDescription
+
+SPACING = 0.03
+"""Largest distance of two knots [m]."""
+CLOSEST = 1e-5
+"""Smallest distance of two knots; a way that needs closer ones passes a singular posture [m]."""
+TOLERANCE = 1e-6
+"""Largest error of the tool between two knots [m, rad]."""
+EXACT = 1e-12
+"""Error below which a posture counts as a solution [m, rad]."""
+ITERATIONS = 12
+"""Largest number of Newton's steps to a knot."""
+STEEPEST = 300.0
+"""Angle that a joint may turn for each metre of the tool's way; beyond it the arm is close to a singular posture
+[rad/m]."""
+
+
+class WayError(Exception):
+    """The joints cannot follow the path."""
+
+    def __init__(self, s: float, pose: Placement, q: Floats) -> None:
+        super().__init__(f"no way on from {s:g} m")
+        self.s = s
+        """Length at which the way ends [m]."""
+        self.pose = pose
+        """Pose that is not reached."""
+        self.q = q
+        """Joint positions near that pose, shape (n,) [rad]."""
+
+
+class Tracker:
+    """Kinematics of an arm and its tool.
+
+    Args:
+        description: The robot.
+        tcp: Tool centre point in the flange frame: x y z [m] and rotation vector [rad].
+    """
+
+    def __init__(self, description: RobotDescription, tcp: Sequence[float]) -> None:
+        self._dh = dh_table(description)
+        self._tool = placement(tcp)
+
+    def pose(self, q: Floats) -> Placement:
+        """Return the pose of the tool at joint positions, shape (n,) [rad]."""
+        rotation, position, _ = kinematics(self._dh, *self._tool, q)
+        return Placement(rotation, position)
+
+    def solve(self, goal: Placement, q: Floats) -> Floats | None:
+        """Return joint positions near q at which the tool has a pose, shape (n,) [rad]; None if Newton finds none."""
+        for _ in range(ITERATIONS):
+            rotation, position, jacobian = kinematics(self._dh, *self._tool, q)
+            error = np.concatenate((goal.position - position, turn(rotation, goal.rotation)))
+            size = float(np.abs(error).max())
+            if size < EXACT:
+                return q
+            step = _solved(jacobian, error)
+            if step is None or np.abs(step).max() > 1.0:
+                return None
+            q = q + step
+            if size < 1e-8:  # Newton converges quadratically: the next error is below rounding
+                return q
+        return None
+
+    def rates(self, q: Floats, state: ToolState) -> tuple[Floats, Floats] | None:
+        """Return dq/ds and d²q/ds² of a posture on a path, each of shape (n,); None in a singular posture."""
+        jacobian = kinematics(self._dh, *self._tool, q)[2]
+        first = _solved(jacobian, state.first)
+        if first is None or np.abs(first).max() > STEEPEST:
+            return None
+        second = _solved(jacobian, state.second - bias(self._dh, self._tool.position, q, first))
+        return None if second is None else (first, second)
+
+    def follow(self, curve: ToolCurve, q: Floats) -> Knots:
+        """Return the joints' way along a path of the tool.
+
+        Args:
+            curve: The path.
+            q: Joint positions at its start, shape (n,) [rad].
+
+        Raises:
+            WayError: A singular posture is on the way, or its poses cannot be reached.
+        """
+        places = np.linspace(0.0, curve.length, max(int(np.ceil(curve.length / SPACING)), 2) + 1)
+        knots = [self._knot(curve, 0.0, q)]
+        for place in places[1:].tolist():
+            knots += self._between(curve, knots[-1], place)
+        s, *rest = zip(*knots, strict=True)
+        return Knots(np.array(s), *(np.array(values) for values in rest))
+
+    def _between(self, curve: ToolCurve, start: "Knot", end: float) -> list["Knot"]:
+        """Knots behind one, up to a place, so close that a polynomial between two of them keeps to the path."""
+        length = end - start[0]
+        guess = start[1] + length * (start[2] + 0.5 * length * start[3])
+        middle = 0.5 * (start[0] + end)
+        try:
+            last = self._knot(curve, end, guess)
+            c = hermite(length, start[1:], last[1:])
+            q = (0.5 * length) ** np.arange(6) @ c
+            goal, found = curve.at(middle).pose, self.pose(q)
+            off = max(
+                float(np.abs(goal.position - found.position).max()),
+                float(np.abs(turn(found.rotation, goal.rotation)).max()),
+            )
+            if off <= TOLERANCE:
+                return [last]
+        except WayError:
+            if length < CLOSEST:
+                raise
+        if length < CLOSEST:
+            raise WayError(middle, curve.at(middle).pose, start[1])
+        first = self._between(curve, start, middle)
+        return first + self._between(curve, first[-1], end)
+
+    def _knot(self, curve: ToolCurve, s: float, guess: Floats) -> "Knot":
+        state = curve.at(s)
+        q = self.solve(state.pose, guess)
+        rates = None if q is None else self.rates(q, state)
+        if q is None or rates is None:
+            raise WayError(s, state.pose, guess)
+        return s, q, *rates
+
+
+Knot = tuple[float, Floats, Floats, Floats]
+"""Place, joint positions and their first two derivatives."""
+
+
+def _solved(jacobian: Floats, wanted: Floats) -> Floats | None:
+    """Solve J x = wanted, for other arms than those with six joints in the sense of least squares."""
+    if jacobian.shape[1] == 6:
+        try:
+            exact: Floats = np.asarray(np.linalg.solve(jacobian, wanted), dtype=np.float64)
+        except np.linalg.LinAlgError:
+            return None
+        return exact
+    least: Floats = np.asarray(np.linalg.lstsq(jacobian, wanted, rcond=1e-9)[0], dtype=np.float64)
+    return least

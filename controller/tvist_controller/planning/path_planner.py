@@ -1,0 +1,227 @@
+"""Planning of motions of the tool and of paths of several parts."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tvist_controller.control.differentiator import Floats
+from tvist_controller.paths.legs import JointWay, Leg, Pacing
+from tvist_controller.paths.pacing import JointLimits, joined, law_of, timed
+from tvist_controller.paths.poses import Placement, placement
+from tvist_controller.paths.route import Run, runs_of
+from tvist_controller.paths.tool_curves import PER_RADIAN, SHORTEST, ToolArc, ToolCurve, ToolLine
+from tvist_controller.paths.tracking import Tracker, WayError
+from tvist_controller.planning.basis import MotionBasis
+from tvist_controller.planning.filter_planner import FilterPlanner
+from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
+from tvist_controller.planning.reachable import Reachable
+from tvist_controller.refusal import RefusalError
+from tvist_controller.safety import rate_of
+from tvist_controller.setup import Setup
+from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, quickest_motion
+from tvist_controller.trajectory.spline import SplineCurve
+from tvist_plant.plant import PERIOD
+from tvist_protocol.motions import (
+    ArcSegment,
+    JointSegment,
+    LineSegment,
+    MoveC,
+    MoveL,
+    MovePath,
+    ProcessSegment,
+    Segment,
+)
+from tvist_shaping.base import Filter
+
+POSTURES = 9
+"""Number of postures of a run at which the shaper's delay is looked up."""
+VARIATION = 1.1
+"""Factor by which the delay may be longer between them [-]."""
+
+
+class PathPlanner:
+    """Plans the motions of one robot along paths.
+
+    Args:
+        setup: Initial setup.
+        filters: Creates its filters.
+        moves: Plans its point-to-point motions, and checks motions of any kind.
+    """
+
+    def __init__(self, setup: Setup, filters: FilterPlanner, moves: MovePlanner) -> None:
+        self._description, self._filters, self._moves = setup.description, filters, moves
+        self._reachable = Reachable(setup.description)
+
+    def plan(self, command: MoveL | MoveC | MovePath, basis: MotionBasis) -> PlannedMove:
+        """Plan a motion from rest; the command's content has been checked.
+
+        Raises:
+            RefusalError: There is no such motion, or it would lead to a collision.
+        """
+        tracker = Tracker(self._description, basis.tcp)
+        legs = list(self._legs(command, tracker, basis))
+        try:
+            runs, skipped = runs_of(legs, tracker)
+        except WayError as error:
+            raise self._reachable.refusal(error, "", legs[0].where, basis.tcp) from error
+        if not runs:
+            runs = [[]]
+        length = sum(float(piece.knots.s[-1]) for run in runs for piece in run)
+        tvist, done, motions = self._filters.present(basis.filter), 0.0, list[PlannedMotion]()
+        window = 0.0
+        for run in runs:
+            motion, delay = self._motion(run, command.jerk, tvist, basis)
+            self._moves.check_clear(motion, basis, _shares(run, done, length))
+            motions.append(motion)
+            window = max(window, delay)
+            done += sum(float(piece.knots.s[-1]) for piece in run)
+        fastest = max(_fastest(motion) for motion in motions)
+        excess = [self._moves.excess_of_torque(motion, basis) for motion in motions]
+        return PlannedMove(
+            tuple(motions),
+            fastest,
+            next((one for one in excess if one is not None), None),
+            tuple(skipped),
+            window,
+        )
+
+    # ------------------------------------------------------------------ geometry
+
+    def _legs(self, command: MoveL | MoveC | MovePath, tracker: Tracker, basis: MotionBasis) -> Iterator[Leg]:
+        frame, q = placement(command.frame), basis.q
+        for segment, where in _segments(command):
+            start = tracker.pose(q)
+            way: ToolCurve | JointWay
+            match segment:
+                case JointSegment():
+                    way = JointWay(q, np.array(segment.q, dtype=float))
+                case ArcSegment():
+                    via = frame @ placement(segment.via)
+                    end = frame @ placement(segment.pose)
+                    way = self._arc(start, via.position, end, segment, where)
+                case _:
+                    way = ToolLine(start, frame @ placement(segment.pose))
+            if way.length < SHORTEST:
+                continue
+            end_q = self._end(way, q, tracker, where, basis)
+            pacing = timed(_pacing(segment), way.length)
+            yield Leg(way, q, end_q, tracker.pose(end_q), pacing, segment.blend, where)
+            q = end_q
+
+    @staticmethod
+    def _arc(start: Placement, via: Floats, end: Placement, segment: ArcSegment, where: str) -> ToolArc:
+        try:
+            return ToolArc(start, via, end, tangent=segment.orientation == "tangent")
+        except ValueError as error:
+            field = f"{where}.via".removeprefix(".")
+            why = f"{field}: no arc leads from the present position through it to pose: {error}"
+            raise RefusalError("out_of_range", field, why) from error
+
+    def _end(
+        self, way: ToolCurve | JointWay, q: Floats, tracker: Tracker, where: str, basis: MotionBasis
+    ) -> Floats:
+        """Joint positions at the end of a leg, whose whole way is within the joints' range."""
+        if isinstance(way, JointWay):
+            return way.end
+        field = f"{where}.pose".removeprefix(".")
+        try:
+            knots = tracker.follow(way, q)
+        except WayError as error:
+            share = f"{100.0 * error.s / way.length:.0f} % of the way"
+            raise self._reachable.refusal(error, share, field, basis.tcp) from error
+        self._check_range(knots.s / way.length, knots.q, field)
+        end: Floats = knots.q[-1]
+        return end
+
+    def _check_range(self, shares: Floats, q: Floats, field: str) -> None:
+        most = np.array(self._description.limits.position)
+        beyond = np.abs(q) > most
+        if not beyond.any():
+            return
+        first = int(np.flatnonzero(beyond.any(axis=1))[0])
+        joint = int(np.flatnonzero(beyond[first])[0])
+        name = self._description.robot.joints[joint]
+        why = (
+            f"{field}: joint {name} would be at {q[first, joint]:.3f} rad after {100.0 * shares[first]:.0f} % of the "
+            f"way; it goes to ±{most[joint]:g}"
+        )
+        raise RefusalError("limit_position", field, why, float(most[joint]))
+
+    # ------------------------------------------------------------------ time
+
+    def _motion(
+        self, run: Run, jerk: float, tvist: Filter, basis: MotionBasis
+    ) -> tuple[PlannedMotion, float]:
+        limits, spared = self._description.limits, 1.0 - basis.excess
+        if not run:  # the arm is there already
+            rest = MotionLimits(min(limits.velocity), min(limits.acceleration), min(limits.jerk))
+            return quickest_motion(JointLine(basis.q, basis.q), rest, PERIOD, basis.speed), 0.0
+        knots = joined(run)
+        acceleration = np.array(limits.acceleration) * spared
+        curve = SplineCurve(knots, acceleration)
+        delay = self._delay(curve, tvist)
+        peak = tvist.peak
+        joints = JointLimits(np.array(limits.velocity) / peak, acceleration / peak**2, min(limits.jerk))
+        law = law_of(run, curve, joints, jerk, delay)
+        motion = PlannedMotion(curve, law, PERIOD)
+        rate = rate_of(basis.speed, _fastest(motion), basis.slowest)
+        return PlannedMotion(curve, law, PERIOD, rate), delay
+
+    @staticmethod
+    def _delay(curve: SplineCurve, tvist: Filter) -> float:
+        """Longest delay of a shaper on a curve [s]."""
+        found = []
+        for s in np.linspace(0.0, float(curve.end[0]), POSTURES):
+            tvist.reset(curve.posture(np.array([s])))
+            found.append(tvist.delay)
+        return VARIATION * max(found)
+
+
+def _segments(command: MoveL | MoveC | MovePath) -> Iterator[tuple[Segment, str]]:
+    match command:
+        case MoveL():
+            yield (
+                LineSegment(
+                    pose=command.pose,
+                    velocity=command.velocity,
+                    acceleration=command.acceleration,
+                    duration=command.duration,
+                ),
+                "",
+            )
+        case MoveC():
+            yield (
+                ArcSegment(
+                    via=command.via,
+                    pose=command.pose,
+                    orientation=command.orientation,
+                    velocity=command.velocity,
+                    acceleration=command.acceleration,
+                ),
+                "",
+            )
+        case MovePath():
+            for number, segment in enumerate(command.segments):
+                yield segment, f"segments[{number}]"
+
+
+def _pacing(segment: Segment) -> Pacing:
+    match segment:
+        case JointSegment():
+            return Pacing(PER_RADIAN * segment.velocity, PER_RADIAN * segment.acceleration, segment.duration)
+        case LineSegment():
+            return Pacing(segment.velocity, segment.acceleration, segment.duration)
+        case ProcessSegment() | ArcSegment():
+            return Pacing(segment.velocity, segment.acceleration, even=True)
+
+
+def _fastest(motion: PlannedMotion) -> float:
+    """Largest velocity of any joint in a motion at full rate [rad/s]."""
+    return max(float(np.abs(qd).max()) for _, qd, _ in motion.states(100))
+
+
+def _shares(run: Run, done: float, length: float) -> tuple[float, float]:
+    """Shares of the whole way at the start and at the end of a run."""
+    if not run:
+        return 0.0, 1.0
+    return done / length, (done + sum(float(piece.knots.s[-1]) for piece in run)) / length
