@@ -1,0 +1,180 @@
+"""The nearest of all postures that have a pose, for arms with a closed form and for all others."""
+
+import math
+
+import numpy as np
+
+from tvist_controller._compiled import compiled
+from tvist_controller.kinematics.denavit_hartenberg import Floats, kinematics_into
+from tvist_controller.kinematics.geometry import representation
+from tvist_controller.kinematics.least_squares import (
+    ACCURACY,
+    AIM,
+    NO_TOOL_POSITION,
+    NO_TOOL_ROTATION,
+    approach,
+    descend,
+    pose_error,
+)
+from tvist_controller.kinematics.postures import postures
+
+FOUND, NO_SOLUTION, OUT_OF_RANGE = 0, 1, 2
+
+SAMPLES = 96
+"""Values of a free angle at which postures are computed, before the nearest ones are improved."""
+
+
+@compiled
+def represent(arm: Floats, near: Floats, q: Floats) -> tuple[float, bool]:
+    """Choose the nearest representation of each joint's position within its range, in place.
+
+    Returns:
+        Squared distance from `near` [rad^2], and whether all joints are within their ranges.
+    """
+    square, inside = 0.0, True
+    for i in range(len(q)):
+        q[i] = representation(q[i], near[i], arm[i, 4])
+        inside &= abs(q[i]) <= arm[i, 4]
+        square += (q[i] - near[i]) * (q[i] - near[i])
+    return square, inside
+
+
+@compiled
+def all_postures(arm: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats) -> None:
+    """Compute all postures in closed form; of a curve of them, the ones nearest to `near`.
+
+    Args:
+        arm: Table of `arm_table`, shape (7, 5).
+        rotation: Rotation of the flange, shape (3, 3).
+        position: Position of the flange, shape (3,) [m].
+        near: Joint positions, shape (6,) [rad].
+        table: Result, shape (9, 6) [rad]; rows without posture begin with NaN.
+    """
+    table[8, 0] = math.nan
+    if not postures(arm, rotation, position, 0.0, table):
+        return
+    dh = arm[:6]
+    sample, least = np.empty((8, 6)), np.full(9, math.inf)
+    for row in range(8):
+        table[row, 0] = math.nan
+    for number in range(SAMPLES):
+        postures(arm, rotation, position, 2.0 * math.pi * number / SAMPLES, sample)
+        for row in range(8):
+            if math.isnan(sample[row, 0]):
+                continue
+            square, inside = represent(arm, near, sample[row])
+            square += 0.0 if inside else 1e6
+            if square < least[row]:
+                least[row] = square
+                table[row] = sample[row]
+    table[8] = near
+    for row in range(9):
+        if math.isnan(table[row, 0]):
+            continue
+        posture = table[row].copy()
+        if approach(dh, rotation, position, near, posture) <= ACCURACY:
+            square, inside = represent(arm, near, posture)
+            # From a posture that fits, the way to the nearest one may leave a joint's range.
+            if inside or not least[row] < 1e6:
+                table[row] = posture
+        elif row == 8:
+            table[row, 0] = math.nan
+
+
+@compiled
+def improved_postures(arm: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats) -> None:
+    """Compute what `all_postures` does, and improve each by least squares as far as its error is not rounding."""
+    all_postures(arm, rotation, position, near, table)
+    for row in range(9):
+        if math.isnan(table[row, 0]):
+            continue
+        represent(arm, near, table[row])
+        posture = table[row].copy()
+        if descend(arm[:6], rotation, position, near, 0.0, 5, posture) <= ACCURACY:
+            table[row] = posture
+        else:
+            table[row, 0] = math.nan
+
+
+@compiled
+def closest(arm: Floats, rotation: Floats, position: Floats, near: Floats, q: Floats) -> int:
+    """Find the nearest posture in closed form.
+
+    Args:
+        arm: Table of `arm_table`, shape (7, 5).
+        rotation: Rotation of the flange, shape (3, 3).
+        position: Position of the flange, shape (3,) [m].
+        near: Joint positions, shape (6,) [rad].
+        q: Result, shape (6,) [rad]; if it is outside the range of a joint, the nearest of those that are.
+
+    Returns:
+        FOUND, NO_SOLUTION or OUT_OF_RANGE.
+    """
+    table = np.empty((9, 6))
+    all_postures(arm, rotation, position, near, table)
+    squares, outside = np.empty(9), np.empty(9)
+    for row in range(9):
+        squares[row] = math.inf
+        outside[row] = 0.0
+        if not math.isnan(table[row, 0]):
+            square, inside = represent(arm, near, table[row])
+            squares[row] = square
+            outside[row] = 0.0 if inside else 1.0
+    now, place, J, error = np.empty((3, 3)), np.empty(3), np.empty((6, 6)), np.empty(6)
+    for wrong in range(2):
+        while True:
+            best, least = -1, math.inf
+            for row in range(9):
+                if outside[row] == wrong and squares[row] < least:
+                    best, least = row, squares[row]
+            if best < 0:
+                break
+            q[:] = table[best]
+            kinematics_into(arm[:6], NO_TOOL_ROTATION, NO_TOOL_POSITION, q, now, place, J)
+            far, angle = pose_error(rotation, position, now, place, error)
+            # Written so that a number that is none does not pass.
+            if max(far, angle) <= AIM or descend(arm[:6], rotation, position, q, 0.0, 5, q) <= ACCURACY:
+                return OUT_OF_RANGE if wrong else FOUND
+            squares[best] = math.inf
+    return NO_SOLUTION
+
+
+@compiled
+def search(
+    arm: Floats, starts: Floats, rotation: Floats, position: Floats, near: Floats, found: Floats
+) -> int:
+    """Find postures of any arm by least squares, from `near` and from given starts.
+
+    Args:
+        arm: Table of `arm_table`, shape (n + 1, 5).
+        starts: Further starts, shape (k, n) [rad].
+        rotation: Rotation of the flange, shape (3, 3).
+        position: Position of the flange, shape (3,) [m].
+        near: Joint positions, shape (n,) [rad].
+        found: Result, shape (2 k + 2, n) [rad]: what was found from each start, and the nearest to `near` that can be
+            reached from there without leaving the pose, in the representation nearest to `near`. Rows without result
+            begin with NaN.
+
+    Returns:
+        Index of the nearest posture within the joints' ranges; -1 if there is none.
+    """
+    joints = arm.shape[0] - 1
+    dh = arm[:joints]
+    best, least = -1, math.inf
+    for start in range(len(starts) + 1):
+        first, second = found[2 * start], found[2 * start + 1]
+        first[:] = near if start == 0 else starts[start - 1]
+        second[0] = math.nan
+        if not descend(dh, rotation, position, near, 0.0, 100, first) <= ACCURACY:
+            first[0] = math.nan
+            continue
+        represent(arm, near, first)
+        second[:] = first
+        if not approach(dh, rotation, position, near, second) <= ACCURACY:
+            second[0] = math.nan
+        for row in range(2 * start, 2 * start + 2):
+            if not math.isnan(found[row, 0]):
+                square, inside = represent(arm, near, found[row])
+                if inside and square < least:
+                    best, least = row, square
+    return best

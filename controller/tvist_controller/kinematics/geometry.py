@@ -1,0 +1,68 @@
+"""The form of an arm, as far as it decides how its inverse kinematics is computed."""
+
+import math
+
+import numpy as np
+
+from tvist_controller._compiled import compiled
+from tvist_controller.kinematics.denavit_hartenberg import Floats, dh_table
+from tvist_plant.description import RobotDescription
+
+ANY, PARALLEL, SPHERICAL = 0.0, 1.0, 2.0
+"""No closed form; axes 2, 3 and 4 are parallel (UR); axes 4, 5 and 6 meet in one point (spherical wrist)."""
+
+EXACT = 1e-9
+"""Deviation of a sine, a cosine or a length [m] from the form that still counts as the form."""
+
+
+def arm_table(description: RobotDescription) -> Floats:
+    """Return what the kernels of inverse kinematics need to know of an arm, shape (n + 1, 5).
+
+    The first n rows are those of `dh_table`, with the largest distance of the joint from zero [rad] in the last column.
+    The last row has the form (`ANY`, `PARALLEL` or `SPHERICAL`), the length l₃ [m] of the forearm between the axes of
+    elbow and wrist in the arm's plane, and its angle ψ [rad] to the x axis of its Denavit-Hartenberg frame.
+    """
+    dh = dh_table(description)
+    limits = np.array(description.limits.position, dtype=float)
+    form = _form(dh)
+    forearm, angle = 0.0, 0.0
+    if form == PARALLEL:
+        forearm = dh[2, 0]
+    elif form == SPHERICAL:
+        forearm = math.hypot(dh[2, 0], dh[3, 1])
+        angle = math.atan2(-dh[2, 3] * dh[1, 2] * dh[3, 1], dh[2, 0])
+    return np.vstack((np.column_stack((dh, limits)), (form, forearm, angle, 0.0, 0.0)))
+
+
+def _form(dh: Floats) -> float:
+    """Recognise a form that `postures` solves."""
+    if len(dh) != 6:
+        return ANY
+    a, d, cosine, sine = dh.T
+    turned, straight = np.abs(cosine) < EXACT, np.abs(sine) < EXACT
+    if not (turned[0] and straight[1] and turned[3] and turned[4] and abs(a[1]) > EXACT):
+        return ANY
+    if straight[2] and abs(a[2]) > EXACT and abs(a[4]) < EXACT:
+        return PARALLEL
+    meet = max(abs(a[3]), abs(a[4]), abs(d[4])) < EXACT
+    if turned[2] and meet and math.hypot(a[2], d[3]) > EXACT:
+        return SPHERICAL
+    return ANY
+
+
+@compiled
+def representation(angle: float, near: float, limit: float) -> float:
+    """Add the whole turns to an angle that bring it nearest to `near` within ± limit.
+
+    If none of its representations is in the range, the one nearest to zero is returned.
+    """
+    turn = 2.0 * math.pi
+    value = angle + turn * math.floor((near - angle) / turn + 0.5)
+    if abs(value) <= limit:
+        return value
+    # A limit is a number in a file, and an angle that should be on it is beyond it by rounding half of the time.
+    fewest, most = math.ceil((-limit - 1e-10 - angle) / turn), math.floor((limit + 1e-10 - angle) / turn)
+    if fewest > most:
+        return angle - turn * math.floor(angle / turn + 0.5)
+    value = angle + turn * min(max(math.floor((near - angle) / turn + 0.5), fewest), most)
+    return min(max(value, -limit), limit)

@@ -1,0 +1,169 @@
+"""Inverse kinematics: joint positions from a pose of the flange."""
+
+from typing import Literal
+
+import numpy as np
+from numba import float64, types
+
+from tvist_controller.kinematics.choice import FOUND, NO_SOLUTION, closest, improved_postures, search
+from tvist_controller.kinematics.denavit_hartenberg import Floats
+from tvist_controller.kinematics.geometry import ANY, arm_table
+from tvist_plant.description import RobotDescription
+
+STARTS = 63
+"""Postures, besides the given one, from which an arm without closed form is searched."""
+
+SAME = 1e-6
+"""Difference of angles [rad] below which two postures count as one."""
+
+
+class InverseKinematicsError(ValueError):
+    """No joint positions reach the pose.
+
+    Attributes:
+        code: "no_solution" if no posture has this pose; "limit_position" if those that have are outside a joint's range.
+        joint: Index of the joint whose range is exceeded most, in the nearest posture; None without solution.
+        value: Position of that joint, in its representation nearest to zero [rad]; None without solution.
+        limit: Its largest distance from zero [rad]; None without solution.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        code: Literal["no_solution", "limit_position"] = "no_solution",
+        joint: int | None = None,
+        value: float | None = None,
+        limit: float | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.code: Literal["no_solution", "limit_position"] = code
+        self.joint = joint
+        self.value = value
+        self.limit = limit
+
+
+class InverseKinematics:
+    """All postures of an arm that have a pose of the flange, and the nearest of them.
+
+    UR arms, and arms with a spherical wrist, are solved in closed form (`postures`), others by damped least squares
+    from 64 starts, which are the same for every call. There, a posture that no start leads to is missed.
+
+    Objects keep no state between calls. The constructor compiles what the methods use, or loads it from numba's cache.
+
+    Args:
+        description: The robot.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self._names = description.robot.joints
+        self._arm = arm_table(description)
+        self._limits = self._arm[:-1, 4]
+        self._closed = bool(self._arm[-1, 0] != ANY)
+        span = np.minimum(self._limits, np.pi)
+        self._starts = np.random.default_rng(1).uniform(-span, span, (STARTS, description.joints))
+        _compile()
+
+    @property
+    def closed_form(self) -> bool:
+        """Whether the arm is solved in closed form."""
+        return self._closed
+
+    def solve(self, rotation: Floats, position: Floats, near: Floats) -> Floats:
+        """Return the posture nearest to another one, of all that have a pose.
+
+        Nearest means the smallest Euclidean distance in joint space. Each joint has the representation, of those that
+        differ by whole turns and are in its range, that is nearest. If sin q₅ = 0, or if another joint is free at the
+        pose, the nearest posture of the curve of them is returned.
+
+        Args:
+            rotation: Rotation of the flange in the base frame, orthonormal, shape (3, 3).
+            position: Position of the flange in the base frame, shape (3,) [m].
+            near: Joint positions, shape (n,) [rad].
+
+        Returns:
+            Joint positions, shape (n,) [rad], whose pose differs by at most 1e-9 m and 1e-9 rad.
+
+        Raises:
+            InverseKinematicsError: No posture within the joints' ranges has this pose.
+            TypeError: An array does not have 64-bit floats.
+        """
+        if not self._closed:
+            return self._search(rotation, position, near)
+        q = near.copy()
+        status = closest(self._arm, rotation, position, near, q)
+        if status != FOUND:
+            raise self._none() if status == NO_SOLUTION else self._outside(q)
+        return q
+
+    def all(self, rotation: Floats, position: Floats) -> Floats:
+        """Return the postures that have a pose, whatever the joints' ranges.
+
+        Where a joint is free, the posture nearest to zero stands for each curve of postures. For a redundant arm, these
+        are examples.
+
+        Args:
+            rotation: Rotation of the flange in the base frame, orthonormal, shape (3, 3).
+            position: Position of the flange in the base frame, shape (3,) [m].
+
+        Returns:
+            Distinct postures, shape (k, n), each angle within ±π [rad]. Postures that differ by less than 1e-6 rad are
+            one.
+        """
+        zero = np.zeros(len(self._limits))
+        unlimited = self._arm.copy()
+        unlimited[:-1, 4] = 2.0 * np.pi
+        if self._closed:
+            found = np.empty((9, 6))
+            improved_postures(unlimited, rotation, position, zero, found)
+        else:
+            found = np.empty((2 * STARTS + 2, len(zero)))
+            search(unlimited, self._starts, rotation, position, zero, found)
+        return _distinct(found[~np.isnan(found[:, 0])])
+
+    def _search(self, rotation: Floats, position: Floats, near: Floats) -> Floats:
+        found = np.empty((2 * STARTS + 2, len(near)))
+        best = search(self._arm, self._starts, rotation, position, near, found)
+        if best >= 0:
+            return found[best].copy()
+        found = found[~np.isnan(found[:, 0])]
+        if not len(found):
+            raise self._none()
+        raise self._outside(found[np.argmin(np.linalg.norm(found - near, axis=1))])
+
+    def _none(self) -> InverseKinematicsError:
+        return InverseKinematicsError("no joint positions reach this pose")
+
+    def _outside(self, q: Floats) -> InverseKinematicsError:
+        joint = int(np.argmax(np.abs(q) - self._limits))
+        value, limit = float(q[joint]), float(self._limits[joint])
+        return InverseKinematicsError(
+            f"{self._names[joint]} would be at {value:.4f} rad, outside its range of ±{limit:.4f} rad",
+            "limit_position",
+            joint,
+            value,
+            limit,
+        )
+
+
+def _distinct(found: Floats) -> Floats:
+    """Keep the first of each group of postures that are the same but for whole turns."""
+    kept: list[Floats] = []
+    for q in found:
+        differences = [np.abs(np.remainder(q - other + np.pi, 2.0 * np.pi) - np.pi).max() for other in kept]
+        if not differences or min(differences) > SAME:
+            kept.append(q)
+    return np.array(kept).reshape(len(kept), found.shape[1])
+
+
+def _compile() -> None:
+    """Compile each kernel for arrays of any layout, once: the first call of a method must not take seconds."""
+    table, result = types.Array(float64, 2, "C"), types.Array(float64, 1, "C")
+    vector, matrix = (types.Array(float64, axes, "A", readonly=True) for axes in (1, 2))
+    for kernel, signature in (
+        (closest, (table, matrix, vector, vector, result)),
+        (improved_postures, (table, matrix, vector, vector, table)),
+        (search, (table, table, matrix, vector, vector, table)),
+    ):
+        if not kernel.signatures:
+            kernel.compile(signature)
+            kernel.disable_compile()

@@ -1,0 +1,188 @@
+"""The postures of an arm with six joints at a pose of its flange, in closed form.
+
+Two forms of arm are solved, whose parameters a and d may have any value and sign where none is named:
+
+- Axes 2, 3 and 4 are parallel (UR): α = ±90°, 0 or 180°, 0 or 180°, ±90°, ±90°, any; a₅ = 0.
+- Axes 4, 5 and 6 meet (spherical wrist): α = ±90°, 0 or 180°, ±90°, ±90°, ±90°, any; a₄ = a₅ = d₅ = 0.
+
+Both have a shoulder that turns a plane, in which upper arm and forearm move, about axis 1: two postures have the wrist
+on that plane's fixed distance from axis 1. In the plane, the triangle of upper arm and forearm has two forms, and the
+wrist has two postures, q₅ and -q₅, so that there are up to eight. Angles come from atan2 alone, so that rounding of
+the pose, near a singularity too, is rounding of the result's forward kinematics, not more.
+
+Where a joint is free because axes coincide, there is a curve of postures. It is followed with a free angle as
+parameter: q₁ if the wrist's centre is on axis 1; the direction of frame 4 in the plane (axes 4 and 6 parallel, UR) or
+q₄ (axes 4 and 6 coincide, spherical wrist) if sin q₅ = 0; q₂ if the wrist is on axis 2.
+"""
+
+import math
+
+from tvist_controller._compiled import compiled
+from tvist_controller.kinematics.denavit_hartenberg import Floats
+from tvist_controller.kinematics.geometry import PARALLEL
+
+AT_BORDER = 1e-10
+"""Distance [m] beyond the reach that counts as rounding, and sine or length [m] below which a joint is free."""
+
+
+@compiled
+def elbow(upper: float, forearm: float, x: float, y: float, slack: float, free: float) -> tuple[Floats, bool]:
+    """Solve the triangle of upper arm and forearm for its far end at (x, y).
+
+    Returns:
+        (θ₂, δ, θ₂', δ'), the angle of the upper arm and the angle from it to the forearm, for the two forms [rad], all
+        of them NaN where there is none; and whether θ₂ is free, and therefore has the value `free`.
+    """
+    square = x * x + y * y
+    radius = math.sqrt(square)
+    longest, shortest = abs(upper) + abs(forearm), abs(abs(upper) - abs(forearm))
+    if not (shortest - slack <= radius <= longest + slack):
+        return (math.nan, math.nan, math.nan, math.nan), False
+    scale = 2.0 * upper * forearm
+    cosine = (square - upper * upper - forearm * forearm) / scale
+    area = (radius - shortest) * (radius + shortest) * (longest - radius) * (longest + radius)
+    sine = math.sqrt(max(area, 0.0)) / abs(scale)
+    delta = math.atan2(sine, cosine)
+    if radius < AT_BORDER:
+        return (free, delta, free, delta), True
+    middle = math.atan2(y, x)
+    aside = math.atan2(forearm * sine, upper + forearm * cosine)
+    return (middle - aside, delta, middle + aside, -delta), False
+
+
+@compiled
+def postures(arm: Floats, rotation: Floats, position: Floats, free: float, table: Floats) -> bool:
+    """Compute all postures at a pose.
+
+    Args:
+        arm: Table of `arm_table`, shape (7, 5), of one of the two forms.
+        rotation: Rotation of the flange, shape (3, 3).
+        position: Position of the flange, shape (3,) [m].
+        free: Value of an angle that is free, if there is one [rad].
+        table: Result, shape (8, 6) at least: the row 4 shoulder + 2 wrist + elbow has a posture [rad], each angle in
+            any representation, or begins with NaN if there is none.
+
+    Returns:
+        Whether an angle is free in one of them.
+    """
+    for row in range(8):
+        table[row, 0] = math.nan
+    # Axis 6 (z), the direction x that q₆ turns about it, and the origin of frame 5.
+    a6, d6, ca6, sa6 = arm[5, 0], arm[5, 1], arm[5, 2], arm[5, 3]
+    xx, xy, xz = rotation[0, 0], rotation[1, 0], rotation[2, 0]
+    zx = sa6 * rotation[0, 1] + ca6 * rotation[0, 2]
+    zy = sa6 * rotation[1, 1] + ca6 * rotation[1, 2]
+    zz = sa6 * rotation[2, 1] + ca6 * rotation[2, 2]
+    px, py = position[0] - d6 * zx - a6 * xx, position[1] - d6 * zy - a6 * xy
+    pz = position[2] - d6 * zz - a6 * xz - arm[0, 1]
+
+    parallel = arm[6, 0] == PARALLEL
+    s1 = arm[0, 3]
+    distance = arm[1, 1] + arm[1, 2] * arm[2, 1]
+    if parallel:
+        distance += arm[1, 2] * arm[2, 2] * arm[3, 1]
+    distance *= s1
+    radius = math.hypot(px, py)
+    if not (abs(distance) <= radius + AT_BORDER):
+        return False
+    distance = min(max(distance, -radius), radius)
+    along = math.sqrt((radius - distance) * (radius + distance))
+    turns = radius < AT_BORDER
+    is_free = turns
+    for shoulder in range(2):
+        if turns:
+            q1 = free + math.pi * shoulder
+            c, s = math.cos(q1), math.sin(q1)
+        else:
+            c = (along * px - distance * py) / (radius * radius)
+            s = (along * py + distance * px) / (radius * radius)
+            q1 = math.atan2(s, c)
+        # In the arm's plane: first coordinate horizontal, second up or down, third along axis 2.
+        pose = (
+            (c * px + s * py - arm[0, 0], s1 * pz),
+            (c * xx + s * xy, s1 * xz, s1 * (s * xx - c * xy)),
+            (c * zx + s * zy, s1 * zz, s1 * (s * zx - c * zy)),
+        )
+        rows = table[4 * shoulder : 4 * shoulder + 4]
+        if parallel:
+            is_free |= _parallel(arm, q1, pose, free, rows)
+        else:
+            is_free |= _spherical(arm, q1, pose, free, rows)
+        along = -along
+    return is_free
+
+
+@compiled
+def _parallel(arm: Floats, q1: float, pose: tuple[Floats, Floats, Floats], free: float, rows: Floats) -> bool:
+    """Compute the four postures of an arm whose axes 2, 3 and 4 are parallel, at one position of its shoulder."""
+    (px, py), (xx, xy, xu), (zx, zy, zu) = pose
+    e2 = arm[1, 2]
+    along = e2 * arm[2, 2]  # axis 4 along axis 2, or against it
+    s4, s5 = along * arm[3, 3], arm[4, 3]
+    c5 = -s5 * s4 * zu
+    sine = math.hypot(zx, zy)
+    is_free = sine < AT_BORDER
+    slack = AT_BORDER
+    if is_free:
+        q5 = 0.0 if c5 > 0.0 else math.pi
+        hx, hy, sine = math.cos(free), math.sin(free), 0.0
+    else:
+        q5 = math.atan2(sine, c5)
+        hx, hy = s5 * zx / sine, s5 * zy / sine
+        slack += 1e-15 * abs(arm[4, 1]) / sine  # rounding of the pose turns frame 4
+    # x axis of frame 4 (h) and its z axis, which is axis 5.
+    q6 = math.atan2(s5 * s4 * (xx * hy - xy * hx), c5 * (xx * hx + xy * hy) + sine * s4 * xu)
+    theta4 = math.atan2(hy, hx)
+    wx = arm[4, 1] * s4 * hy + arm[3, 0] * hx
+    wy = -arm[4, 1] * s4 * hx + arm[3, 0] * hy
+    for wrist in range(1 if is_free else 2):
+        ways, elbow_is_free = elbow(arm[1, 0], arm[6, 1], px - wx, py - wy, slack, free)
+        is_free |= elbow_is_free
+        for way in range(2):
+            theta2, delta = ways[2 * way], ways[2 * way + 1]
+            row = rows[2 * wrist + way]
+            if math.isnan(theta2):
+                row[0] = math.nan
+                continue
+            row[0], row[1], row[2] = q1, theta2, e2 * delta
+            row[3], row[4], row[5] = along * (theta4 - theta2 - delta), q5, q6
+        wx, wy, q5 = -wx, -wy, -q5
+        theta4, q6 = theta4 + math.pi, q6 + math.pi
+    return is_free
+
+
+@compiled
+def _spherical(
+    arm: Floats, q1: float, pose: tuple[Floats, Floats, Floats], free: float, rows: Floats
+) -> bool:
+    """Compute the four postures of an arm with a spherical wrist, at one position of its shoulder."""
+    (px, py), (xx, xy, xu), (zx, zy, zu) = pose
+    e2, s3, s4, s5 = arm[1, 2], arm[2, 3], arm[3, 3], arm[4, 3]
+    ways, is_free = elbow(arm[1, 0], arm[6, 1], px, py, AT_BORDER, free)
+    for way in range(2):
+        theta2, delta = ways[2 * way], ways[2 * way + 1]
+        if math.isnan(theta2):
+            continue
+        theta3 = theta2 + delta - arm[6, 2]
+        c, s = math.cos(theta3), math.sin(theta3)
+        # Axis 6 (v) and the direction that q₆ turns (w) in frame 3, whose z axis is axis 4.
+        side, up = s3 * e2, -s3 * e2
+        vx, vy, vz = c * zx + s * zy, side * zu, up * (c * zy - s * zx)
+        wx, wy, wz = c * xx + s * xy, side * xu, up * (c * xy - s * xx)
+        c5 = -s5 * s4 * vz
+        sine = math.hypot(vx, vy)
+        straight = sine < AT_BORDER
+        if straight:
+            is_free = True
+            q4, q5, sine = free, 0.0 if c5 > 0.0 else math.pi, 0.0
+            hx, hy = math.cos(free), math.sin(free)
+        else:
+            q5 = math.atan2(sine, c5)
+            hx, hy = s5 * vx / sine, s5 * vy / sine
+            q4 = math.atan2(hy, hx)
+        q6 = math.atan2(s5 * s4 * (wx * hy - wy * hx), c5 * (wx * hx + wy * hy) + sine * s4 * wz)
+        for wrist in range(1 if straight else 2):
+            row = rows[2 * wrist + way]
+            row[0], row[1], row[2] = q1, theta2, e2 * (theta3 - theta2)
+            row[3], row[4], row[5] = q4 + math.pi * wrist, q5 * (1.0 - 2.0 * wrist), q6 + math.pi * wrist
+    return is_free
