@@ -16,12 +16,15 @@ from tvist_controller.kinematics.least_squares import (
     descend,
     pose_error,
 )
-from tvist_controller.kinematics.postures import postures
+from tvist_controller.kinematics.postures import DEFINITE, FREE, postures
 
 FOUND, NO_SOLUTION, OUT_OF_RANGE = 0, 1, 2
 
 SAMPLES = 96
 """Values of a free angle at which postures are computed, before the nearest ones are improved."""
+
+OUTSIDE = 1e6
+"""Added to the squared distance [rad^2] of a posture outside a joint's range: any inside is preferred."""
 
 
 @compiled
@@ -50,35 +53,44 @@ def all_postures(arm: Floats, rotation: Floats, position: Floats, near: Floats, 
         near: Joint positions, shape (6,) [rad].
         table: Result, shape (9, 6) [rad]; rows without posture begin with NaN.
     """
-    table[8, 0] = math.nan
-    if not postures(arm, rotation, position, 0.0, table):
+    table[8] = math.nan
+    freedom = postures(arm, rotation, position, 0.0, table)
+    if freedom == DEFINITE:
         return
-    dh = arm[:6]
-    sample, least = np.empty((8, 6)), np.full(9, math.inf)
-    for row in range(8):
-        table[row, 0] = math.nan
+    if freedom == FREE:
+        _sample_curves(arm, rotation, position, near, table)
+    # Close to a singularity, rounding of the pose moves postures far apart. From `near`, none is overlooked.
+    posture = near.copy()
+    if descend(arm[:6], rotation, position, near, 0.0, 30, posture) <= ACCURACY:
+        if freedom == FREE:
+            approach(arm[:6], rotation, position, near, posture)
+        table[8] = posture
+
+
+@compiled
+def _sample_curves(arm: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats) -> None:
+    """Compute the postures at many values of the free angle, and move the nearest of each kind along its curve."""
+    sample, least = np.empty((8, 6)), np.full(8, math.inf)
+    table[:8] = math.nan
     for number in range(SAMPLES):
         postures(arm, rotation, position, 2.0 * math.pi * number / SAMPLES, sample)
         for row in range(8):
             if math.isnan(sample[row, 0]):
                 continue
             square, inside = represent(arm, near, sample[row])
-            square += 0.0 if inside else 1e6
+            square += 0.0 if inside else OUTSIDE
             if square < least[row]:
                 least[row] = square
                 table[row] = sample[row]
-    table[8] = near
-    for row in range(9):
+    for row in range(8):
         if math.isnan(table[row, 0]):
             continue
         posture = table[row].copy()
-        if approach(dh, rotation, position, near, posture) <= ACCURACY:
-            square, inside = represent(arm, near, posture)
-            # From a posture that fits, the way to the nearest one may leave a joint's range.
-            if inside or not least[row] < 1e6:
+        if approach(arm[:6], rotation, position, near, posture) <= ACCURACY:
+            _, inside = represent(arm, near, posture)
+            # The way from a posture within the ranges to the nearest one may lead out of them.
+            if inside or least[row] >= OUTSIDE:
                 table[row] = posture
-        elif row == 8:
-            table[row, 0] = math.nan
 
 
 @compiled

@@ -1,6 +1,6 @@
 """Inverse kinematics: joint positions from a pose of the flange."""
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numba import float64, types
@@ -21,7 +21,8 @@ class InverseKinematicsError(ValueError):
     """No joint positions reach the pose.
 
     Attributes:
-        code: "no_solution" if no posture has this pose; "limit_position" if those that have are outside a joint's range.
+        code: "no_solution" if no posture has this pose; "limit_position" if every posture that has it is outside a
+            joint's range.
         joint: Index of the joint whose range is exceeded most, in the nearest posture; None without solution.
         value: Position of that joint, in its representation nearest to zero [rad]; None without solution.
         limit: Its largest distance from zero [rad]; None without solution.
@@ -124,7 +125,7 @@ class InverseKinematics:
         found = np.empty((2 * STARTS + 2, len(near)))
         best = search(self._arm, self._starts, rotation, position, near, found)
         if best >= 0:
-            return found[best].copy()
+            return np.array(found[best])
         found = found[~np.isnan(found[:, 0])]
         if not len(found):
             raise self._none()
@@ -159,11 +160,12 @@ def _compile() -> None:
     """Compile each kernel for arrays of any layout, once: the first call of a method must not take seconds."""
     table, result = types.Array(float64, 2, "C"), types.Array(float64, 1, "C")
     vector, matrix = (types.Array(float64, axes, "A", readonly=True) for axes in (1, 2))
-    for kernel, signature in (
+    kernels: tuple[tuple[Any, Any], ...] = (
         (closest, (table, matrix, vector, vector, result)),
         (improved_postures, (table, matrix, vector, vector, table)),
         (search, (table, table, matrix, vector, vector, table)),
-    ):
+    )
+    for kernel, signature in kernels:
         if not kernel.signatures:
             kernel.compile(signature)
             kernel.disable_compile()

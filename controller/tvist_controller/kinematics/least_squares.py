@@ -71,6 +71,28 @@ def solve_in_place(A: Floats, b: Floats) -> None:
 
 
 @compiled
+def _linearize(
+    dh: Floats, rotation: Floats, position: Floats, q: Floats, J: Floats, error: Floats
+) -> tuple[float, float]:
+    """Compute Jacobian and error at a posture; return the errors of position [m] and rotation [rad]."""
+    now, place = np.empty((3, 3)), np.empty(3)
+    kinematics_into(dh, NO_TOOL_ROTATION, NO_TOOL_POSITION, q, now, place, J)
+    return pose_error(rotation, position, now, place, error)
+
+
+@compiled
+def _normal_matrix(J: Floats, added: float, A: Floats) -> None:
+    """Compute the lower half of JᵀJ + added 1."""
+    n = J.shape[1]
+    for i in range(n):
+        for j in range(i + 1):
+            A[i, j] = 0.0
+            for k in range(6):
+                A[i, j] += J[k, i] * J[k, j]
+        A[i, i] += added
+
+
+@compiled
 def descend(
     dh: Floats, rotation: Floats, position: Floats, near: Floats, pull: float, iterations: int, q: Floats
 ) -> float:
@@ -89,57 +111,41 @@ def descend(
         q: Start, which becomes the result, shape (n,) [rad].
 
     Returns:
-        Larger one of the errors of position [m] and rotation [rad].
+        Root of the summed squares of the errors of position [m] and rotation [rad].
     """
     n = dh.shape[0]
-    now, place, J = np.empty((3, 3)), np.empty(3), np.empty((6, n))
-    error, trial, step, A = np.empty(6), np.empty(n), np.empty(n), np.empty((n, n))
-    kinematics_into(dh, NO_TOOL_ROTATION, NO_TOOL_POSITION, q, now, place, J)
-    far, angle = pose_error(rotation, position, now, place, error)
+    J, error = np.empty((6, n)), np.empty(6)
+    trial, step, A = np.empty(n), np.empty(n), np.empty((n, n))
+    far, angle = _linearize(dh, rotation, position, q, J, error)
     square = far * far + angle * angle
-    cost = square
-    for i in range(n):
-        cost += pull * (q[i] - near[i]) ** 2
+    cost = square + pull * np.sum((q - near) ** 2)
     damping = 1.0
     for _ in range(iterations):
         if damping > 1e12 or (pull == 0.0 and square < 1e-30):
             break
+        _normal_matrix(J, pull + damping * square + 1e-15, A)
         for i in range(n):
             step[i] = pull * (near[i] - q[i])
             for k in range(6):
                 step[i] += J[k, i] * error[k]
-            for j in range(i + 1):
-                A[i, j] = 0.0
-                for k in range(6):
-                    A[i, j] += J[k, i] * J[k, j]
-            A[i, i] += pull + damping * square + 1e-15
         solve_in_place(A, step)
-        largest = 0.0
-        for i in range(n):
-            trial[i] = q[i] + step[i]
-            largest = max(largest, abs(step[i]))
-        kinematics_into(dh, NO_TOOL_ROTATION, NO_TOOL_POSITION, trial, now, place, J)
-        far, angle = pose_error(rotation, position, now, place, error)
+        trial[:] = q + step
+        far, angle = _linearize(dh, rotation, position, trial, J, error)
         trial_square = far * far + angle * angle
-        trial_cost = trial_square
-        for i in range(n):
-            trial_cost += pull * (trial[i] - near[i]) ** 2
+        trial_cost = trial_square + pull * np.sum((trial - near) ** 2)
         if trial_cost < cost:
             stalled = trial_cost > cost * (1.0 - 1e-9)
             q[:] = trial
             square, cost = trial_square, trial_cost
             damping = max(0.1 * damping, 1e-6)
-            if stalled or largest < 1e-15:
+            if stalled:
                 break
-            continue
-        if largest < 1e-13:
-            break
-        damping *= 10.0
-        kinematics_into(dh, NO_TOOL_ROTATION, NO_TOOL_POSITION, q, now, place, J)
-        pose_error(rotation, position, now, place, error)
-    kinematics_into(dh, NO_TOOL_ROTATION, NO_TOOL_POSITION, q, now, place, J)
-    far, angle = pose_error(rotation, position, now, place, error)
-    return max(far, angle)
+        else:
+            if np.max(np.abs(step)) < 1e-13:
+                break
+            damping *= 10.0
+            _linearize(dh, rotation, position, q, J, error)
+    return math.sqrt(square)
 
 
 @compiled

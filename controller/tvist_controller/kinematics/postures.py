@@ -24,34 +24,55 @@ from tvist_controller.kinematics.geometry import PARALLEL
 AT_BORDER = 1e-10
 """Distance [m] beyond the reach that counts as rounding, and sine or length [m] below which a joint is free."""
 
+AMPLIFIED = 1e-6
+"""Sine or length [m] below which an angle has the rounding of the pose more than a million times."""
+
+DEFINITE, LOOSE, FREE = 0, 1, 2
+"""No angle is free; one is nearly so and has the rounding of the pose many times; one is free."""
+
+Point = tuple[float, float]
+Vector = tuple[float, float, float]
+Triangles = tuple[float, float, float, float]
+
 
 @compiled
-def elbow(upper: float, forearm: float, x: float, y: float, slack: float, free: float) -> tuple[Floats, bool]:
+def freedom_at(length: float) -> int:
+    """Return DEFINITE, LOOSE or FREE for the sine or length that an angle is computed from."""
+    if length < AT_BORDER:
+        return FREE
+    return LOOSE if length < AMPLIFIED else DEFINITE
+
+
+@compiled
+def elbow(
+    upper: float, forearm: float, x: float, y: float, slack: float, free: float
+) -> tuple[Triangles, int]:
     """Solve the triangle of upper arm and forearm for its far end at (x, y).
 
     Returns:
         (θ₂, δ, θ₂', δ'), the angle of the upper arm and the angle from it to the forearm, for the two forms [rad], all
-        of them NaN where there is none; and whether θ₂ is free, and therefore has the value `free`.
+        of them NaN where there is none; and DEFINITE, LOOSE, or FREE if θ₂ is free and therefore has the value `free`.
     """
     square = x * x + y * y
     radius = math.sqrt(square)
     longest, shortest = abs(upper) + abs(forearm), abs(abs(upper) - abs(forearm))
     if not (shortest - slack <= radius <= longest + slack):
-        return (math.nan, math.nan, math.nan, math.nan), False
+        return (math.nan, math.nan, math.nan, math.nan), DEFINITE
     scale = 2.0 * upper * forearm
     cosine = (square - upper * upper - forearm * forearm) / scale
     area = (radius - shortest) * (radius + shortest) * (longest - radius) * (longest + radius)
     sine = math.sqrt(max(area, 0.0)) / abs(scale)
     delta = math.atan2(sine, cosine)
-    if radius < AT_BORDER:
-        return (free, delta, free, delta), True
+    freedom = freedom_at(radius)
+    if freedom == FREE:
+        return (free, delta, free, delta), freedom
     middle = math.atan2(y, x)
     aside = math.atan2(forearm * sine, upper + forearm * cosine)
-    return (middle - aside, delta, middle + aside, -delta), False
+    return (middle - aside, delta, middle + aside, -delta), freedom
 
 
 @compiled
-def postures(arm: Floats, rotation: Floats, position: Floats, free: float, table: Floats) -> bool:
+def postures(arm: Floats, rotation: Floats, position: Floats, free: float, table: Floats) -> int:
     """Compute all postures at a pose.
 
     Args:
@@ -63,7 +84,7 @@ def postures(arm: Floats, rotation: Floats, position: Floats, free: float, table
             any representation, or begins with NaN if there is none.
 
     Returns:
-        Whether an angle is free in one of them.
+        The largest of DEFINITE, LOOSE and FREE that applies to any of them.
     """
     for row in range(8):
         table[row, 0] = math.nan
@@ -84,11 +105,11 @@ def postures(arm: Floats, rotation: Floats, position: Floats, free: float, table
     distance *= s1
     radius = math.hypot(px, py)
     if not (abs(distance) <= radius + AT_BORDER):
-        return False
+        return DEFINITE
     distance = min(max(distance, -radius), radius)
     along = math.sqrt((radius - distance) * (radius + distance))
-    turns = radius < AT_BORDER
-    is_free = turns
+    freedom = freedom_at(radius)
+    turns = freedom == FREE
     for shoulder in range(2):
         if turns:
             q1 = free + math.pi * shoulder
@@ -105,15 +126,15 @@ def postures(arm: Floats, rotation: Floats, position: Floats, free: float, table
         )
         rows = table[4 * shoulder : 4 * shoulder + 4]
         if parallel:
-            is_free |= _parallel(arm, q1, pose, free, rows)
+            freedom = max(freedom, _parallel(arm, q1, pose, free, rows))
         else:
-            is_free |= _spherical(arm, q1, pose, free, rows)
+            freedom = max(freedom, _spherical(arm, q1, pose, free, rows))
         along = -along
-    return is_free
+    return freedom
 
 
 @compiled
-def _parallel(arm: Floats, q1: float, pose: tuple[Floats, Floats, Floats], free: float, rows: Floats) -> bool:
+def _parallel(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: float, rows: Floats) -> int:
     """Compute the four postures of an arm whose axes 2, 3 and 4 are parallel, at one position of its shoulder."""
     (px, py), (xx, xy, xu), (zx, zy, zu) = pose
     e2 = arm[1, 2]
@@ -121,9 +142,10 @@ def _parallel(arm: Floats, q1: float, pose: tuple[Floats, Floats, Floats], free:
     s4, s5 = along * arm[3, 3], arm[4, 3]
     c5 = -s5 * s4 * zu
     sine = math.hypot(zx, zy)
-    is_free = sine < AT_BORDER
+    freedom = freedom_at(sine)
+    straight = freedom == FREE
     slack = AT_BORDER
-    if is_free:
+    if straight:
         q5 = 0.0 if c5 > 0.0 else math.pi
         hx, hy, sine = math.cos(free), math.sin(free), 0.0
     else:
@@ -135,9 +157,9 @@ def _parallel(arm: Floats, q1: float, pose: tuple[Floats, Floats, Floats], free:
     theta4 = math.atan2(hy, hx)
     wx = arm[4, 1] * s4 * hy + arm[3, 0] * hx
     wy = -arm[4, 1] * s4 * hx + arm[3, 0] * hy
-    for wrist in range(1 if is_free else 2):
-        ways, elbow_is_free = elbow(arm[1, 0], arm[6, 1], px - wx, py - wy, slack, free)
-        is_free |= elbow_is_free
+    for wrist in range(1 if straight else 2):
+        ways, triangle = elbow(arm[1, 0], arm[6, 1], px - wx, py - wy, slack, free)
+        freedom = max(freedom, triangle)
         for way in range(2):
             theta2, delta = ways[2 * way], ways[2 * way + 1]
             row = rows[2 * wrist + way]
@@ -148,17 +170,15 @@ def _parallel(arm: Floats, q1: float, pose: tuple[Floats, Floats, Floats], free:
             row[3], row[4], row[5] = along * (theta4 - theta2 - delta), q5, q6
         wx, wy, q5 = -wx, -wy, -q5
         theta4, q6 = theta4 + math.pi, q6 + math.pi
-    return is_free
+    return freedom
 
 
 @compiled
-def _spherical(
-    arm: Floats, q1: float, pose: tuple[Floats, Floats, Floats], free: float, rows: Floats
-) -> bool:
+def _spherical(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: float, rows: Floats) -> int:
     """Compute the four postures of an arm with a spherical wrist, at one position of its shoulder."""
     (px, py), (xx, xy, xu), (zx, zy, zu) = pose
     e2, s3, s4, s5 = arm[1, 2], arm[2, 3], arm[3, 3], arm[4, 3]
-    ways, is_free = elbow(arm[1, 0], arm[6, 1], px, py, AT_BORDER, free)
+    ways, freedom = elbow(arm[1, 0], arm[6, 1], px, py, AT_BORDER, free)
     for way in range(2):
         theta2, delta = ways[2 * way], ways[2 * way + 1]
         if math.isnan(theta2):
@@ -171,9 +191,10 @@ def _spherical(
         wx, wy, wz = c * xx + s * xy, side * xu, up * (c * xy - s * xx)
         c5 = -s5 * s4 * vz
         sine = math.hypot(vx, vy)
-        straight = sine < AT_BORDER
+        wrist_freedom = freedom_at(sine)
+        freedom = max(freedom, wrist_freedom)
+        straight = wrist_freedom == FREE
         if straight:
-            is_free = True
             q4, q5, sine = free, 0.0 if c5 > 0.0 else math.pi, 0.0
             hx, hy = math.cos(free), math.sin(free)
         else:
@@ -185,4 +206,4 @@ def _spherical(
             row = rows[2 * wrist + way]
             row[0], row[1], row[2] = q1, theta2, e2 * (theta3 - theta2)
             row[3], row[4], row[5] = q4 + math.pi * wrist, q5 * (1.0 - 2.0 * wrist), q6 + math.pi * wrist
-    return is_free
+    return freedom
