@@ -43,7 +43,7 @@ def represent(arm: Floats, near: Floats, q: Floats) -> tuple[float, bool]:
 
 
 @compiled
-def all_postures(arm: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats) -> None:
+def all_postures(arm: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats) -> int:
     """Compute all postures in closed form; of a curve of them, the ones nearest to `near`.
 
     Args:
@@ -51,27 +51,22 @@ def all_postures(arm: Floats, rotation: Floats, position: Floats, near: Floats, 
         rotation: Rotation of the flange, shape (3, 3).
         position: Position of the flange, shape (3,) [m].
         near: Joint positions, shape (6,) [rad].
-        table: Result, shape (9, 6) [rad]; rows without posture begin with NaN.
+        table: Result, shape (8, 6) at least [rad]; rows without posture begin with NaN.
+
+    Returns:
+        What `postures` returns.
     """
-    table[8] = math.nan
     freedom = postures(arm, rotation, position, 0.0, table)
-    if freedom == DEFINITE:
-        return
     if freedom == FREE:
         _sample_curves(arm, rotation, position, near, table)
-    # Close to a singularity, rounding of the pose moves postures far apart. From `near`, none is overlooked.
-    posture = near.copy()
-    if descend(arm[:6], rotation, position, near, 0.0, 30, posture) <= ACCURACY:
-        if freedom == FREE:
-            approach(arm[:6], rotation, position, near, posture)
-        table[8] = posture
+    return freedom
 
 
 @compiled
 def _sample_curves(arm: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats) -> None:
     """Compute the postures at many values of the free angle, and move the nearest of each kind along its curve."""
     sample, least = np.empty((8, 6)), np.full(8, math.inf)
-    table[:8] = math.nan
+    table[:8, 0] = math.nan
     for number in range(SAMPLES):
         postures(arm, rotation, position, 2.0 * math.pi * number / SAMPLES, sample)
         for row in range(8):
@@ -97,7 +92,7 @@ def _sample_curves(arm: Floats, rotation: Floats, position: Floats, near: Floats
 def improved_postures(arm: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats) -> None:
     """Compute what `all_postures` does, and improve each by least squares as far as its error is not rounding."""
     all_postures(arm, rotation, position, near, table)
-    for row in range(9):
+    for row in range(8):
         if math.isnan(table[row, 0]):
             continue
         represent(arm, near, table[row])
@@ -106,6 +101,18 @@ def improved_postures(arm: Floats, rotation: Floats, position: Floats, near: Flo
             table[row] = posture
         else:
             table[row, 0] = math.nan
+
+
+@compiled
+def _start_from_near(
+    arm: Floats, rotation: Floats, position: Floats, near: Floats, on_curve: bool, row: Floats
+) -> None:
+    """Find the posture next to `near`: close to a singularity, rounding of the pose moves those of `postures` far."""
+    posture = near.copy()
+    if descend(arm[:6], rotation, position, near, 0.0, 30, posture) <= ACCURACY:
+        if on_curve:
+            approach(arm[:6], rotation, position, near, posture)
+        row[:] = posture
 
 
 @compiled
@@ -123,7 +130,10 @@ def closest(arm: Floats, rotation: Floats, position: Floats, near: Floats, q: Fl
         FOUND, NO_SOLUTION or OUT_OF_RANGE.
     """
     table = np.empty((9, 6))
-    all_postures(arm, rotation, position, near, table)
+    table[8, 0] = math.nan
+    freedom = all_postures(arm, rotation, position, near, table)
+    if freedom != DEFINITE:
+        _start_from_near(arm, rotation, position, near, freedom == FREE, table[8])
     squares, outside = np.empty(9), np.empty(9)
     for row in range(9):
         squares[row] = math.inf

@@ -62,7 +62,7 @@ class InverseKinematics:
         self._closed = bool(self._arm[-1, 0] != ANY)
         span = np.minimum(self._limits, np.pi)
         self._starts = np.random.default_rng(1).uniform(-span, span, (STARTS, description.joints))
-        _compile()
+        _compile(self._closed)
 
     @property
     def closed_form(self) -> bool:
@@ -99,8 +99,8 @@ class InverseKinematics:
     def all(self, rotation: Floats, position: Floats) -> Floats:
         """Return the postures that have a pose, whatever the joints' ranges.
 
-        Where a joint is free, the posture nearest to zero stands for each curve of postures. For a redundant arm, these
-        are examples.
+        Where a joint is free, the postures next to zero stand for the curves of postures. For a redundant arm, the
+        postures are examples.
 
         Args:
             rotation: Rotation of the flange in the base frame, orthonormal, shape (3, 3).
@@ -114,7 +114,7 @@ class InverseKinematics:
         unlimited = self._arm.copy()
         unlimited[:-1, 4] = 2.0 * np.pi
         if self._closed:
-            found = np.empty((9, 6))
+            found = np.empty((8, 6))
             improved_postures(unlimited, rotation, position, zero, found)
         else:
             found = np.empty((2 * STARTS + 2, len(zero)))
@@ -156,16 +156,18 @@ def _distinct(found: Floats) -> Floats:
     return np.array(kept).reshape(len(kept), found.shape[1])
 
 
-def _compile() -> None:
-    """Compile each kernel for arrays of any layout, once: the first call of a method must not take seconds."""
+def _compile(closed_form: bool) -> None:
+    """Compile the kernels for arrays of any layout, once: the first call of a method must not take seconds."""
     table, result = types.Array(float64, 2, "C"), types.Array(float64, 1, "C")
     vector, matrix = (types.Array(float64, axes, "A", readonly=True) for axes in (1, 2))
-    kernels: tuple[tuple[Any, Any], ...] = (
-        (closest, (table, matrix, vector, vector, result)),
-        (improved_postures, (table, matrix, vector, vector, table)),
-        (search, (table, table, matrix, vector, vector, table)),
-    )
+    pose = (matrix, vector)
+    kernels: tuple[tuple[Any, Any], ...] = ((search, (table, table, *pose, vector, table)),)
+    if closed_form:
+        kernels = (
+            (closest, (table, *pose, vector, result)),
+            (improved_postures, (table, *pose, vector, table)),
+        )
     for kernel, signature in kernels:
-        if not kernel.signatures:
+        if signature not in kernel.overloads:
             kernel.compile(signature)
-            kernel.disable_compile()
+            kernel.disable_compile()  # arrays of another type are refused, not compiled for
