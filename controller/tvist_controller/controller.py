@@ -21,9 +21,9 @@ from tvist_controller.instruments.wrench import ToolWrench
 from tvist_controller.motion import MotionControl
 from tvist_controller.motion_commands import MotionCommands
 from tvist_controller.peripherals import Peripherals
-from tvist_controller.planning.basis import PlanBasis
+from tvist_controller.planning.basis import PlanBasis, ToolBasis
 from tvist_controller.planning.filter_planner import PlannedFilter
-from tvist_controller.planning.planner import Plan, Planner
+from tvist_controller.planning.planner import QUESTIONS, Plan, Planner
 from tvist_controller.programs.player import ProgramPlayer
 from tvist_controller.refusal import RefusalError, check_content, check_joints
 from tvist_controller.reporting import Reporter, truth_of
@@ -120,6 +120,7 @@ class Controller:
         return (
             Row(SimulationReset, self._reset),
             Row(SimulationStep, self._check_step, lease="none"),
+            *(Row(kind, lambda call: call.planned(), lease="none") for kind in QUESTIONS),
         )
 
     @property
@@ -148,7 +149,7 @@ class Controller:
     def basis(self) -> PlanBasis:
         """The present state that plans for commands depend on."""
         on = self.filters.basis
-        return PlanBasis(on, self.motion.basis(on))
+        return PlanBasis(on, self.motion.basis(on), ToolBasis(self.motion.tcp, self.cycle.reference))
 
     def receive(self, command: c.Command, plan: Plan | None = None, session: str | None = None) -> Reply:
         """Carry out a command between two ticks. A refused command changes nothing.

@@ -11,6 +11,7 @@ from tvist_controller.paths.tool_curves import PER_RADIAN
 from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.retiming import Cells, RetimedLaw, quickest_law
 from tvist_controller.trajectory.spline import Knots, SplineCurve
+from tvist_plant.plant import PERIOD
 
 FINEST, CELLS = 5e-4, 400
 """Smallest length of a cell [m], and the number of cells that a run is divided into if they are not smaller."""
@@ -18,6 +19,10 @@ MARGIN = 1.01
 """Factor by which a derivative may exceed its samples within a cell [-]."""
 FASTEST = 1e3
 """Factor beyond which a motion is not hurried for its duration, since the joints limit it by far [-]."""
+JOLT_SHARE = 0.3
+"""Share of the joints' jerk that each effect of the curve may use [-]."""
+MOMENTS = 500
+"""Number of moments at which a motion's velocity is looked at."""
 LEAST = 1e-3
 """Smallest derivative that a speed is divided by [-]."""
 CLOSE = 1e-6
@@ -56,18 +61,34 @@ def law_of(run: Run, curve: SplineCurve, limits: JointLimits, jerk: float, windo
         jerk: Largest jerk along the path [m/s^3].
         window: Time over which the shaper mixes moments of the motion [s].
     """
-    softest = limits.jerk / float(curve.bends.slope.max())
+    softest = (1.0 - 2.0 * JOLT_SHARE) * limits.jerk / float(curve.bends.slope.max())
     asked = [piece.pacing.duration for piece in run]
     if not any(asked):
-        return quickest_law(_cells(run, curve, limits, 1.0), min(jerk, softest), window)
+        return _kept(quickest_law(_cells(run, curve, limits, 1.0), min(jerk, softest), window), curve, limits)
     law = quickest_law(_cells(run, curve, limits, 1.0), softest, window)
     if not all(asked):
-        return law
+        return _kept(law, curve, limits)
     wanted, hurry = sum(_share(piece) for piece in run), 1.0
     while law.duration > wanted * (1.0 + CLOSE) and hurry < FASTEST:
         hurry *= 1.05 * law.duration / wanted
         law = quickest_law(_cells(run, curve, limits, hurry), softest, window)
-    return law.slowed(wanted)
+    return _kept(law.slowed(wanted), curve, limits)
+
+
+def _kept(law: RetimedLaw, curve: SplineCurve, limits: JointLimits) -> RetimedLaw:
+    """The law, slowed down by the per mille by which limits may be exceeded between the samples of a cell."""
+    s, sd, sdd = law.states(np.arange(0.0, law.duration, PERIOD))
+    _, slope, second = curve.derivatives(s)
+    qd = np.abs(slope * sd[:, None])
+    qdd = np.abs(slope * sdd[:, None] + second * (sd**2)[:, None])
+    excess = max(float((qd / limits.velocity).max()), float(np.sqrt((qdd / limits.acceleration).max())))
+    return law.slowed(law.duration * max(excess, 1.0))
+
+
+def fastest(law: RetimedLaw, curve: SplineCurve) -> float:
+    """Largest velocity of any joint in a motion at full rate [rad/s]."""
+    s, sd, _ = law.states(np.linspace(0.0, law.duration, MOMENTS))
+    return float(np.abs(curve.derivatives(s)[1] * sd[:, None]).max())
 
 
 def _share(piece: Piece) -> float:
@@ -90,14 +111,19 @@ def _cells(run: Run, curve: SplineCurve, limits: JointLimits, hurry: float) -> C
         tool_p.append(along / (hurry**2 * pacing.acceleration))
         tool_q.append(bent / (hurry**2 * pacing.acceleration))
     places = np.concatenate(edges)
-    slope, second = (_largest(np.abs(values)) for values in curve.derivatives(_looks(places))[1:])
-    fastest = np.minimum(np.concatenate(speeds), (limits.velocity / np.maximum(slope, 1e-9)).min(axis=1))
+    looks = _looks(places)
+    slope, second = (_largest(np.abs(values)) for values in curve.derivatives(looks)[1:])
+    bend, jolt = second.max(axis=1), _largest(np.abs(curve.third(looks))).max(axis=1)
+    fastest = np.minimum(np.concatenate(speeds), (limits.velocity / np.maximum(slope, LEAST)).min(axis=1))
+    fastest = np.minimum(fastest, np.cbrt(JOLT_SHARE * limits.jerk / np.maximum(jolt, LEAST)))
+    # Joints jerk by the third derivative times ṡ³, by 3 q'' ṡ s̈, and by q' s⃛: the first two take a share each.
+    bent = 3.0 * bend * fastest / (JOLT_SHARE * limits.jerk)
     p, q = slope / limits.acceleration, second / limits.acceleration
     return Cells(
         places,
         fastest,
-        np.column_stack((p, np.concatenate(tool_p))),
-        np.column_stack((q, np.concatenate(tool_q))),
+        np.column_stack((p, np.concatenate(tool_p), bent)),
+        np.column_stack((q, np.concatenate(tool_q), np.zeros(len(bent)))),
     )
 
 

@@ -2,18 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from tvist_controller.paths.by_length import EvenBlend, evenly
 from tvist_controller.paths.legs import JointWay, Leg, Pacing
 from tvist_controller.paths.tool_curves import ToolBlend, ToolPart, ToolState
-from tvist_controller.paths.tracking import Tracker
+from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.spline import Knots, hermite
 
 INSIDE, CLOSE = 1.0 + 1e-9, 1e-6
 """Factor by which rounding, and length by which the joints' interpolation, may exceed a blend's radius [-, m]."""
+SAME = 1e-9
+"""Difference between postures that is rounding [rad]."""
 SHARPEST = 0.15
 """Smallest ratio of a blend's chord to its radius for its length; it is 0 where the tool goes back as it came [-]."""
 SHRINK, TRIES = 0.85, 12
@@ -61,18 +64,18 @@ def runs_of(legs: Sequence[Leg], tracker: Tracker) -> tuple[list[Run], list[str]
         The runs, and a sentence for each blend that is left out.
 
     Raises:
-        WayError: The joints cannot follow a blend.
+        WayError: The joints cannot follow the path; beside a singular posture two ways lead on from it.
     """
     runs, skipped, begun = [Run()], list[str](), 0.0
+    cut: _Cut | None
     for number, leg in enumerate(legs):
         cut, length = None, leg.way.length
         if leg.blend > 0.0 and number + 1 < len(legs):
-            cut = _cut(leg, legs[number + 1], length - begun, tracker)
-            if cut is None:
-                skipped.append(
-                    f"{leg.where}: the blend of {leg.blend:g} m does not fit between those beside it and the ends "
-                    "of its parts, so the arm stops there"
-                )
+            found = _cut(leg, legs[number + 1], length - begun, tracker)
+            if isinstance(found, str):
+                skipped.append(f"{leg.where}: the blend of {leg.blend:g} m {found}, so the arm stops there")
+            else:
+                cut = found
         end = length - (0.0 if cut is None else cut.before)
         if end - begun > 1e-9 * length:
             runs[-1].append(_rest_of(leg, begun, end, runs[-1], tracker))
@@ -82,6 +85,10 @@ def runs_of(legs: Sequence[Leg], tracker: Tracker) -> tuple[list[Run], list[str]
         else:
             runs[-1].append(cut.piece)
             begun = cut.after
+    for run in runs:
+        for one, other in pairwise(run):
+            if np.abs(one.knots.q[-1] - other.knots.q[0]).max() > SAME:
+                raise WayError(0.0, tracker.pose(one.knots.q[-1]), one.knots.q[-1])
     return [run for run in runs if run], skipped
 
 
@@ -93,22 +100,25 @@ def _rest_of(leg: Leg, start: float, end: float, before: Run, tracker: Tracker) 
     return Piece(tracker.follow(ToolPart(leg.way, start, end), q), leg.pacing, None, False, leg.where)
 
 
-def _cut(leg: Leg, then: Leg, left: float, tracker: Tracker) -> _Cut | None:
-    """The blend between two legs; None if it does not fit."""
+def _cut(leg: Leg, then: Leg, left: float, tracker: Tracker) -> _Cut | str:
+    """The blend between two legs, or why there is none."""
     radius = leg.blend
     for _ in range(TRIES):
         before = _within(leg, radius, tracker, from_end=True)
         after = _within(then, radius, tracker, from_end=False)
         if before > left * INSIDE or after > then.way.length * INSIDE:
-            return None
+            return "does not fit between those beside it and the ends of its parts"
         before, after = min(before, left), min(after, then.way.length)
-        piece = _blend(leg, then, before, after, tracker)
+        try:
+            piece = _blend(leg, then, before, after, tracker)
+        except WayError:
+            return "passes a singular posture"
         postures = _middle(piece.knots)
         off = [np.linalg.norm(tracker.pose(q).position - leg.corner.position) for q in postures]
         if max(off) <= leg.blend * INSIDE + CLOSE:
             return _Cut(before, after, piece)
         radius *= SHRINK
-    return None
+    return "cannot keep to its radius"
 
 
 def _blend(leg: Leg, then: Leg, before: float, after: float, tracker: Tracker) -> Piece:
@@ -134,7 +144,8 @@ def _rounding(leg: Leg, start: ToolState, end: ToolState) -> float:
     chord = float(np.linalg.norm(places[1] - places[0]))
     if away <= 0.0:
         return 1.0
-    return 0.625 * max(2.0 * chord / away, SHARPEST) ** 0.55
+    ratio = max(2.0 * chord / away, SHARPEST)
+    return float(0.625 * ratio**0.55)
 
 
 def _joints(leg: Leg, s: float, near: Floats, tracker: Tracker) -> tuple[Floats, Floats, Floats]:

@@ -56,9 +56,19 @@ class MotionBasis(Struct, frozen=True, eq=False, gc=False):
         )
 
 
+class ToolBasis(NamedTuple):
+    """The state that answers about the tool's kinematics depend on."""
+
+    tcp: tuple[float, ...]
+    """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
+    q: Floats
+    """The present reference, shape (n,) [rad]: an answer may be about one that has passed meanwhile."""
+
+
 class PlanBasis(NamedTuple):
     """The state that any plan depends on."""
 
     filter: FilterBasis
     motion: MotionBasis | None
-    """Basis of a point-to-point motion; None while none may begin."""
+    """Basis of a planned motion; None while none may begin."""
+    tool: ToolBasis

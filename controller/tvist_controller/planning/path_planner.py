@@ -6,7 +6,7 @@ import numpy as np
 
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.paths.legs import JointWay, Leg, Pacing
-from tvist_controller.paths.pacing import JointLimits, joined, law_of, timed
+from tvist_controller.paths.pacing import JointLimits, fastest, joined, law_of, timed
 from tvist_controller.paths.poses import Placement, placement
 from tvist_controller.paths.route import Run, runs_of
 from tvist_controller.paths.tool_curves import PER_RADIAN, SHORTEST, ToolArc, ToolCurve, ToolLine
@@ -46,11 +46,14 @@ class PathPlanner:
         setup: Initial setup.
         filters: Creates its filters.
         moves: Plans its point-to-point motions, and checks motions of any kind.
+        reachable: Says why a path cannot be followed.
     """
 
-    def __init__(self, setup: Setup, filters: FilterPlanner, moves: MovePlanner) -> None:
+    def __init__(
+        self, setup: Setup, filters: FilterPlanner, moves: MovePlanner, reachable: Reachable
+    ) -> None:
         self._description, self._filters, self._moves = setup.description, filters, moves
-        self._reachable = Reachable(setup.description)
+        self._reachable = reachable
 
     def plan(self, command: MoveL | MoveC | MovePath, basis: MotionBasis) -> PlannedMove:
         """Plan a motion from rest; the command's content has been checked.
@@ -63,23 +66,23 @@ class PathPlanner:
         try:
             runs, skipped = runs_of(legs, tracker)
         except WayError as error:
-            raise self._reachable.refusal(error, "", legs[0].where, basis.tcp) from error
+            raise self._reachable.refusal(error, "segments", 1.0, legs[-1].corner, basis.tcp) from error
         if not runs:
             runs = [[]]
         length = sum(float(piece.knots.s[-1]) for run in runs for piece in run)
         tvist, done, motions = self._filters.present(basis.filter), 0.0, list[PlannedMotion]()
-        window = 0.0
+        window = velocity = 0.0
         for run in runs:
-            motion, delay = self._motion(run, command.jerk, tvist, basis)
+            motion, delay, highest = self._motion(run, command.jerk, tvist, basis)
+            velocity = max(velocity, highest)
             self._moves.check_clear(motion, basis, _shares(run, done, length))
             motions.append(motion)
             window = max(window, delay)
             done += sum(float(piece.knots.s[-1]) for piece in run)
-        fastest = max(_fastest(motion) for motion in motions)
         excess = [self._moves.excess_of_torque(motion, basis) for motion in motions]
         return PlannedMove(
             tuple(motions),
-            fastest,
+            velocity,
             next((one for one in excess if one is not None), None),
             tuple(skipped),
             window,
@@ -127,8 +130,8 @@ class PathPlanner:
         try:
             knots = tracker.follow(way, q)
         except WayError as error:
-            share = f"{100.0 * error.s / way.length:.0f} % of the way"
-            raise self._reachable.refusal(error, share, field, basis.tcp) from error
+            goal, share = way.at(way.length).pose, error.s / way.length
+            raise self._reachable.refusal(error, field, share, goal, basis.tcp) from error
         self._check_range(knots.s / way.length, knots.q, field)
         end: Floats = knots.q[-1]
         return end
@@ -151,21 +154,23 @@ class PathPlanner:
 
     def _motion(
         self, run: Run, jerk: float, tvist: Filter, basis: MotionBasis
-    ) -> tuple[PlannedMotion, float]:
+    ) -> tuple[PlannedMotion, float, float]:
+        """A motion, the delay of the shaper on it [s], and the largest velocity of a joint [rad/s]."""
         limits, spared = self._description.limits, 1.0 - basis.excess
         if not run:  # the arm is there already
             rest = MotionLimits(min(limits.velocity), min(limits.acceleration), min(limits.jerk))
-            return quickest_motion(JointLine(basis.q, basis.q), rest, PERIOD, basis.speed), 0.0
+            return quickest_motion(JointLine(basis.q, basis.q), rest, PERIOD, basis.speed), 0.0, 0.0
         knots = joined(run)
+        self._check_range(knots.s / knots.s[-1], knots.q, run[0].where)
         acceleration = np.array(limits.acceleration) * spared
         curve = SplineCurve(knots, acceleration)
         delay = self._delay(curve, tvist)
         peak = tvist.peak
         joints = JointLimits(np.array(limits.velocity) / peak, acceleration / peak**2, min(limits.jerk))
         law = law_of(run, curve, joints, jerk, delay)
-        motion = PlannedMotion(curve, law, PERIOD)
-        rate = rate_of(basis.speed, _fastest(motion), basis.slowest)
-        return PlannedMotion(curve, law, PERIOD, rate), delay
+        highest = fastest(law, curve)
+        rate = rate_of(basis.speed, highest, basis.slowest)
+        return PlannedMotion(curve, law, PERIOD, rate), delay, highest
 
     @staticmethod
     def _delay(curve: SplineCurve, tvist: Filter) -> float:
@@ -213,11 +218,6 @@ def _pacing(segment: Segment) -> Pacing:
             return Pacing(segment.velocity, segment.acceleration, segment.duration)
         case ProcessSegment() | ArcSegment():
             return Pacing(segment.velocity, segment.acceleration, even=True)
-
-
-def _fastest(motion: PlannedMotion) -> float:
-    """Largest velocity of any joint in a motion at full rate [rad/s]."""
-    return max(float(np.abs(qd).max()) for _, qd, _ in motion.states(100))
 
 
 def _shares(run: Run, done: float, length: float) -> tuple[float, float]:

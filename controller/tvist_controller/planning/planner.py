@@ -2,31 +2,39 @@
 
 from dataclasses import dataclass
 
-from tvist_controller.planning.basis import FilterBasis, MotionBasis, PlanBasis
+from tvist_controller.planning.basis import FilterBasis, MotionBasis, PlanBasis, ToolBasis
 from tvist_controller.planning.filter_planner import FilterPlanner, PlannedFilter
 from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
 from tvist_controller.planning.path_planner import PathPlanner
+from tvist_controller.planning.reachable import Reachable
 from tvist_controller.refusal import RefusalError, check_content, payload_of
 from tvist_controller.setup import Setup
 from tvist_protocol import commands as c
+from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
 from tvist_protocol.motions import MoveC, MoveL, MovePath
+from tvist_protocol.replies import Posture, ToolPose
 from tvist_protocol.simulation import SimulationReset
 from tvist_shaping.base import Filter
 
-PLANNED = (c.MoveJ, MoveL, MoveC, MovePath, c.SetShaper, c.SetEstimator, c.SetPayload, SimulationReset)
-"""Commands that are planned."""
 MOTIONS = (c.MoveJ, MoveL, MoveC, MovePath)
-"""Those of them that are planned on the state at rest."""
+"""Commands for motions, which are planned on the state at rest."""
+QUESTIONS = (InverseKinematics, ForwardKinematics)
+"""Questions about the tool's kinematics."""
+PLANNED = (*MOTIONS, *QUESTIONS, c.SetShaper, c.SetEstimator, c.SetPayload, SimulationReset)
+"""Commands that are planned."""
+
+Found = PlannedMove | PlannedFilter | Filter | Posture | ToolPose | None
+"""What a plan may contain; None if nothing has to change."""
 
 
 @dataclass(frozen=True)
 class Plan:
     """The outcome of a command, valid while the state that it was planned on holds."""
 
-    basis: FilterBasis | MotionBasis | None
+    basis: FilterBasis | MotionBasis | ToolBasis | None
     """State that it was planned on; None if no point-to-point motion may begin."""
-    found: PlannedMove | PlannedFilter | Filter | RefusalError | None
-    """What was planned, or why the command is refused; None if nothing has to change."""
+    found: Found | RefusalError
+    """What was planned, or why the command is refused."""
 
     def holds(self, now: PlanBasis) -> bool:
         """Return whether the plan is valid for the present state."""
@@ -35,6 +43,8 @@ class Plan:
                 return now.motion is None
             case FilterBasis() as planned:
                 return planned == now.filter
+            case ToolBasis() as planned:
+                return planned.tcp == now.tool.tcp
             case planned:
                 return now.motion is not None and planned.agrees(now.motion)
 
@@ -50,27 +60,39 @@ class Planner:
         self._description = setup.description
         self.filters = FilterPlanner(setup)
         self._moves = MovePlanner(setup, self.filters)
-        self._paths = PathPlanner(setup, self.filters, self._moves)
+        self._reachable = Reachable(setup.description)
+        self._paths = PathPlanner(setup, self.filters, self._moves, self._reachable)
 
     def plan(self, command: c.Command, basis: PlanBasis) -> Plan:
         """Plan a command; a refusal is a plan, too."""
-        on = basis.motion if isinstance(command, MOTIONS) else basis.filter
+        on: FilterBasis | MotionBasis | ToolBasis | None = basis.filter
+        if isinstance(command, MOTIONS):
+            on = basis.motion
+        elif isinstance(command, QUESTIONS):
+            on = basis.tool
         try:
-            return Plan(on, self._find(command, basis))
+            check_content(command, self._description)
+            return Plan(on, self._find(command, on))
         except RefusalError as refusal:
             return Plan(on, refusal)
 
-    def _motion(self, command: c.MoveJ | MoveL | MoveC | MovePath, basis: MotionBasis) -> PlannedMove:
-        if isinstance(command, c.MoveJ):
-            return self._moves.move(command, basis)
-        return self._paths.plan(command, basis)
+    def _find(self, command: c.Command, on: FilterBasis | MotionBasis | ToolBasis | None) -> Found:
+        match on:
+            case MotionBasis() if isinstance(command, c.MoveJ):
+                return self._moves.move(command, on)
+            case MotionBasis() if isinstance(command, MoveL | MoveC | MovePath):
+                return self._paths.plan(command, on)
+            case ToolBasis() if isinstance(command, InverseKinematics):
+                return self._reachable.posture(command, on)
+            case ToolBasis() if isinstance(command, ForwardKinematics):
+                return self._reachable.pose(command, on)
+            case FilterBasis():
+                return self._filter(command, on)
+        return None
 
-    def _find(self, command: c.Command, basis: PlanBasis) -> PlannedMove | PlannedFilter | Filter | None:
-        check_content(command, self._description)
-        on, filters = basis.filter, self.filters
+    def _filter(self, command: c.Command, on: FilterBasis) -> PlannedFilter | Filter | None:
+        filters = self.filters
         match command:
-            case c.MoveJ() | MoveL() | MoveC() | MovePath():
-                return None if basis.motion is None else self._motion(command, basis.motion)
             case c.SetShaper():
                 return filters.choose(command.name, command.modes, on.source, on.declared, "name")
             case c.SetEstimator():

@@ -17,6 +17,9 @@ import numpy as np
 from tvist_controller._compiled import compiled
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 
+SHORTLY = 1e-9
+"""Time before and after a change of the acceleration at which it is looked at [s]."""
+
 
 @dataclass(frozen=True)
 class Cells:
@@ -98,30 +101,28 @@ class RetimedLaw:
 
     def __init__(self, edges: Floats, b: Floats, ramp: float, rate: float = 1.0) -> None:
         self._edges, self._b, self._ramp, self._rate = edges, b, ramp, rate
-        speeds = np.sqrt(b)
-        lengths = np.diff(edges)
-        times = arrivals(edges, b)
+        speeds, times = np.sqrt(b), arrivals(edges, b)
         spans = np.diff(times)
-        accelerations = 0.5 * np.diff(b) / lengths
+        accelerations = 0.5 * np.diff(b) / np.diff(edges)
         areas = np.cumsum(spans * (edges[:-1] + spans * (speeds[:-1] / 2.0 + spans * accelerations / 6.0)))
-        self._times, self._last = times.tolist(), len(lengths) - 1
-        self._pieces = list(
-            zip(
-                [0.0, *areas[:-1].tolist()],
-                edges.tolist(),
-                speeds.tolist(),
-                accelerations.tolist(),
-                strict=False,
-            )
-        )
-        self._end = float(areas[-1]), float(edges[-1])
-        self.duration = (self._times[-1] + ramp) / rate
+        # The motion before the mean: its integral, s, ṡ and s̈ when each cell begins; before the first and behind the
+        # last, it is at rest.
+        self._times = np.concatenate(([-np.inf], times))
+        self._begun = np.concatenate(([0.0], times))
+        self._pieces = np.zeros((4, len(edges) + 1))
+        self._pieces[:, 1:-1] = np.concatenate(([0.0], areas[:-1])), edges[:-1], speeds[:-1], accelerations
+        self._pieces[:2, -1] = areas[-1], edges[-1]
+        self._rows = list(zip(self._begun.tolist(), *self._pieces.tolist(), strict=True))
+        self._starts = self._times.tolist()
+        self.duration = float(times[-1] + ramp) / rate
         """Duration from rest to rest [s]."""
-        braking = np.flatnonzero(accelerations < 0.0)
-        self.brakes_at = self._times[int(braking[0])] / rate
+        braking = int(np.flatnonzero(accelerations < 0.0)[0])
+        self.brakes_at = float(times[braking]) / rate
         """Time at which it begins to slow down [s]."""
+        changes = np.concatenate((times + SHORTLY, times + ramp - SHORTLY))
+        jerk = float(np.abs(self._before(changes)[3] - self._before(changes - ramp)[3]).max()) / ramp
         most = float(np.abs(accelerations).max())
-        self.limits = MotionLimits(float(speeds.max()) * rate, most * rate**2, self._harshest() * rate**3)
+        self.limits = MotionLimits(float(speeds.max()) * rate, most * rate**2, jerk * rate**3)
         """Limits that it keeps."""
 
     def slowed(self, duration: float) -> "RetimedLaw":
@@ -133,33 +134,29 @@ class RetimedLaw:
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
         """Parameter, its velocity [1/s] and its acceleration [1/s^2] at a time [s]."""
         rate, ramp = self._rate, self._ramp
-        late, early = self._before(time * rate), self._before(time * rate - ramp)
-        s, sd, sdd = ((after - before) / ramp for after, before in zip(late[:3], early[:3], strict=True))
+        late, early = self._moment(time * rate), self._moment(time * rate - ramp)
+        s, sd, sdd = ((after - before) / ramp for after, before in zip(late, early, strict=True))
         return [s], [sd * rate], [sdd * rate * rate]
 
-    def _before(self, time: float) -> tuple[float, float, float, float]:
-        """∫s, s, ṡ and s̈ of the motion before the mean."""
-        if time <= 0.0:
-            return 0.0, 0.0, 0.0, 0.0
-        if time >= self._times[-1]:
-            area, length = self._end
-            return area + length * (time - self._times[-1]), length, 0.0, 0.0
-        number = min(bisect_right(self._times, time) - 1, self._last)
-        area, s, sd, sdd = self._pieces[number]
-        t = time - self._times[number]
-        return (
-            area + t * (s + t * (sd / 2.0 + t * sdd / 6.0)),
-            s + t * (sd + 0.5 * t * sdd),
-            sd + t * sdd,
-            sdd,
-        )
+    def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
+        """Evaluate `at` at k times [s]; each result has shape (k,)."""
+        rate, ramp = self._rate, self._ramp
+        s, sd, sdd = (self._before(times * rate) - self._before(times * rate - ramp))[:3] / ramp
+        return s, sd * rate, sdd * rate**2
 
-    def _harshest(self) -> float:
-        """Largest jerk at full rate."""
-        moments = [time + shift for time in self._times for shift in (1e-9, self._ramp - 1e-9)]
-        return (
-            max(abs(self._before(time)[3] - self._before(time - self._ramp)[3]) for time in moments)
-            / self._ramp
+    def _moment(self, time: float) -> tuple[float, float, float]:
+        """∫s, s and ṡ of the motion before the mean."""
+        begun, area, s, sd, sdd = self._rows[bisect_right(self._starts, time) - 1]
+        t = time - begun
+        return area + t * (s + t * (sd / 2.0 + t * sdd / 6.0)), s + t * (sd + 0.5 * t * sdd), sd + t * sdd
+
+    def _before(self, times: Floats) -> Floats:
+        """∫s, s, ṡ and s̈ of the motion before the mean, shape (4, k)."""
+        numbers = np.searchsorted(self._times, times, side="right") - 1
+        t = times - self._begun[numbers]
+        area, s, sd, sdd = self._pieces[:, numbers]
+        return np.array(
+            (area + t * (s + t * (sd / 2.0 + t * sdd / 6.0)), s + t * (sd + 0.5 * t * sdd), sd + t * sdd, sdd)
         )
 
 

@@ -110,6 +110,11 @@ class SplineCurve(Curve):
         self._second, self._third = ENOUGH * sizes[2].max(axis=1), ENOUGH * sizes[3].max(axis=1)
         super().__init__(float(knots.s[-1]), self._bends(0, len(lengths)), most)
 
+    def third(self, s: Floats) -> Floats:
+        """Return d³q/ds³ at k points, shape (k, n); it may have steps at the knots."""
+        third: Floats = self._evaluate(s)[3]
+        return third
+
     def derivatives(self, s: Floats) -> tuple[Floats, Floats, Floats]:
         """Evaluate the spline."""
         q, slope, second, _ = self._evaluate(s)
