@@ -22,6 +22,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.info import Clock
 from tvist_protocol.replies import Accepted, Refused, Reply
 from tvist_protocol.stream import Event
+from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload as Declared
 
 CLIENT, SESSION = "searcher", "5e55"
@@ -135,9 +136,10 @@ class Subject:
 
     @property
     def resting(self) -> bool:
-        """Whether the shaped reference stands still, at rest or paused."""
-        q = self.references
-        cycle = self.controller.cycle
+        """Whether the shaped reference stands still, at rest or paused, and no part of its motion will follow."""
+        q, cycle, motion = self.references, self.controller.cycle, self.controller.motion
+        if motion.activity is Activity.MOVING and motion.motions.coming:
+            return False
         still = len(q) > 2 and max(np.abs(q[-1] - q[-2]).max(), np.abs(q[-2] - q[-3]).max()) <= STILL
         return cycle.at_rest or (still and cycle.trajectory.standing)
 
