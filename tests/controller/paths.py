@@ -75,7 +75,7 @@ class Progress:
             now = self.covered[-1] if begun is None else float(begun + cycle.along.position[0])
             self.covered.append(max(now, self.covered[-1]) if begun is None else now)
 
-    def until_rest(self, most: int = 60_000) -> None:
+    def until_rest(self, most: int = 500_000) -> None:
         while not self.robot.resting:
             self.tick()
             assert len(self.covered) < most, "the motion does not end"

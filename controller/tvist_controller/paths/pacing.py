@@ -68,7 +68,7 @@ def law_of(run: Run, curve: SplineCurve, limits: JointLimits, jerk: float, windo
     law = quickest_law(_cells(run, curve, limits, 1.0), softest, window)
     if not all(asked):
         return _kept(law, curve, limits)
-    wanted, hurry = sum(_share(piece) for piece in run), 1.0
+    wanted, hurry = sum({piece.where: piece.pacing.duration or 0.0 for piece in run}.values()), 1.0
     while law.duration > wanted * (1.0 + CLOSE) and hurry < FASTEST:
         hurry *= 1.05 * law.duration / wanted
         law = quickest_law(_cells(run, curve, limits, hurry), softest, window)
@@ -89,11 +89,6 @@ def fastest(law: RetimedLaw, curve: SplineCurve) -> float:
     """Largest velocity of any joint in a motion at full rate [rad/s]."""
     s, sd, _ = law.states(np.linspace(0.0, law.duration, MOMENTS))
     return float(np.abs(curve.derivatives(s)[1] * sd[:, None]).max())
-
-
-def _share(piece: Piece) -> float:
-    """Time that a piece has of the duration that was asked for [s]."""
-    return 1.5 * float(piece.knots.s[-1]) / piece.pacing.velocity
 
 
 def _cells(run: Run, curve: SplineCurve, limits: JointLimits, hurry: float) -> Cells:

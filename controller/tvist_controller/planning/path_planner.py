@@ -35,6 +35,8 @@ from tvist_shaping.base import Filter
 
 POSTURES = 9
 """Number of postures of a run at which the shaper's delay is looked up."""
+SPARED = 0.995
+"""Share of the joints' limits that paths use, since a shaper whose weights vary may exceed its reference a little [-]."""
 VARIATION = 1.1
 """Factor by which the delay may be longer between them [-]."""
 
@@ -166,7 +168,9 @@ class PathPlanner:
         curve = SplineCurve(knots, acceleration)
         delay = self._delay(curve, tvist)
         peak = tvist.peak
-        joints = JointLimits(np.array(limits.velocity) / peak, acceleration / peak**2, min(limits.jerk))
+        joints = JointLimits(
+            SPARED * np.array(limits.velocity) / peak, SPARED * acceleration / peak**2, min(limits.jerk)
+        )
         law = law_of(run, curve, joints, jerk, delay)
         highest = fastest(law, curve)
         rate = rate_of(basis.speed, highest, basis.slowest)

@@ -80,6 +80,9 @@ class Reachable:
                 self._inverse.solve(flange.rotation, flange.position, error.q)
             except InverseKinematicsError as unreachable:
                 return RefusalError(unreachable.code, field, f"{where}: {unreachable}", unreachable.limit)
+        if share == 0.0:
+            why = f"{field}: the arm is in a singular posture, from which it cannot move the tool so: use move_j first"
+            return RefusalError("singular", field, why)
         near = ", ".join(f"{angle:.2f}" for angle in error.q)
         why = f"{at}, the arm passes a singular posture (near [{near}] rad): go round it, or move there with move_j"
         return RefusalError("singular", field, why)

@@ -53,12 +53,14 @@ def passes(edges: Floats, highest: Floats, p: Floats, q: Floats) -> Floats:  # p
         twice = 2.0 * (edges[number + 1] - edges[number])
         for row in range(rows):
             share = p[number, row] / twice
-            b[number] = min(b[number], (1.0 + share * b[number + 1]) / (share + q[number, row]))
+            if share + q[number, row] > 0.0:
+                b[number] = min(b[number], (1.0 + share * b[number + 1]) / (share + q[number, row]))
     for number in range(count):
         twice = 2.0 * (edges[number + 1] - edges[number])
         for row in range(rows):
             share = p[number, row] / twice
-            b[number + 1] = min(b[number + 1], (1.0 + share * b[number]) / (share + q[number, row]))
+            if share + q[number, row] > 0.0:
+                b[number + 1] = min(b[number + 1], (1.0 + share * b[number]) / (share + q[number, row]))
     return b
 
 
