@@ -12,8 +12,10 @@ from tvist_controller.planning.planner import Planner
 from tvist_protocol import commands as c
 from tvist_protocol.channels import tag
 from tvist_protocol.codec import encode
+from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
+from tvist_protocol.motions import MoveL
 from tvist_protocol.programs import ProgramStop
-from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.replies import Accepted, Done, Posture, Refused, ToolPose
 from tvist_protocol.values import Payload
 from tvist_server.plan_ahead import MAX_WAITING, PlanAhead
 from tvist_server.reception import Reception
@@ -309,3 +311,39 @@ def test_a_payload_that_no_body_can_be_is_refused_by_what_is_wrong_with_it(shape
     served.ahead.end()
     served.ahead.close()
     assert not caplog.text
+
+
+def test_a_line_planned_beside_is_what_the_controller_would_have_done(served):
+    bent, pose = (0.2, -1.4, 1.7, -1.8, -1.5, 0.3), (-0.5, -0.15, 0.4, 2.2, 2.0, 0.0)
+    states = []
+    for robot in (served, Robot()):
+        send = robot.ask if robot is served else robot.controller.receive
+        token = robot.token
+        assert isinstance(send(c.SimulationReset(token=token, q=bent)), Done)
+        assert isinstance(send(MoveL(token=token, pose=pose)), Accepted)
+        robot.tick(400)
+        states.append([state.target_q for state in (robot.sink if robot is served else robot).states[-400:]])
+    assert states[0] == states[1]
+
+
+def test_a_question_from_anyone_is_answered_and_stays_out_of_the_journal(served):
+    before = len(served.sink.entries)
+    posture = served.ask(ForwardKinematics(q=(0.2, -1.4, 1.7, -1.8, -1.5, 0.3)))
+    assert isinstance(posture, ToolPose)
+    found = served.ask(InverseKinematics(pose=posture.pose, near=(0.0, -1.4, 1.7, -1.8, -1.5, 0.3)))
+    assert isinstance(found, Posture)
+    assert found.q == pytest.approx((0.2, -1.4, 1.7, -1.8, -1.5, 0.3), abs=1e-9)
+    refused = served.ask(InverseKinematics(pose=(9.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
+    assert (refused.code, refused.where) == ("no_solution", "pose")
+    assert len(served.sink.entries) == before
+
+
+def test_whoever_asks_leaves_room_for_commands(served):
+    for _ in range(3 * MAX_WAITING):
+        served.send(ForwardKinematics())
+    served.send(served.of(c.MoveJ, q=tuple(Q2.tolist())))
+    served.serve(3 * MAX_WAITING + 2)
+    kinds = [type(reply) for reply in served.replies[1:]]
+    assert kinds.count(Accepted) == 1
+    assert kinds.count(ToolPose) >= 1
+    assert all(reply.code == "busy" for reply in served.replies if isinstance(reply, Refused))

@@ -8,23 +8,28 @@ from typing import NamedTuple
 
 from tvist_controller.admission import Admitted
 from tvist_controller.host import Host
-from tvist_controller.planning.planner import PLANNED, Plan, Planner
-from tvist_protocol.commands import PowerOff, Stop
+from tvist_controller.planning.basis import PlanBasis
+from tvist_controller.planning.planner import PLANNED, QUESTIONS, Plan, Planner
+from tvist_controller.refusal import RefusalError
+from tvist_protocol.commands import Command, PowerOff, Stop
+from tvist_protocol.motions import StopJ, StopL
 from tvist_protocol.programs import ProgramStop
-from tvist_protocol.replies import Refused, Reply
+from tvist_protocol.replies import Posture, Refused, Reply, ToolPose
 from tvist_server.gateways.base import Answer
 
 log = logging.getLogger(__name__)
 
 MAX_WAITING = 16
 """Commands that may wait to be planned or wait behind one that is being planned."""
+MAX_ASKING = 8
+"""Waiting commands above which a question is refused, so that whoever asks leaves room for who has control."""
 TRIES = 10
 """Number of plans that may become out of date before one is made in the controller's thread."""
 CLOSE_WAIT = 1.0
 """Longest time to finish the current plan at close [s]."""
 
 
-STOPPING = (Stop, PowerOff, ProgramStop)
+STOPPING = (Stop, StopJ, StopL, PowerOff, ProgramStop)
 """Commands that stop the arm."""
 _BUSY = Refused(
     code="busy",
@@ -96,7 +101,8 @@ class PlanAhead:
         stops = isinstance(admitted.command, STOPPING)
         with self._lock:
             waits = self._count > 0 or isinstance(admitted.command, PLANNED)
-            full = self._count >= MAX_WAITING or self._closing
+            most = MAX_ASKING if isinstance(admitted.command, QUESTIONS) else MAX_WAITING
+            full = self._count >= most or self._closing
             if waits and not full:
                 self._count += 1
                 self._queue.put(_Waiting(admitted, _nobody if stops else answer))
@@ -116,6 +122,9 @@ class PlanAhead:
         if self._closing:
             self._post(lambda: waiting.answer(_BUSY))
             return
+        if isinstance(command, QUESTIONS):
+            self._reply(command, waiting.answer)
+            return
         if isinstance(command, PLANNED):
             taken: SimpleQueue[bool] = SimpleQueue()
             for _ in range(TRIES):
@@ -131,6 +140,20 @@ class PlanAhead:
                 if taken.get():
                     return
         self._post(lambda: waiting.answer(self._host.carry_out(waiting.admitted)))
+
+    def _reply(self, question: Command, answer: Answer) -> None:
+        """Answer a question, which anyone may ask: it does not reach the controller or its journal."""
+        present: SimpleQueue[PlanBasis] = SimpleQueue()
+        self._post(lambda: present.put(self._host.controller.basis))
+        try:
+            found = self._planner.plan(question, present.get()).found
+        except Exception:
+            log.exception("a question is refused, since looking for the answer failed")
+            self._post(lambda: answer(_FAILED))
+            return
+        assert isinstance(found, Posture | ToolPose | RefusalError)
+        reply = found.reply if isinstance(found, RefusalError) else found
+        self._post(lambda: answer(reply))
 
     def _take(self, waiting: _Waiting, plan: Plan) -> bool:
         """Carry out a command with its plan, if that still applies; runs in the controller's thread."""
