@@ -30,6 +30,9 @@ from tvist_protocol.stream import EventKind
 from tvist_protocol.transitions import Activity, after
 from tvist_protocol.values import ResetMode
 
+_GUARDED = frozenset({Activity.STREAMING, Activity.ENDING, Activity.GUIDED})
+"""Activities whose next reference may be refused, so that a stop is made instead."""
+
 
 class MotionControl:
     """Starts, monitors and ends motion on the control line. Each motion's number ends in either done or stopped.
@@ -57,9 +60,11 @@ class MotionControl:
         """Collision check of that motion."""
         self._protection = Protection(cycle)
         self.motions = Motions(cycle, self.safety, emit)
-        """Point-to-point motions and their speed."""
+        """Motions by number, and their speed."""
         self.streams = Streaming()
         """The present stream of set-points, if there is one."""
+        self.tcp: tuple[float, ...] = (0.0,) * 6
+        """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
 
     @property
     def streaming(self) -> bool:
@@ -72,7 +77,7 @@ class MotionControl:
         Raises:
             RefusalError: The arm is busy, without power or stopped for safety.
         """
-        self._check("move_j")
+        self.check("move_j")
 
     @property
     def may_move(self) -> bool:
@@ -104,7 +109,7 @@ class MotionControl:
         Raises:
             RefusalError: See `check_move`.
         """
-        self._go("move_j")
+        self.go("move_j")
         return self.motions.begin(planned)
 
     def pause(self) -> None:
@@ -113,7 +118,7 @@ class MotionControl:
         Raises:
             RefusalError: No motion is running.
         """
-        self._go("pause")
+        self.go("pause")
         self.motions.hold()
 
     def resume(self) -> None:
@@ -122,7 +127,7 @@ class MotionControl:
         Raises:
             RefusalError: No motion is paused.
         """
-        self._go("resume")
+        self.go("resume")
         self.motions.release()
 
     @property
@@ -144,7 +149,7 @@ class MotionControl:
         Raises:
             RefusalError: The arm is moving, or is in a protective stop.
         """
-        self._go("power_on" if release_brakes else "power")
+        self.go("power_on" if release_brakes else "power")
 
     def brake(self, why: str) -> None:
         """Stop with category 0: the power is off, and the brakes close at once.
@@ -173,7 +178,7 @@ class MotionControl:
         Raises:
             RefusalError: There is no protective stop, or the arm is still stopping.
         """
-        self._go("unlock_protective_stop")
+        self.go("unlock_protective_stop")
         self._protection.forget()
 
     def recover(self, error: PlantError, seed: int) -> Sample:
@@ -191,11 +196,11 @@ class MotionControl:
         self.cycle.reset(self.cycle.position, seed=seed)
         self._protection.forget()
         if after(self.activity, "plant_failure") is not None:
-            self._go("plant_failure")
+            self.go("plant_failure")
         self._emit("protective_stop", code="plant_failure", why=why)
         return self.cycle.step()
 
-    def _check(self, trigger: str) -> Activity:
+    def check(self, trigger: str) -> Activity:
         """Return the activity that a trigger leads to.
 
         Raises:
@@ -207,8 +212,9 @@ class MotionControl:
         self.safety.check(trigger, self.activity)
         return target
 
-    def _go(self, trigger: str) -> None:
-        self.activity = self._check(trigger)
+    def go(self, trigger: str) -> None:
+        """Carry out the transition of a trigger that `check` accepts."""
+        self.activity = self.check(trigger)
 
     def follow(self, period: float, limits: MotionLimits, now: float) -> None:
         """Start to follow set-points.
@@ -216,7 +222,7 @@ class MotionControl:
         Raises:
             RefusalError: The arm is busy, or the velocity limit is above that of reduced speed.
         """
-        target = self._check("servo_start")
+        target = self.check("servo_start")
         most = self.motions.slowest
         if most is not None and limits.velocity > most:
             why = f"velocity is {limits.velocity:g} rad/s; safety_mode is REDUCED, which allows {most:.3g}"
@@ -239,7 +245,7 @@ class MotionControl:
         if met is not None:
             self.interrupt(f"{met} before the stream came to rest through the filter", "collision")
             return
-        self._go("servo_stop")
+        self.go("servo_stop")
         self.cycle.start(end)
         self._end_stream("servo_stop")
 
@@ -330,10 +336,9 @@ class MotionControl:
             PlantError: The arm's state is no longer finite; call `recover`.
         """
         sample = self.cycle.step()
-        stream = self.streams.stream
-        refused = stream is not None and self.cycle.trajectory is not stream
-        if refused or (self.cycle.stopping and self.activity is Activity.ENDING):
-            self.end("interruption", str(self.ahead.met), "collision")
+        guard = self.cycle.guard
+        if guard is not None and self.cycle.stopping and self.activity in _GUARDED:
+            self.end("interruption", *guard.obstacle)
         if self.cycle.at_rest and self.activity.moving and (target := after(self.activity, "at_rest")):
             self.activity = target
             self.motions.done()

@@ -1,9 +1,11 @@
 """A point-to-point motion in progress: its rate and its pause."""
 
+from typing import Protocol
+
 import numpy as np
 
 from tvist_controller.cycle import STILL, ControlCycle
-from tvist_controller.safety import acceleration_on_way
+from tvist_controller.safety import acceleration_on_way, rate_of
 from tvist_controller.trajectory import PlannedMotion
 
 PAUSE_SHARE = 0.95
@@ -12,18 +14,33 @@ LEAST_PAUSE = 0.2
 """Smallest share of a motion's acceleration that the torque must permit for a pause; else the motion runs on [-]."""
 
 
+class RunningMotion(Protocol):
+    """A motion in progress, whose speed can be changed."""
+
+    @property
+    def rate(self) -> float:
+        """Rate of its time [-]."""
+
+    def pace(self, speed: float, slowest: float | None) -> None:
+        """Change its speed.
+
+        Args:
+            speed: Programmed speed fraction [-].
+            slowest: Velocity limit of reduced speed [rad/s]; None if the speed is not reduced.
+        """
+
+
 class RunningMove:
-    """One motion.
+    """One point-to-point motion.
 
     Args:
-        number: Number of the motion.
         trajectory: Its trajectory, which has just been started on the line.
         velocity: Requested velocity limit [rad/s].
         cycle: The control line.
     """
 
-    def __init__(self, number: int, trajectory: PlannedMotion, velocity: float, cycle: ControlCycle) -> None:
-        self.number, self.velocity = number, velocity
+    def __init__(self, trajectory: PlannedMotion, velocity: float, cycle: ControlCycle) -> None:
+        self._velocity = velocity
         self._trajectory, self._cycle = trajectory, cycle
         self._held = False
 
@@ -32,10 +49,10 @@ class RunningMove:
         """Rate of its time [-]."""
         return self._trajectory.rate
 
-    def go(self, rate: float) -> None:
-        """Change the rate [-], unless the motion is paused."""
+    def pace(self, speed: float, slowest: float | None) -> None:
+        """Change the rate, unless the motion is paused; see `RunningMotion`."""
         if not self._held:
-            self._trajectory.speed = rate
+            self._trajectory.speed = rate_of(speed, self._velocity, slowest)
 
     def hold(self) -> None:
         """Slow down to a standstill within the torque limits, if that takes less time; see `PlannedMotion.hold`."""
@@ -56,8 +73,8 @@ class RunningMove:
             room = most
         self._held = room > LEAST_PAUSE * most and trajectory.hold(min(room, most))
 
-    def release(self, rate: float) -> None:
-        """Resume after a pause, at a rate [-]."""
+    def release(self, speed: float, slowest: float | None) -> None:
+        """Resume after a pause; see `RunningMotion`."""
         if self._held:
-            self._trajectory.release(rate)
+            self._trajectory.release(rate_of(speed, self._velocity, slowest))
         self._held = False
