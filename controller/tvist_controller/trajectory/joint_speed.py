@@ -5,10 +5,14 @@ import numpy as np
 from tvist_controller.trajectory.guided import Guided
 from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
-from tvist_controller.trajectory.speed import HALVINGS, fitting_rates, part_of, rise_within
-
-STEADY = 1e-12
-"""Velocity below which a motion whose time stands still counts as being at rest [rad/s]."""
+from tvist_controller.trajectory.speed import (
+    HALVINGS,
+    STANDING,
+    STEADY,
+    fitting_rates,
+    part_of,
+    rise_within,
+)
 
 
 class JointSpeed(Guided):
@@ -44,8 +48,10 @@ class JointSpeed(Guided):
         self.limits = MotionLimits(limits.velocity, limits.acceleration, 2.0 * limits.acceleration / period)
         """Limits of the reference; the jerk is that of the acceleration changing its sign within a tick."""
         fastest = float(np.abs(qd).max())
+        if fastest <= STANDING:
+            self._qd = qd = np.zeros_like(q)
         self.rate = max(rate, min(fastest / limits.velocity, 1.0))
-        self._u = qd / self.rate if fastest > 0.0 else np.zeros_like(q)
+        self._u = qd / self.rate if fastest > STANDING else qd
         self._goal, self._most = self._u, limits.acceleration
         self._speed, self._slowest = rate, limits.velocity
 
@@ -82,6 +88,7 @@ class JointSpeed(Guided):
     def next(self) -> Floats:
         """Advance by one tick and return the position."""
         if self.finished:
+            self._qdd = np.zeros_like(self._q)
             return self._q
         h, present = self._period, self._qd
         u, rate = self._after(1.0)
@@ -112,7 +119,8 @@ class JointSpeed(Guided):
         u = goal if part == 1.0 else self._u + part * (goal - self._u)
         most = np.full(len(u), share * self._most * h)
         lowest, highest = fitting_rates(-self._qd, u, -most, most)
-        return u, min(max(self._wanted_rate, lowest), highest)
+        # The present rate is among them, but for rounding.
+        return u, min(max(self._wanted_rate, lowest), highest) if lowest <= highest else self.rate
 
     @property
     def finished(self) -> bool:

@@ -8,6 +8,12 @@ from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 HALVINGS = 8
 """Number of times that a change of velocity is halved if the torque does not permit it."""
+STANDING = 1e-6
+"""Velocity below which all joints count as standing where a motion is taken over [rad/s]."""
+STEADY = 1e-12
+"""Velocity below which a motion whose time hardly passes counts as being at rest [rad/s or m/s]."""
+FLAT = 1e-12
+"""Factor of a rate that counts as zero."""
 ROUNDING = 1e-9
 """Share of a tick by which rounding may delay the end of a change [-]."""
 
@@ -33,7 +39,7 @@ def fitting_rates(x: Floats, y: Floats, low: Floats, high: Floats) -> tuple[floa
     """
     lowest, highest = -math.inf, math.inf
     for own, slope, least, most in zip(x.tolist(), y.tolist(), low.tolist(), high.tolist(), strict=True):
-        if slope == 0.0:
+        if abs(slope) < FLAT:
             if not least <= own <= most:
                 return math.inf, -math.inf
             continue

@@ -5,10 +5,16 @@ from typing import Protocol
 import numpy as np
 
 from tvist_controller.trajectory.guided import Guided, StuckError
-from tvist_controller.trajectory.joint_speed import STEADY
 from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
-from tvist_controller.trajectory.speed import HALVINGS, fitting_rates, part_of, rise_within
+from tvist_controller.trajectory.speed import (
+    HALVINGS,
+    STANDING,
+    STEADY,
+    fitting_rates,
+    part_of,
+    rise_within,
+)
 
 BENT_SHARE = 0.5
 """Share of the joints' acceleration that the curvature of their way may use up at a constant speed [-]."""
@@ -82,14 +88,20 @@ class ToolSpeed(Guided):
         q, qd, qdd = (np.array(values, dtype=float) for values in state)
         self._q, self._qd, self._qdd = q, qd, qdd
         self._step = period * (qd - 0.5 * period * qdd)
-        self.kinematics, self._torque = kinematics, torque
+        self.kinematics = kinematics
+        """Kinematics of the tool centre point."""
+        self._torque = torque
         self._arm, self._period = limits, period
         self.limits = MotionLimits(limits.velocity, limits.acceleration, 2.0 * limits.acceleration / period)
         """Limits of the reference; the jerk is that of the acceleration changing its sign within a tick."""
         self._rotation, self._position = kinematics.pose(q)
-        twist, fastest = kinematics.jacobian(q) @ qd, float(np.abs(qd).max())
+        fastest = float(np.abs(qd).max())
+        if fastest <= STANDING:
+            self._qd = qd = np.zeros_like(q)
         self.rate = max(rate, min(fastest / limits.velocity, 1.0))
-        self._u = twist / self.rate if fastest > 0.0 else np.zeros(6)
+        self._u = kinematics.jacobian(q) @ qd
+        if fastest > STANDING:
+            self._u = self._u / self.rate
         self._goal, self._most = self._u, np.full(6, np.inf)
         self._speed, self._slowest = rate, limits.velocity
 
@@ -127,6 +139,7 @@ class ToolSpeed(Guided):
             StuckError: The joints cannot move the tool on in its direction.
         """
         if self.finished:
+            self._step = self._qd = self._qdd = np.zeros_like(self._q)
             return self._q
         share, found = 1.0, None
         for attempt in range(HALVINGS + 1):
