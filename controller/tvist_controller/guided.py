@@ -8,7 +8,7 @@ from tvist_controller.control.differentiator import Floats
 from tvist_controller.control.tool_kinematics import ToolKinematics
 from tvist_controller.motion import MotionControl
 from tvist_controller.refusal import RefusalError
-from tvist_controller.safety import GENTLEST_STOP, StreamTorqueRoom
+from tvist_controller.safety import GENTLEST_STOP, GuidedTorqueRoom
 from tvist_controller.trajectory import Guided, JointSpeed, MotionLimits, Servo, ToolSpeed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.transitions import Activity
@@ -31,7 +31,7 @@ class Guidance:
         limits = motion.cycle.description.limits
         self._limits = MotionLimits(min(limits.velocity), min(limits.acceleration), min(limits.jerk))
         self._reach = np.array(limits.position)
-        self._torque = StreamTorqueRoom(motion.cycle.description, motion.cycle.inverse_dynamics)
+        self._torque = GuidedTorqueRoom(motion.cycle.description, motion.cycle.inverse_dynamics)
         self._tcp, self._kinematics = motion.tcp, ToolKinematics(motion.cycle.description)
 
     def servo(self, q: Floats, lookahead: float, gain: float, *, shaped: bool) -> int:

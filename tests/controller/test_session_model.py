@@ -345,7 +345,7 @@ class Sessions(RuleBasedStateMachine):
     def wait_for_rest(self):
         for _ in range(3000):
             self.tick()
-            if not self.activity.moving or self.activity is Activity.PAUSED:
+            if not self.activity.moving or self.activity in {Activity.PAUSED, Activity.GUIDED}:
                 return
         raise AssertionError(f"{self.activity} for 6 s")
 
@@ -366,6 +366,9 @@ class Sessions(RuleBasedStateMachine):
         elif any(event.code == "limit_torque" for event in events):
             self.told.append("protective_stop")
             self.happen("protective_stop")
+        elif any(event.code in BARRED for event in events):
+            assert self.activity is Activity.GUIDED
+            self.happen("interruption")
         if self.robot.motion.activity is not self.activity:
             assert self.robot.cycle.at_rest
             self.happen("at_rest")
@@ -398,6 +401,8 @@ class Sessions(RuleBasedStateMachine):
         raise AssertionError(f"{self.activity} for 6 s after a stop")
 
 
+BARRED = {"collision", "limit_position", "singular"}
+"""Codes of what may end a guided motion."""
 TOLD = {"lease_lost", "stream_stopped", "protective_stop"}
 
 
