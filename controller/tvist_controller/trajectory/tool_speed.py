@@ -183,7 +183,7 @@ class ToolSpeed(Guided):
         up = np.where(self._qd > 0.0, np.minimum(rise, most), most) * h * h
         down = np.where(self._qd < 0.0, np.minimum(rise, most), most) * h * h
         lowest, highest = fitting_rates(before - self._step, after, -down, up)
-        if lowest > highest or highest < 0.0:
+        if lowest > min(highest, max(self.rate, self._speed)) or highest < 0.0:
             return None
         rate = min(self._wanted(u, share, after / (0.5 * h)), highest)
         rate = max(rate, lowest, 0.0)
