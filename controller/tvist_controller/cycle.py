@@ -10,7 +10,7 @@ from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.control.joint_controllers import JointControllers
 from tvist_controller.control.shaped_reference import ShapedReference
 from tvist_controller.line_filter import LineFilter
-from tvist_controller.look_ahead import LookAhead
+from tvist_controller.look_ahead import LookAhead, Obstacle
 from tvist_controller.safety import StreamTorqueRoom
 from tvist_controller.trajectory import (
     JointLine,
@@ -97,6 +97,8 @@ class ControlCycle:
         """Whether the present motion comes to rest by itself, since no stop is quicker."""
         self.guard: LookAhead | None = None
         """Checks each shaped reference before it is played; if it returns a stop, that is followed instead."""
+        self.refused: Obstacle | None = None
+        """Why the latest reference was not played, so that a stop was made instead; None if it was played."""
         self.reset(q, carried=carried, seed=seed)
         check_measurement(self.standing.measured, description.joints, self._plant)
         # The first steps load compiled code, which takes many ticks; they are made here, and undone.
@@ -117,6 +119,7 @@ class ControlCycle:
 
     def step(self) -> Sample:
         """Compute one tick."""
+        self.refused = None
         try:
             x = self.trajectory.next()  # a path's parameter, or q itself [rad]
         except StuckError as error:
@@ -139,6 +142,7 @@ class ControlCycle:
         assert self.guard is not None, "what may be stuck is guarded"
         stop = self.guard.give_up(str(error))
         self.bypass(stop)
+        self.refused = self.guard.obstacle
         return stop.next()
 
     def _guarded(self, guard: LookAhead, reference: Floats, shaped: Floats) -> tuple[Floats, Floats]:
@@ -147,6 +151,7 @@ class ControlCycle:
         if stop is None:
             return reference, shaped
         self.bypass(stop)
+        self.refused = guard.obstacle
         reference = stop.next()
         return reference, reference
 

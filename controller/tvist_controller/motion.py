@@ -336,9 +336,8 @@ class MotionControl:
             PlantError: The arm's state is no longer finite; call `recover`.
         """
         sample = self.cycle.step()
-        guard = self.cycle.guard
-        if guard is not None and self.cycle.stopping and self.activity in _GUARDED:
-            self.end("interruption", *guard.obstacle)
+        if self.cycle.refused is not None and self.activity in _GUARDED:
+            self.end("interruption", *self.cycle.refused)
         if self.cycle.at_rest and self.activity.moving and (target := after(self.activity, "at_rest")):
             self.activity = target
             self.motions.done()

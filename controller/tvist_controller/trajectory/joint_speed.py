@@ -120,7 +120,10 @@ class JointSpeed(Guided):
         most = np.full(len(u), share * self._most * h)
         lowest, highest = fitting_rates(-self._qd, u, -most, most)
         # The present rate is among them, but for rounding.
-        return u, min(max(self._wanted_rate, lowest), highest) if lowest <= highest else self.rate
+        wanted = self._wanted_rate
+        if wanted == self.rate or lowest > highest:
+            return u, self.rate
+        return u, min(max(wanted, lowest), highest)
 
     @property
     def finished(self) -> bool:
