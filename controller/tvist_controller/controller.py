@@ -17,7 +17,6 @@ from tvist_controller.declared_payload import DeclaredPayload
 from tvist_controller.events import Fields
 from tvist_controller.faults import Faults
 from tvist_controller.filters import Filters
-from tvist_controller.guided import Guidance
 from tvist_controller.guided_commands import GuidedCommands
 from tvist_controller.instruments.wrench import ToolWrench
 from tvist_controller.motion import MotionControl
@@ -77,14 +76,9 @@ class Controller:
         self._planner = Planner(setup)
         source, tvist = self._planner.filters.first()
         self.cycle = ControlCycle(
-            setup.description,
-            tvist,
-            q=np.array(setup.q, dtype=float),
-            declared=body(setup.payload),
-            carried=body(setup.carried or setup.payload),
-            seed=setup.seed,
-            plant=plant,
-        )
+            setup.description, tvist, q=np.array(setup.q, dtype=float), declared=body(setup.payload),
+            carried=body(setup.carried or setup.payload), seed=setup.seed, plant=plant,
+        )  # fmt: skip
         if setup.truth:
             truth_of(self.cycle.plant)  # raises now rather than at the first tick if the plant has no truth
         self._seed = setup.seed
@@ -105,11 +99,11 @@ class Controller:
         self._told_program = self.programs.progress
         self.filters = Filters(self.motion, source, setup.payload, self._emit)
         self._payload = DeclaredPayload(setup.payload, self.motion, self.filters, self._emit)
-        self.peripherals = Peripherals(self._set_tcp)
-        guided = GuidedCommands(Guidance(self.motion), self.programs, setup.description)
+        self.peripherals = Peripherals(self._reporter.set_tcp, self.motion.set_tcp)
         parts = (
-            self._authority, MotionCommands(self.motion, safety, self.programs), guided, self.filters,
-            self._payload, self.peripherals, self._faults, self.programs, self,
+            self._authority, MotionCommands(self.motion, safety, self.programs),
+            GuidedCommands(self.motion, self.programs), self.filters, self._payload, self.peripherals,
+            self._faults, self.programs, self,
         )  # fmt: skip
         self._rows = {row.message: row for part in parts for row in part.rows}
         self.latest = self._state(self.cycle.standing)
@@ -282,11 +276,6 @@ class Controller:
             ValueError: The plant does not provide it.
         """
         return self._reporter.truth(self.tick_number, self.cycle.plant)
-
-    def _set_tcp(self, offset: tuple[float, ...]) -> None:
-        """Pass the tool centre point to whatever depends on it."""
-        self._reporter.set_tcp(offset)
-        self.motion.tcp = offset
 
     def _emit(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
         """Store an event of the tick that is being computed, or of the next one between two ticks."""

@@ -4,9 +4,9 @@ import numpy as np
 
 from tvist_controller.command_row import Call, Row
 from tvist_controller.guided import Guidance
+from tvist_controller.motion import MotionControl
 from tvist_controller.programs.player import ProgramPlayer
 from tvist_controller.refusal import check_content
-from tvist_plant.description import RobotDescription
 from tvist_protocol import motions as m
 from tvist_protocol.replies import Accepted, Reply
 
@@ -15,13 +15,13 @@ class GuidedCommands:
     """Handlers of the commands for guided motions.
 
     Args:
-        guidance: Starts and stops these motions.
+        motion: The robot's motion.
         programs: The program, which ends with every stop.
-        description: The robot.
     """
 
-    def __init__(self, guidance: Guidance, programs: ProgramPlayer, description: RobotDescription) -> None:
-        self._guidance, self._programs, self._description = guidance, programs, description
+    def __init__(self, motion: MotionControl, programs: ProgramPlayer) -> None:
+        self._guidance, self._programs = Guidance(motion), programs
+        self._description = motion.cycle.description
         self.rows = (
             Row(m.ServoJ, self._servo_j),
             Row(m.SpeedJ, self._speed_j),

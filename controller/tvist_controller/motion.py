@@ -30,9 +30,6 @@ from tvist_protocol.stream import EventKind
 from tvist_protocol.transitions import Activity, after
 from tvist_protocol.values import ResetMode
 
-_GUARDED = frozenset({Activity.STREAMING, Activity.ENDING, Activity.GUIDED})
-"""Activities whose next reference may be refused, so that a stop is made instead."""
-
 
 class MotionControl:
     """Starts, monitors and ends motion on the control line. Each motion's number ends in either done or stopped.
@@ -65,6 +62,10 @@ class MotionControl:
         """The present stream of set-points, if there is one."""
         self.tcp: tuple[float, ...] = (0.0,) * 6
         """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
+
+    def set_tcp(self, offset: tuple[float, ...]) -> None:
+        """Set the tool centre point for the motions that begin from now on; see `tcp`."""
+        self.tcp = offset
 
     @property
     def streaming(self) -> bool:
@@ -158,8 +159,7 @@ class MotionControl:
             why: The reason, for people.
         """
         target, plan, cycle = after(self.activity, "brakes"), None, self.cycle
-        if target is not None:
-            self.activity = target
+        self.activity = target or self.activity
         if target is not None and not cycle.at_rest:
             stop = brake(cycle.description, cycle.plant.payload, cycle.newest, PERIOD)
             way = float(np.abs(stop.end - cycle.position).max())
@@ -223,8 +223,7 @@ class MotionControl:
             RefusalError: The arm is busy, or the velocity limit is above that of reduced speed.
         """
         target = self.check("servo_start")
-        most = self.motions.slowest
-        if most is not None and limits.velocity > most:
+        if (most := self.motions.slowest) is not None and limits.velocity > most:
             why = f"velocity is {limits.velocity:g} rad/s; safety_mode is REDUCED, which allows {most:.3g}"
             raise RefusalError("limit_velocity", "velocity", why, most)
         self.activity = target
@@ -336,7 +335,7 @@ class MotionControl:
             PlantError: The arm's state is no longer finite; call `recover`.
         """
         sample = self.cycle.step()
-        if self.cycle.refused is not None and self.activity in _GUARDED:
+        if self.cycle.refused is not None and self.activity is not Activity.STOPPING:
             self.end("interruption", *self.cycle.refused)
         if self.cycle.at_rest and self.activity.moving and (target := after(self.activity, "at_rest")):
             self.activity = target

@@ -15,7 +15,7 @@ SLOWEST = {"velocity": 1e-3, "acceleration": 1e-2, "jerk": 0.1}
 """Lowest accepted limits of a motion; lower ones would make it too slow [rad/s, rad/s^2, rad/s^3]."""
 
 _NOTHING_TO = {
-    "pause": "no motion is running: there is nothing to pause",
+    "pause": "no motion that can be paused is running",
     "resume": "no motion is paused: there is nothing to resume",
     "servo_stop": "no stream is running: send servo_start first",
     "unlock_protective_stop": "there is no protective stop to unlock",
