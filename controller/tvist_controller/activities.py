@@ -13,6 +13,7 @@ PUT: dict[ResetMode, Activity] = {
 _RUNTIME = {
     Activity.MOVING: RuntimeState.PLAYING,
     Activity.STREAMING: RuntimeState.PLAYING,
+    Activity.GUIDED: RuntimeState.PLAYING,
     Activity.ENDING: RuntimeState.PLAYING,
     Activity.PAUSED: RuntimeState.PAUSED,
     Activity.STOPPING: RuntimeState.STOPPING,

@@ -17,6 +17,7 @@ from tvist_controller.declared_payload import DeclaredPayload
 from tvist_controller.events import Fields
 from tvist_controller.faults import Faults
 from tvist_controller.filters import Filters
+from tvist_controller.guided_commands import GuidedCommands
 from tvist_controller.instruments.wrench import ToolWrench
 from tvist_controller.motion import MotionControl
 from tvist_controller.motion_commands import MotionCommands
@@ -75,14 +76,9 @@ class Controller:
         self._planner = Planner(setup)
         source, tvist = self._planner.filters.first()
         self.cycle = ControlCycle(
-            setup.description,
-            tvist,
-            q=np.array(setup.q, dtype=float),
-            declared=body(setup.payload),
-            carried=body(setup.carried or setup.payload),
-            seed=setup.seed,
-            plant=plant,
-        )
+            setup.description, tvist, q=np.array(setup.q, dtype=float), declared=body(setup.payload),
+            carried=body(setup.carried or setup.payload), seed=setup.seed, plant=plant,
+        )  # fmt: skip
         if setup.truth:
             truth_of(self.cycle.plant)  # raises now rather than at the first tick if the plant has no truth
         self._seed = setup.seed
@@ -103,10 +99,11 @@ class Controller:
         self._told_program = self.programs.progress
         self.filters = Filters(self.motion, source, setup.payload, self._emit)
         self._payload = DeclaredPayload(setup.payload, self.motion, self.filters, self._emit)
-        self.peripherals = Peripherals(self._set_tcp)
+        self.peripherals = Peripherals(self._reporter.set_tcp, self.motion.set_tcp)
         parts = (
-            self._authority, MotionCommands(self.motion, safety, self.programs), self.filters, self._payload,
-            self.peripherals, self._faults, self.programs, self,
+            self._authority, MotionCommands(self.motion, safety, self.programs),
+            GuidedCommands(self.motion, self.programs), self.filters, self._payload, self.peripherals,
+            self._faults, self.programs, self,
         )  # fmt: skip
         self._rows = {row.message: row for part in parts for row in part.rows}
         self.latest = self._state(self.cycle.standing)
@@ -305,10 +302,6 @@ class Controller:
         """Plan and start a motion of the program; return its number."""
         self.motion.check_move()
         return self.motion.move(self._found(self._planner.plan(command, self.basis)))
-
-    def _set_tcp(self, offset: tuple[float, ...]) -> None:
-        self._reporter.set_tcp(offset)
-        self.motion.tcp = offset
 
     def _found(self, plan: Plan) -> Any:
         if isinstance(plan.found, RefusalError):

@@ -10,7 +10,7 @@ from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.control.joint_controllers import JointControllers
 from tvist_controller.control.shaped_reference import ShapedReference
 from tvist_controller.line_filter import LineFilter
-from tvist_controller.look_ahead import LookAhead
+from tvist_controller.look_ahead import LookAhead, Obstacle
 from tvist_controller.safety import StreamTorqueRoom
 from tvist_controller.trajectory import (
     JointLine,
@@ -19,6 +19,7 @@ from tvist_controller.trajectory import (
     PlannedMotion,
     Rest,
     SetpointStream,
+    StuckError,
     Trajectory,
     quickest_motion,
 )
@@ -88,12 +89,16 @@ class ControlCycle:
         """Newest reference before shaping, shape (n,) [rad]."""
         self.at_rest = True
         """Whether the shaped reference has come to rest."""
+        self.unshaped = False
+        """Whether the trajectory bypasses the filter."""
         self.stopping = False
-        """Whether a stop bypasses the filter."""
+        """Whether the trajectory is a stop, which bypasses the filter."""
         self.running_out = False
         """Whether the present motion comes to rest by itself, since no stop is quicker."""
         self.guard: LookAhead | None = None
         """Checks each shaped reference before it is played; if it returns a stop, that is followed instead."""
+        self.refused: Obstacle | None = None
+        """Why the latest reference was not played, so that a stop was made instead; None if it was played."""
         self.reset(q, carried=carried, seed=seed)
         check_measurement(self.standing.measured, description.joints, self._plant)
         # The first steps load compiled code, which takes many ticks; they are made here, and undone.
@@ -114,8 +119,12 @@ class ControlCycle:
 
     def step(self) -> Sample:
         """Compute one tick."""
-        x = self.trajectory.next()  # a path's parameter, or q itself [rad]
-        x_star = x if self.stopping else self.line_filter.filter(x)  # x* [rad]
+        self.refused = None
+        try:
+            x = self.trajectory.next()  # a path's parameter, or q itself [rad]
+        except StuckError as error:
+            x = self._give_up(error)
+        x_star = x if self.unshaped else self.line_filter.filter(x)  # x* [rad]
         if self.guard is not None:
             x, x_star = self._guarded(self.guard, x, x_star)
         self.reference = reference = self._shaped.posture(x)  # q [rad]
@@ -128,12 +137,21 @@ class ControlCycle:
         self._settle(reference, target)
         return Sample(reference, target, torque, command.torque, measured)
 
+    def _give_up(self, error: StuckError) -> Floats:
+        """Return the first reference of the stop from the last shaped one, since the trajectory cannot go on."""
+        assert self.guard is not None, "what may be stuck is guarded"
+        stop = self.guard.give_up(str(error))
+        self.bypass(stop)
+        self.refused = self.guard.obstacle
+        return stop.next()
+
     def _guarded(self, guard: LookAhead, reference: Floats, shaped: Floats) -> tuple[Floats, Floats]:
-        """Return the stream's reference and its shaped one, or those of a stop if no clear stop leads on from them."""
+        """Return the reference and its shaped one, or those of a stop if no clear stop leads on from them."""
         stop = None if self.stopping else guard(self._shaped.joints.after(shaped))
         if stop is None:
             return reference, shaped
         self.bypass(stop)
+        self.refused = guard.obstacle
         reference = stop.next()
         return reference, reference
 
@@ -145,7 +163,7 @@ class ControlCycle:
         Args:
             tvist: New filter, with the joints and the period of the present one.
         """
-        if self.at_rest or self.stopping:
+        if self.at_rest or self.unshaped:
             self.line_filter.begin(tvist, self.reference)
         else:
             self.line_filter.use(tvist)
@@ -155,15 +173,16 @@ class ControlCycle:
         trajectory = self.trajectory
         if self.at_rest or not (trajectory.finished or (self.running_out and trajectory.standing)):
             return
-        if not ((self.stopping or self.line_filter.settled) and rests(reference, target)):
+        if not ((self.unshaped or self.line_filter.settled) and rests(reference, target)):
             return
         leaves = self._shaped.posture_of is not None
-        if self.stopping or leaves:  # the delay line restarts from where the motion ended
+        if self.unshaped or leaves:  # the delay line restarts from where the motion ended
             self._shaped.enter(None, reference)
             self.line_filter.begin(self.tvist, reference)
         if leaves or not trajectory.finished:  # a motion that ran out while paused ends here
             self.trajectory = Rest(reference)
-        self.at_rest, self.stopping, self.running_out, self.guard = True, False, False, None
+        self.at_rest, self.unshaped, self.guard = True, False, None
+        self.stopping = self.running_out = False
 
     @property
     def position(self) -> Floats:
@@ -232,16 +251,26 @@ class ControlCycle:
         Args:
             stop: Stop that continues the shaped reference.
         """
-        self.trajectory, self.at_rest = stop, False
-        if stop.path is None:
+        self.follow(stop)
+        self.stopping = True
+
+    def follow(self, trajectory: Trajectory) -> None:
+        """Follow a trajectory without the filter; the contents of the delay line are not played.
+
+        Args:
+            trajectory: Trajectory that continues the shaped reference.
+        """
+        self.trajectory, self.at_rest = trajectory, False
+        if trajectory.path is None:
             self._shaped.enter(None, self.position)
         self.line_filter.cut()
-        self.stopping, self.running_out = True, False
+        self.unshaped, self.stopping, self.running_out = True, False, False
 
     def reset(self, q: Floats, *, carried: Payload | None = None, seed: int = 0) -> None:
         """Place the arm somewhere at rest, in static equilibrium; the whole line restarts."""
         self.trajectory, self.reference = Rest(q), q
-        self.at_rest, self.stopping, self.running_out, self.guard = True, False, False, None
+        self.at_rest, self.unshaped, self.guard = True, False, None
+        self.stopping = self.running_out = False
         self.inverse_dynamics.settle()
         self.line_filter.begin(self.tvist, q)
         self._shaped.reset(q)

@@ -1,7 +1,8 @@
-"""Collision check for streams of set-points: a reference is played only if a clear stop exists from it."""
+"""Check of streams of set-points and of guided motions: a reference is played only if a clear stop exists from it."""
 
 from collections.abc import Callable
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from tvist_controller.control.differentiator import Floats, Target
 from tvist_controller.safety import GENTLEST_STOP, StreamTorqueRoom
 from tvist_controller.stops import StopPlanner
 from tvist_controller.trajectory import JointStop, Way
+from tvist_protocol.replies import Code
 
 MARGIN = 0.8
 """Share of the acceleration that the torque permits at the start of a stop, which the stop uses, since the permitted
@@ -17,6 +19,15 @@ acceleration changes on the way [-].
 """
 FRESH = 8
 """Number of ticks for which a computed permitted acceleration is reused; the margin covers its changes."""
+
+
+class Obstacle(NamedTuple):
+    """Why a reference was refused."""
+
+    why: str
+    """The reason, for people."""
+    code: Code
+    """The reason, for programs."""
 
 
 class LookAhead:
@@ -32,9 +43,19 @@ class LookAhead:
         collisions: Collision model of the arm.
         stops: Planner of stops.
         room: Acceleration that the torque permits.
+        reach: Largest position of each joint in either direction, shape (n,) [rad], which stops must keep; None if
+            the references keep clear of it by themselves, as those of streams do.
     """
 
-    def __init__(self, collisions: CollisionModel, stops: StopPlanner, room: StreamTorqueRoom) -> None:
+    def __init__(
+        self,
+        collisions: CollisionModel,
+        stops: StopPlanner,
+        room: StreamTorqueRoom,
+        *,
+        reach: Floats | None = None,
+    ) -> None:
+        self._reach = reach
         self._collisions, self._stops, self._torque = collisions, stops, room
         self._centre: Floats | None = None
         self._room = 0.0
@@ -43,10 +64,13 @@ class LookAhead:
         self._acceleration, self._age = GENTLEST_STOP, FRESH
         self.met: Meeting | None = None
         """Meeting that the latest refused reference would have led to."""
+        self._outside: str | None = None
+        self._stuck: str | None = None
 
     def begin(self, state: Target) -> None:
         """Start from rest."""
-        self._before, self.met = (state, self._within(state, GENTLEST_STOP)), None
+        self._before = state, self._within(state, GENTLEST_STOP)
+        self.met = self._outside = self._stuck = None
         self._acceleration, self._age = GENTLEST_STOP, FRESH
 
     def __call__(self, state: Target) -> JointStop | None:
@@ -73,10 +97,28 @@ class LookAhead:
         assert self._before is not None, "begin comes first"
         return self._before[1]()
 
+    def give_up(self, why: str) -> JointStop:
+        """Return the stop as in `fallback`, since no reference follows for this reason."""
+        self._stuck = why
+        return self.fallback()
+
+    @property
+    def obstacle(self) -> Obstacle:
+        """Why the latest reference was refused."""
+        if self._stuck is not None:
+            return Obstacle(self._stuck, "singular")
+        if self._outside is not None:
+            return Obstacle(self._outside, "limit_position")
+        return Obstacle(str(self.met), "collision")
+
     def clear(self, stop: JointStop) -> bool:
         """Return whether the whole way of a stop is clear."""
         q, qd, qdd = stop.at(0.0)
-        if self.is_spacious(q, self.turned(qd, qdd, stop.acceleration)):
+        turned = self.turned(qd, qdd, stop.acceleration)
+        self._outside = None if self._is_inside(q, turned) else self._beyond(stop)
+        if self._outside is not None:
+            return False
+        if self.is_spacious(q, turned):
             return True
         self.met = self.meeting(stop)
         return self.met is None
@@ -108,7 +150,21 @@ class LookAhead:
         return None if found is None else lambda: found
 
     def _is_spacious_for(self, state: Target) -> bool:
-        return self.is_spacious(state.q, self.turned(state.qd, state.qdd, self._acceleration))
+        turned = self.turned(state.qd, state.qdd, self._acceleration)
+        return self._is_inside(state.q, turned) and self.is_spacious(state.q, turned)
+
+    def _is_inside(self, q: Floats, turned: Floats) -> bool:
+        """Return whether the joints can certainly turn by these angles around q inside their range."""
+        return self._reach is None or bool((np.abs(q) + turned <= self._reach).all())
+
+    def _beyond(self, stop: JointStop) -> str | None:
+        """Return which joint leaves its range on the way of a stop, if one does, in words."""
+        assert self._reach is not None, "only a range can be left"
+        beyond = stop.farthest - self._reach
+        joint = int(np.argmax(beyond))
+        if beyond[joint] <= 0.0:
+            return None
+        return f"joint {joint} would pass the end of its range, ±{self._reach[joint]:g} rad"
 
     def is_spacious(self, q: Floats, turned: Floats) -> bool:
         """Return whether the joints can certainly turn by these angles around q without a meeting."""

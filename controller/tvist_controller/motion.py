@@ -48,8 +48,6 @@ class MotionControl:
         self.collisions = collisions
         self.activity = PUT[mode]
         """Present activity of the robot."""
-        self.tcp: tuple[float, ...] = (0.0,) * 6
-        """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
         self.safety = SafetySystem()
         """The safety system."""
         self._emit = emit
@@ -59,10 +57,16 @@ class MotionControl:
         """Collision check of that motion."""
         self._protection = Protection(cycle)
         self.motions = Motions(cycle, self.safety, emit)
-        """Planned motions and their speed."""
+        """Motions by number, and their speed."""
         self.ahead.coming = lambda: self.motions.coming
         self.streams = Streaming()
         """The present stream of set-points, if there is one."""
+        self.tcp: tuple[float, ...] = (0.0,) * 6
+        """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
+
+    def set_tcp(self, offset: tuple[float, ...]) -> None:
+        """Set the tool centre point for the motions that begin from now on; see `tcp`."""
+        self.tcp = offset
 
     @property
     def streaming(self) -> bool:
@@ -75,7 +79,7 @@ class MotionControl:
         Raises:
             RefusalError: The arm is busy, without power or stopped for safety.
         """
-        self._check("move_j")
+        self.check("move_j")
 
     @property
     def may_move(self) -> bool:
@@ -112,7 +116,7 @@ class MotionControl:
         Raises:
             RefusalError: See `check_move`.
         """
-        self._go(trigger)
+        self.go(trigger)
         return self.motions.begin(planned)
 
     def pause(self) -> None:
@@ -121,7 +125,7 @@ class MotionControl:
         Raises:
             RefusalError: No motion is running.
         """
-        self._go("pause")
+        self.go("pause")
         self.motions.hold()
 
     def resume(self) -> None:
@@ -130,7 +134,7 @@ class MotionControl:
         Raises:
             RefusalError: No motion is paused.
         """
-        self._go("resume")
+        self.go("resume")
         self.motions.release()
 
     @property
@@ -152,7 +156,7 @@ class MotionControl:
         Raises:
             RefusalError: The arm is moving, or is in a protective stop.
         """
-        self._go("power_on" if release_brakes else "power")
+        self.go("power_on" if release_brakes else "power")
 
     def brake(self, why: str) -> None:
         """Stop with category 0: the power is off, and the brakes close at once.
@@ -161,8 +165,7 @@ class MotionControl:
             why: The reason, for people.
         """
         target, plan, cycle = after(self.activity, "brakes"), None, self.cycle
-        if target is not None:
-            self.activity = target
+        self.activity = target or self.activity
         if target is not None and not cycle.at_rest:
             stop = brake(cycle.description, cycle.plant.payload, cycle.newest, PERIOD)
             way = float(np.abs(stop.end - cycle.position).max())
@@ -181,7 +184,7 @@ class MotionControl:
         Raises:
             RefusalError: There is no protective stop, or the arm is still stopping.
         """
-        self._go("unlock_protective_stop")
+        self.go("unlock_protective_stop")
         self._protection.forget()
 
     def recover(self, error: PlantError, seed: int) -> Sample:
@@ -199,11 +202,11 @@ class MotionControl:
         self.cycle.reset(self.cycle.position, seed=seed)
         self._protection.forget()
         if after(self.activity, "plant_failure") is not None:
-            self._go("plant_failure")
+            self.go("plant_failure")
         self._emit("protective_stop", code="plant_failure", why=why)
         return self.cycle.step()
 
-    def _check(self, trigger: str) -> Activity:
+    def check(self, trigger: str) -> Activity:
         """Return the activity that a trigger leads to.
 
         Raises:
@@ -215,8 +218,9 @@ class MotionControl:
         self.safety.check(trigger, self.activity)
         return target
 
-    def _go(self, trigger: str) -> None:
-        self.activity = self._check(trigger)
+    def go(self, trigger: str) -> None:
+        """Carry out the transition of a trigger that `check` accepts."""
+        self.activity = self.check(trigger)
 
     def follow(self, period: float, limits: MotionLimits, now: float) -> None:
         """Start to follow set-points.
@@ -224,9 +228,8 @@ class MotionControl:
         Raises:
             RefusalError: The arm is busy, or the velocity limit is above that of reduced speed.
         """
-        target = self._check("servo_start")
-        most = self.motions.slowest
-        if most is not None and limits.velocity > most:
+        target = self.check("servo_start")
+        if (most := self.motions.slowest) is not None and limits.velocity > most:
             why = f"velocity is {limits.velocity:g} rad/s; safety_mode is REDUCED, which allows {most:.3g}"
             raise RefusalError("limit_velocity", "velocity", why, most)
         self.activity = target
@@ -247,7 +250,7 @@ class MotionControl:
         if met is not None:
             self.interrupt(f"{met} before the stream came to rest through the filter", "collision")
             return
-        self._go("servo_stop")
+        self.go("servo_stop")
         self.cycle.start(end)
         self._end_stream("servo_stop")
 
@@ -338,10 +341,8 @@ class MotionControl:
             PlantError: The arm's state is no longer finite; call `recover`.
         """
         sample = self.cycle.step()
-        stream = self.streams.stream
-        refused = stream is not None and self.cycle.trajectory is not stream
-        if refused or (self.cycle.stopping and self.activity is Activity.ENDING):
-            self.end("interruption", str(self.ahead.met), "collision")
+        if self.cycle.refused is not None and self.activity is not Activity.STOPPING:
+            self.end("interruption", *self.cycle.refused)
         if self.cycle.at_rest and self.activity.moving and (target := after(self.activity, "at_rest")):
             self._rest(target)
         if self.activity.robot_mode is RobotMode.RUNNING:

@@ -1,14 +1,14 @@
-"""Point-to-point motions by number, and their speed."""
+"""Motions by number, and their speed."""
 
 from typing import Unpack
 
 from tvist_controller.cycle import ControlCycle
 from tvist_controller.events import Emit, Told
-from tvist_controller.moving import RunningMove
+from tvist_controller.moving import RunningMotion, RunningMove
 from tvist_controller.planning.move_planner import PlannedMove
-from tvist_controller.safety import REDUCED_SHARE, rate_of
+from tvist_controller.safety import REDUCED_SHARE
 from tvist_controller.safety_system import SafetySystem
-from tvist_controller.trajectory import PlannedMotion
+from tvist_controller.trajectory import Guided, PlannedMotion
 from tvist_protocol.replies import Code
 
 
@@ -25,19 +25,19 @@ class Motions:
         self._cycle, self._safety, self._emit = cycle, safety, emit
         self._reduced_velocity = REDUCED_SHARE * min(cycle.description.limits.velocity)
         self._started = 0
-        self._move: RunningMove | None = None
+        self._running: RunningMotion | None = None
         self.wanted_speed = 1.0
         """Speed that was set [-]."""
 
     @property
     def running(self) -> bool:
         """Whether a motion is running."""
-        return self._move is not None
+        return self._running is not None
 
     @property
     def speed(self) -> float:
         """Rate of the running motion's time; without one, that of the next motion [-]."""
-        return self.wanted_speed if self._move is None else self._move.rate
+        return self.wanted_speed if self._running is None else self._running.rate
 
     @property
     def slowest(self) -> float | None:
@@ -45,28 +45,40 @@ class Motions:
         return self._reduced_velocity if self._safety.reduced else None
 
     def begin(self, planned: PlannedMove) -> int:
-        """Start a motion and return its number."""
-        self._started += 1
-        move = self._move = RunningMove(self._started, planned, self._cycle)
-        self._emit("motion_started", id=move.number)
+        """Start a planned motion and return its number."""
+        number = self._begin(RunningMove(planned, self._cycle))
         for why in planned.skipped:
-            self._emit("warning", id=move.number, code="blend_skipped", why=why)
+            self._emit("warning", id=number, code="blend_skipped", why=why)
         if planned.excess_of_torque is not None:
-            self._emit("warning", id=move.number, code="limit_torque", why=planned.excess_of_torque)
-        return move.number
+            self._emit("warning", id=number, code="limit_torque", why=planned.excess_of_torque)
+        return number
+
+    def guide(self, trajectory: Guided) -> int:
+        """Return the number of a guided motion, which is that of its predecessor if there is one."""
+        trajectory.pace(self.wanted_speed, self.slowest)
+        if self._running is None:
+            return self._begin(trajectory)
+        self._running = trajectory
+        return self._started
+
+    def _begin(self, motion: RunningMotion) -> int:
+        self._started += 1
+        self._running = motion
+        self._emit("motion_started", id=self._started)
+        return self._started
 
     def go_on(self) -> bool:
         """Start the next part of the running motion, since one has come to rest; return whether there was one."""
-        move = self._move
-        if move is None or not move.coming:
+        if not self.coming:
             return False
-        move.go_on(self._rate(move))
+        assert isinstance(self._running, RunningMove)
+        self._running.go_on(self.wanted_speed, self.slowest)
         return True
 
     @property
     def coming(self) -> tuple[PlannedMotion, ...]:
         """Parts of the running motion that have not begun."""
-        return () if self._move is None else self._move.coming
+        return self._running.coming if isinstance(self._running, RunningMove) else ()
 
     def set_speed(self, fraction: float) -> None:
         """Scale the time of the running motion and of later ones."""
@@ -75,31 +87,27 @@ class Motions:
 
     def keep_rate(self) -> None:
         """Let the running motion continue at the rate that is set and allowed."""
-        if self._move is not None:
-            self._move.go(self._rate(self._move))
+        if self._running is not None:
+            self._running.pace(self.wanted_speed, self.slowest)
 
     def hold(self) -> None:
-        """Bring the motion to a standstill on its path."""
-        if self._move is not None:
-            self._move.hold()
+        """Bring a point-to-point motion to a standstill on its path."""
+        if isinstance(self._running, RunningMove):
+            self._running.hold()
 
     def release(self) -> None:
-        """Resume the motion."""
-        if self._move is not None:
-            self._move.release(self._rate(self._move))
+        """Resume a point-to-point motion."""
+        if isinstance(self._running, RunningMove):
+            self._running.release(self.wanted_speed, self.slowest)
 
     def done(self) -> None:
         """Report that the shaped reference has come to rest at the motion's target."""
-        if self._move is not None:
-            self._emit("motion_done", id=self._move.number)
-            self._move = None
+        if self._running is not None:
+            self._emit("motion_done", id=self._started)
+            self._running = None
 
     def stopped(self, why: str, code: Code | None, **told: Unpack[Told]) -> None:
         """Report that the motion ended before its target."""
-        if self._move is not None:
-            self._emit("motion_stopped", id=self._move.number, code=code, why=why, **told)
-            self._move = None
-
-    def _rate(self, move: RunningMove) -> float:
-        """Rate of a motion's time [-]."""
-        return min(rate_of(self.wanted_speed, move.velocity, self.slowest), move.highest_rate)
+        if self._running is not None:
+            self._emit("motion_stopped", id=self._started, code=code, why=why, **told)
+            self._running = None

@@ -1,10 +1,12 @@
 """A planned motion in progress: its parts, its rate and its pause."""
 
+from typing import Protocol
+
 import numpy as np
 
 from tvist_controller.cycle import STILL, ControlCycle
 from tvist_controller.planning.move_planner import PlannedMove
-from tvist_controller.safety import acceleration_on_way
+from tvist_controller.safety import acceleration_on_way, rate_of
 from tvist_controller.trajectory import PlannedMotion
 
 PAUSE_SHARE = 0.95
@@ -13,50 +15,64 @@ LEAST_PAUSE = 0.2
 """Smallest share of a motion's acceleration that the torque must permit for a pause; else the motion runs on [-]."""
 
 
+class RunningMotion(Protocol):
+    """A motion in progress, whose speed can be changed."""
+
+    @property
+    def rate(self) -> float:
+        """Rate of its time [-]."""
+
+    def pace(self, speed: float, slowest: float | None) -> None:
+        """Change its speed.
+
+        Args:
+            speed: Programmed speed fraction [-].
+            slowest: Velocity limit of reduced speed [rad/s]; None if the speed is not reduced.
+        """
+
+
 class RunningMove:
-    """One motion.
+    """One planned motion.
 
     Args:
-        number: Number of the motion.
         planned: Its plan, whose first part begins now.
         cycle: The control line.
     """
 
-    def __init__(self, number: int, planned: PlannedMove, cycle: ControlCycle) -> None:
-        self.number, self.velocity = number, planned.velocity
-        self._window, self._cycle = planned.window, cycle
+    def __init__(self, planned: PlannedMove, cycle: ControlCycle) -> None:
+        self._velocity, self._window, self._cycle = planned.velocity, planned.window, cycle
         self._held = False
         self._trajectory, *coming = planned.parts
         self.coming: tuple[PlannedMotion, ...] = tuple(coming)
         """Parts that have not begun."""
         self._begin()
 
-    def go_on(self, rate: float) -> None:
-        """Begin the next part at a rate [-]."""
+    def go_on(self, speed: float, slowest: float | None) -> None:
+        """Begin the next part; see `RunningMotion` for the arguments."""
         self._trajectory, *coming = self.coming
         self.coming, self._held = tuple(coming), False
-        self._trajectory.speed = rate
+        self._trajectory.speed = self._rate(speed, slowest)
         self._begin()
 
     def _begin(self) -> None:
         self._cycle.start(self._trajectory)
         self._cycle.tvist.aim(self._trajectory.path.end)
 
-    @property
-    def highest_rate(self) -> float:
-        """Highest rate at which a shaper that was chosen after the motion began keeps the limits in bends [-]."""
+    def _rate(self, speed: float, slowest: float | None) -> float:
+        """Rate of its time [-]: slower if a shaper that was chosen after it began is too slow for its bends."""
         delay = self._cycle.tvist.delay
-        return 1.0 if delay <= self._window else self._window / delay
+        longest = 1.0 if delay <= self._window else self._window / delay
+        return min(rate_of(speed, self._velocity, slowest), longest)
 
     @property
     def rate(self) -> float:
         """Rate of its time [-]."""
         return self._trajectory.rate
 
-    def go(self, rate: float) -> None:
-        """Change the rate [-], unless the motion is paused."""
+    def pace(self, speed: float, slowest: float | None) -> None:
+        """Change the rate, unless the motion is paused; see `RunningMotion`."""
         if not self._held:
-            self._trajectory.speed = rate
+            self._trajectory.speed = self._rate(speed, slowest)
 
     def hold(self) -> None:
         """Slow down to a standstill within the torque limits, if that takes less time; see `PlannedMotion.hold`."""
@@ -77,8 +93,8 @@ class RunningMove:
             room = most
         self._held = room > LEAST_PAUSE * most and trajectory.hold(min(room, most))
 
-    def release(self, rate: float) -> None:
-        """Resume after a pause, at a rate [-]."""
+    def release(self, speed: float, slowest: float | None) -> None:
+        """Resume after a pause; see `RunningMotion`."""
         if self._held:
-            self._trajectory.release(rate)
+            self._trajectory.release(self._rate(speed, slowest))
         self._held = False

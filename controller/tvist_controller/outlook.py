@@ -51,12 +51,12 @@ class Outlook:
 
     def _ahead(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Ahead:
         """Start a simulation as in `foresee`, which the caller runs as far as needed."""
-        stopping = self._cycle.stopping
+        unshaped = self._cycle.unshaped
         present, line_filter, shaped = self._cycle.fork()
         trajectory = present if trajectory is None else trajectory.fork()
-        if tvist is not None and not stopping:
+        if tvist is not None and not unshaped:
             line_filter.use(tvist.fork())
-        return Ahead(trajectory, None if stopping else line_filter, shaped)
+        return Ahead(trajectory, None if unshaped else line_filter, shaped)
 
     def stop(self, deceleration: float | None) -> StopPlan | None:
         """Come to rest as quickly as permitted.
@@ -97,7 +97,8 @@ class Outlook:
     def _by_joints(self, deceleration: float | None) -> StopPlan | None:
         cycle, guard, present = self._cycle, self._cycle.guard, self._cycle.trajectory
         stop = self.stops.by_joints(cycle.newest, deceleration, _anywhere if guard is None else guard.clear)
-        if cycle.stopping and (stop is None or stop.acceleration <= present.acceleration):
+        braking = cycle.stopping or present.acceleration > 0.0
+        if braking and (stop is None or stop.acceleration <= present.acceleration):
             return None
         if stop is None:  # no stop is clear and within the torque limits
             hardest = self.stops.highest

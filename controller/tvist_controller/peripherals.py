@@ -57,7 +57,7 @@ class Peripherals:
         on_tcp: Called with the tool centre point when it is set.
     """
 
-    def __init__(self, on_tcp: Callable[[tuple[float, ...]], None]) -> None:
+    def __init__(self, *on_tcp: Callable[[tuple[float, ...]], None]) -> None:
         self._on_tcp = on_tcp
         self.rows = (
             Row(SetIo, lambda call: self.set_outputs(call.command), changes_io=True),
@@ -104,7 +104,8 @@ class Peripherals:
     def set_tcp(self, offset: tuple[float, ...]) -> None:
         """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
         self.tcp_offset = offset
-        self._on_tcp(offset)
+        for tell in self._on_tcp:
+            tell(offset)
 
     def _set_registers(self, call: Call[SetRegisters]) -> None:
         """Write registers; input registers may be written without control."""

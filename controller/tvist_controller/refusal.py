@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from tvist_plant.description import RobotDescription, is_real_body
 from tvist_protocol.commands import Command, MoveJ, SetPayload
-from tvist_protocol.motions import JointSegment, MoveC, MoveL, MovePath
+from tvist_protocol.motions import JointSegment, MoveC, MoveL, MovePath, ServoJ, SpeedJ
 from tvist_protocol.replies import Code, Refused
 from tvist_protocol.simulation import SimulationReset
 from tvist_protocol.transitions import Activity
@@ -15,7 +15,7 @@ SLOWEST = {"velocity": 1e-3, "acceleration": 1e-2, "jerk": 0.1}
 """Lowest accepted limits of a motion; lower ones would make it too slow [rad/s, rad/s^2, rad/s^3]."""
 
 _NOTHING_TO = {
-    "pause": "no motion is running: there is nothing to pause",
+    "pause": "no motion that can be paused is running",
     "resume": "no motion is paused: there is nothing to resume",
     "servo_stop": "no stream is running: send servo_start first",
     "unlock_protective_stop": "there is no protective stop to unlock",
@@ -70,19 +70,37 @@ def check_motion(
 ) -> None:
     """Refuse limits of a motion above those of the arm, or so low that it would hardly move."""
     limits = description.limits
-    code: Code
-    for code, name, value, highest, unit in (
-        ("limit_velocity", "velocity", velocity, min(limits.velocity), "rad/s"),
-        ("limit_acceleration", "acceleration", acceleration, min(limits.acceleration), "rad/s²"),
-        ("out_of_range", "jerk", jerk, min(limits.jerk), "rad/s³"),
-    ):
-        where = f"{prefix}{name}"
-        if value > highest:
-            why = f"{where} is {value:g} {unit}; the arm's limit is {highest:g}"
-            raise RefusalError(code, where, why, highest)
-        if value < (lowest := SLOWEST[name]):
-            why = f"{where} is {value:g} {unit}; it must be at least {lowest:g}"
-            raise RefusalError("out_of_range", where, why, lowest)
+    _check_limit("limit_velocity", "velocity", velocity, min(limits.velocity), "rad/s", prefix)
+    check_acceleration(acceleration, description, prefix)
+    _check_limit("out_of_range", "jerk", jerk, min(limits.jerk), "rad/s³", prefix)
+
+
+def check_acceleration(acceleration: float, description: RobotDescription, prefix: str = "") -> None:
+    """Refuse an acceleration of the joints above that of the arm, or so low that it would hardly move."""
+    highest = min(description.limits.acceleration)
+    _check_limit("limit_acceleration", "acceleration", acceleration, highest, "rad/s²", prefix)
+
+
+def _check_limit(code: Code, name: str, value: float, highest: float, unit: str, prefix: str) -> None:
+    where = f"{prefix}{name}"
+    if value > highest:
+        why = f"{where} is {value:g} {unit}; the arm's limit is {highest:g}"
+        raise RefusalError(code, where, why, highest)
+    if value < (lowest := SLOWEST[name]):
+        why = f"{where} is {value:g} {unit}; it must be at least {lowest:g}"
+        raise RefusalError("out_of_range", where, why, lowest)
+
+
+def check_speeds(qd: Sequence[float], description: RobotDescription) -> None:
+    """Refuse velocities with a wrong number of joints or above their limits."""
+    if len(qd) != description.joints:
+        why = f"qd has {len(qd)} velocities; the arm has {description.joints} joints"
+        raise RefusalError("out_of_range", "qd", why, description.joints)
+    for number, (speed, limit) in enumerate(zip(qd, description.limits.velocity, strict=True)):
+        if not abs(speed) <= limit:
+            field = f"qd[{number}]"
+            why = f"{field} is {speed:g} rad/s; the joint's limit is {limit:g}"
+            raise RefusalError("limit_velocity", field, why, limit)
 
 
 def check_body(payload: Payload, where: str = "", rated: float = math.inf) -> None:
@@ -135,6 +153,11 @@ def check_content(command: Command, description: RobotDescription) -> None:
             check_pace(command.velocity, command.acceleration, command.jerk)
         case MovePath():
             check_path(command, description)
+        case ServoJ():
+            check_joints(command.q, description)
+        case SpeedJ():
+            check_speeds(command.qd, description)
+            check_acceleration(command.acceleration, description)
         case SetPayload():
             check_body(payload_of(command), rated=description.limits.payload)
         case SimulationReset():

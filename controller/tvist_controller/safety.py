@@ -67,6 +67,31 @@ class StreamTorqueRoom:
         return max(float((left / np.abs(self._dynamics.inertia(q)).sum(axis=1)).min()), GENTLEST_STOP)
 
 
+class GuidedTorqueRoom(StreamTorqueRoom):
+    """The acceleration of a motion that may change suddenly, since neither its client nor a filter smooths it.
+
+    The flexible arm's torque overshoots after each change, so the torque of the acceleration, and what the arm adds
+    to it, have to stay within the limits as well.
+    """
+
+    def __init__(self, description: RobotDescription, dynamics: InverseDynamics) -> None:
+        super().__init__(description, dynamics)
+        self._limits = np.array(description.limits.torque)
+
+    def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
+        """Return whether a state of motion keeps all torques within their limits, or is as gentle as any stop."""
+        if not super().allows(q, qd, qdd):
+            return False
+        swung = self._dynamics.effort(q, qd, (1.0 + REBOUND) * qdd)
+        return bool((swung <= self._limits).all() or np.abs(qdd).max() <= GENTLEST_STOP)
+
+    def acceleration(self, q: Floats, qd: Floats) -> float:
+        """Largest a such that every q̈ with |q̈ᵢ| ≤ a is allowed [rad/s^2]."""
+        left = self._limits - self._dynamics.effort(q, qd, np.zeros_like(q))
+        most = (1.0 + REBOUND) * np.abs(self._dynamics.inertia(q)).sum(axis=1)
+        return max(min(float((left / most).min()), super().acceleration(q, qd)), GENTLEST_STOP)
+
+
 class StopTorque:
     """The joint torques that a stop may use.
 

@@ -15,7 +15,9 @@ _EMERGENCIES = {
     "system": SafetyMode.SYSTEM_EMERGENCY_STOP,
 }
 _LATCHED = {"violation": SafetyMode.VIOLATION, "fault": SafetyMode.FAULT}
-_MOTION = frozenset({"move_j", "servo_start", "resume"})
+_MOTION = frozenset(
+    {"move_j", "move_l", "move_c", "move_path", "servo_j", "speed_j", "speed_l", "servo_start", "resume"}
+)
 _LIVE = frozenset({*_MOTION, "power_on", "power", "unlock_protective_stop"})
 
 

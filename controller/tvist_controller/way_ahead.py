@@ -35,16 +35,30 @@ class WayAhead:
         """Returns the parts of the present motion that have not begun."""
         room = StreamTorqueRoom(cycle.description, cycle.inverse_dynamics)
         self._guard = LookAhead(collisions, outlook.stops, room)
-
-    @property
-    def met(self) -> Meeting | None:
-        """Meeting that the latest refused reference would have led to."""
-        return self._guard.met
+        reach = np.array(cycle.description.limits.position)
+        self._guide_guard = LookAhead(collisions, outlook.stops, room, reach=reach)
 
     def begin(self) -> None:
         """Start to monitor a stream that begins from rest."""
         self._guard.begin(self._cycle.newest)
         self._cycle.guard = self._guard
+
+    def begin_guided(self) -> None:
+        """Start to monitor a guided motion from the present state of motion, whatever that is.
+
+        Raises:
+            RefusalError: There is no clear stop from here, as on a narrow path; nothing has changed.
+        """
+        cycle, guard, stops = self._cycle, self._guide_guard, self._outlook.stops
+        state = cycle.newest
+        guard.begin(state)
+        if not cycle.at_rest:
+            stop = stops.by_joints(state, None, guard.clear)
+            if stop is None and not guard.clear(stops.stop(state, stops.highest)):
+                why, code = guard.obstacle
+                raise RefusalError(code, "", f"the arm cannot leave its path here: {why}")
+            guard.take(state, stops.stop(state, stops.highest) if stop is None else stop)
+        cycle.guard = guard
 
     def until_rest(self, plan: StopPlan | None = None) -> tuple[float | None, float | None]:
         """Time until the shaped reference rests [s], and the angle that the joint that turns most still turns [rad].
@@ -84,10 +98,11 @@ class WayAhead:
             return None
         trajectory = cycle.trajectory
         if not trajectory.foreseeable:
-            stop = self._outlook.stops.by_joints(cycle.newest, None, self._guard.clear)
+            guard = self._guard if cycle.guard is None else cycle.guard
+            stop = self._outlook.stops.by_joints(cycle.newest, None, guard.clear)
             if stop is None:
-                return self._guard.met
-            self._guard.take(cycle.newest, stop)
+                return guard.met
+            guard.take(cycle.newest, stop)
             return None
         forecast = trajectory.forecast
         if forecast is None:

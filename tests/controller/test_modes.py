@@ -7,6 +7,7 @@ from tvist_controller.overload import TICKS, Overload
 from tvist_controller.safety import REDUCED_SHARE
 from tvist_controller.session import NoControlError, Session
 from tvist_protocol import commands as c
+from tvist_protocol import motions as m
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.simulation import SimulationInject, SimulationReset
@@ -28,7 +29,13 @@ COMMANDS = {
     "pause": (c.Pause, {}),
     "resume": (c.Resume, {}),
     "stop": (c.Stop, {}),
+    "servo_j": (m.ServoJ, {"q": Q2_}),
+    "speed_j": (m.SpeedJ, {"qd": (0.1,) * 6}),
+    "speed_l": (m.SpeedL, {"xd": (0.0, 0.0, -0.05, 0.0, 0.0, 0.0)}),
+    "stop_j": (m.StopJ, {}),
+    "stop_l": (m.StopL, {}),
 }
+STOPS = {"stop", "stop_j", "stop_l"}
 
 
 def at(activity: Activity) -> Robot:
@@ -43,6 +50,9 @@ def at(activity: Activity) -> Robot:
             robot.tick()
         if activity is Activity.ENDING:
             robot.send(c.ServoStop)
+    elif activity is Activity.GUIDED:
+        robot.send(m.ServoJ, q=Q3_)
+        robot.tick(100)
     elif activity is Activity.PROTECTIVE_STOP:
         robot.send(SimulationInject, fault="protective_stop")
     elif activity is not Activity.REST:
@@ -71,7 +81,7 @@ def test_a_command_leads_where_the_table_says_or_is_refused(command, activity):
     if target is not None:
         assert isinstance(reply, Accepted | Done), reply
         assert robot.controller.motion.activity is target
-    elif command == "stop":
+    elif command in STOPS:
         assert reply == Done()
         assert robot.controller.motion.activity is activity
     else:

@@ -21,6 +21,7 @@ from tests.examples import share
 from tvist_controller.controller import Controller
 from tvist_controller.streaming import TIMEOUT
 from tvist_protocol import commands as c
+from tvist_protocol import motions as m
 from tvist_protocol.modes import SafetyMode
 from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.simulation import SimulationInject, SimulationReset, SimulationStep
@@ -43,7 +44,15 @@ MOTION = {
     "pause": c.Pause,
     "resume": c.Resume,
     "stop": c.Stop,
+    "servo_j": m.ServoJ,
+    "speed_j": m.SpeedJ,
+    "speed_l": m.SpeedL,
+    "stop_j": m.StopJ,
+    "stop_l": m.StopL,
 }
+NUMBERED = {"move_j", "servo_j", "speed_j", "speed_l"}
+"""Commands that are answered by the number of a motion."""
+STOPS = {"stop", "stop_j", "stop_l"}
 PUT = {"RUNNING": Activity.REST, "IDLE": Activity.IDLE, "POWER_OFF": Activity.POWER_OFF}
 ENDS = {"motion_done", "motion_stopped"}
 
@@ -219,17 +228,23 @@ class Sessions(RuleBasedStateMachine):
 
     @rule(command=st.sampled_from(sorted(MOTION)), whose=TOKENS, offset=st.sampled_from([0.0, 0.02, 0.4]))
     def command(self, command, whose, offset):
-        fields = {"move_j": {"q": (offset, *Q1[1:])}, "servo_start": {"velocity": 0.5}}.get(command, {})
+        fields = {
+            "move_j": {"q": (offset, *Q1[1:])},
+            "servo_start": {"velocity": 0.5},
+            "servo_j": {"q": (offset, *Q1[1:])},
+            "speed_j": {"qd": (offset, 0.0, 0.0, 0.0, 0.0, 0.0)},
+            "speed_l": {"xd": (0.0, 0.0, 0.0, 0.0, 0.0, offset)},
+        }.get(command, {})
         reply = self.send(MOTION[command], whose, **fields)
         if reply is None:
             return
         target = after(self.activity, command)
         if target is not None:
-            assert isinstance(reply, Accepted if command == "move_j" else Done), reply
+            assert isinstance(reply, Accepted if command in NUMBERED else Done), reply
             self.go(target)
             self.heard = self.robot.now if command == "servo_start" else self.heard
             self.sequence = 0 if command == "servo_start" else self.sequence
-        elif command == "stop":
+        elif command in STOPS:
             assert reply == Done()
         else:
             assert isinstance(reply, Refused)
@@ -251,7 +266,21 @@ class Sessions(RuleBasedStateMachine):
 
     @precondition(lambda self: self.activity.moving)
     @rule(
-        command=st.sampled_from(["pause", "pause", "resume", "servo_stop", "stop", "power_off"]), whose=TOKENS
+        command=st.sampled_from(
+            [
+                "pause",
+                "pause",
+                "resume",
+                "servo_stop",
+                "stop",
+                "power_off",
+                "servo_j",
+                "speed_j",
+                "stop_j",
+                "stop_l",
+            ]
+        ),
+        whose=TOKENS,
     )
     def interfere(self, command, whose):
         self.command(command, whose, 0.0)
@@ -316,7 +345,7 @@ class Sessions(RuleBasedStateMachine):
     def wait_for_rest(self):
         for _ in range(3000):
             self.tick()
-            if not self.activity.moving or self.activity is Activity.PAUSED:
+            if not self.activity.moving or self.activity in {Activity.PAUSED, Activity.GUIDED}:
                 return
         raise AssertionError(f"{self.activity} for 6 s")
 
@@ -337,6 +366,9 @@ class Sessions(RuleBasedStateMachine):
         elif any(event.code == "limit_torque" for event in events):
             self.told.append("protective_stop")
             self.happen("protective_stop")
+        elif any(event.code in BARRED for event in events):
+            assert self.activity is Activity.GUIDED
+            self.happen("interruption")
         if self.robot.motion.activity is not self.activity:
             assert self.robot.cycle.at_rest
             self.happen("at_rest")
@@ -355,7 +387,7 @@ class Sessions(RuleBasedStateMachine):
                 self.running.add(event.id)
             elif event.kind in ENDS:
                 self.running.remove(event.id)
-        assert len(self.running) == (self.activity in {Activity.MOVING, Activity.PAUSED})
+        assert len(self.running) == (self.activity in {Activity.MOVING, Activity.PAUSED, Activity.GUIDED})
         held = self.robot.session.lease
         assert (held and held.client) == (self.lease and self.lease.client)
 
@@ -369,6 +401,8 @@ class Sessions(RuleBasedStateMachine):
         raise AssertionError(f"{self.activity} for 6 s after a stop")
 
 
+BARRED = {"collision", "limit_position", "singular"}
+"""Codes of what may end a guided motion."""
 TOLD = {"lease_lost", "stream_stopped", "protective_stop"}
 
 

@@ -36,7 +36,9 @@ from tvist_shaping.base import Filter
 POSTURES = 9
 """Number of postures of a run at which the shaper's delay is looked up."""
 SPARED = 0.995
-"""Share of the joints' limits that paths use, since a shaper whose weights vary may exceed its reference a little [-]."""
+"""Share of the joints' limits that paths use: a shaper whose weights vary may exceed its reference a little [-]."""
+LEAST_WINDOW = 0.08
+"""Delay of a shaper for which a path has room in any case, so that few changes of the shaper slow it down [s]."""
 VARIATION = 1.1
 """Factor by which the delay may be longer between them [-]."""
 
@@ -183,7 +185,7 @@ class PathPlanner:
         for s in np.linspace(0.0, float(curve.end[0]), POSTURES):
             tvist.reset(curve.posture(np.array([s])))
             found.append(tvist.delay)
-        return VARIATION * max(found)
+        return max(VARIATION * max(found), LEAST_WINDOW)
 
 
 def _segments(command: MoveL | MoveC | MovePath) -> Iterator[tuple[Segment, str]]:

@@ -3,20 +3,26 @@
 from tvist_controller.trajectory.base import Forecast, Rest, Trajectory
 from tvist_controller.trajectory.curve import Bends, Curve
 from tvist_controller.trajectory.double_s import DoubleS
+from tvist_controller.trajectory.guided import Guided, StuckError
+from tvist_controller.trajectory.joint_speed import JointSpeed
 from tvist_controller.trajectory.known import Known
 from tvist_controller.trajectory.limits import MotionLimits
 from tvist_controller.trajectory.motion import PlannedMotion, quickest_motion
 from tvist_controller.trajectory.path import JointLine, Path, Way
 from tvist_controller.trajectory.path_stop import PathStop
+from tvist_controller.trajectory.servo import Servo
 from tvist_controller.trajectory.stop import JointStop
 from tvist_controller.trajectory.stream import SetpointStream
+from tvist_controller.trajectory.tool_speed import ToolKinematics, ToolSpeed
 
 __all__ = [
     "Bends",
     "Curve",
     "DoubleS",
     "Forecast",
+    "Guided",
     "JointLine",
+    "JointSpeed",
     "JointStop",
     "Known",
     "MotionLimits",
@@ -24,7 +30,11 @@ __all__ = [
     "PathStop",
     "PlannedMotion",
     "Rest",
+    "Servo",
     "SetpointStream",
+    "StuckError",
+    "ToolKinematics",
+    "ToolSpeed",
     "Trajectory",
     "Way",
     "quickest_motion",

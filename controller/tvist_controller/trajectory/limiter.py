@@ -40,6 +40,7 @@ class Limiter:
         period: Tick [s].
         reach: Largest position of each joint in either direction, shape (n,) [rad]; None for no limit.
         torque: Motion that the torque permits; None for no limit.
+        state: Position, velocity and acceleration to start from instead of rest, each of shape (n,).
     """
 
     TOLERANCE = 1e-6
@@ -63,6 +64,7 @@ class Limiter:
         *,
         reach: Floats | None = None,
         torque: TorqueRoom | None = None,
+        state: tuple[Floats, Floats, Floats] | None = None,
     ) -> None:
         n = len(q)
         self._limits, self._period = limits, period
@@ -74,6 +76,11 @@ class Limiter:
         # earlier.
         self._signal_qd, self._step, self._bend, self._bend_before = np.zeros((4, n))
         self._state: Floats | None = None  # derivatives, if they differ from those of the differences
+        if state is not None:
+            _, qd, qdd = state
+            self._signal_qd, self._step = qd, period * (qd - 0.5 * period * qdd)
+            self._bend = self._bend_before = period * period * qdd
+            self._state = np.stack(state)
         self._behind = np.zeros(n, dtype=bool)
         self.behind = 0.0
         """Time by which joints lag behind a signal that is at its limits, so that they cannot catch up [s]."""
@@ -99,6 +106,11 @@ class Limiter:
     def limited(self) -> bool:
         """Whether the reference differs from the signal."""
         return bool(self._behind.any())
+
+    @property
+    def resting(self) -> bool:
+        """Whether the last two positions were equal."""
+        return not self._step.any()
 
     def follow(self, q: Floats, qd: Floats) -> Floats:
         """Advance by one tick towards a moving position.

@@ -63,6 +63,11 @@ class JointStop(Trajectory):
         """Position at which the stop ends, shape (n,) [rad]."""
         return self.at(self.duration)[0]
 
+    @property
+    def farthest(self) -> Floats:
+        """Largest absolute position of each joint on the way, shape (n,) [rad]."""
+        return np.array([max(-bound.min, bound.max) for bound in self._trajectory.position_extrema])
+
     def next(self) -> Floats:
         """Advance by one tick and return the position."""
         self._ticks += 1

@@ -10,6 +10,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.calibration import Calibration
 from tvist_protocol.codec import MAX_BYTES, encode
 from tvist_protocol.io import SetIo, SetRegisters, SetTcp, SimulationSetInputs
+from tvist_protocol.motions import ServoJ, SpeedJ, SpeedL, StopJ, StopL
 from tvist_protocol.programs import ProgramLoad, ProgramPlay, ProgramStop
 from tvist_protocol.simulation import SimulationInject, SimulationStep
 
@@ -54,6 +55,11 @@ class Messages:
             c.HandOver(token=STRANGER, client="stranger"),
             c.ReleaseControl(token=STRANGER),
             c.MoveJ(token=token, q=q),
+            ServoJ(token=token, q=q),
+            SpeedJ(token=token, qd=(chance.uniform(-0.1, 0.1),) * len(q)),
+            SpeedL(token=token, xd=(0.0, 0.0, chance.uniform(-0.1, 0.1), 0.0, 0.0, 0.0)),
+            StopJ(token=token, acceleration=chance.uniform(1.0, 30.0)),
+            StopL(token=token, acceleration=chance.uniform(1.0, 30.0)),
             c.ServoStart(token=token),
             c.ServoStop(token=token),
             c.Stop(),

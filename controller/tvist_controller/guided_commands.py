@@ -1,0 +1,64 @@
+"""Commands that guide the arm, and the stops of URScript."""
+
+import numpy as np
+
+from tvist_controller.command_row import Call, Row
+from tvist_controller.guided import Guidance
+from tvist_controller.motion import MotionControl
+from tvist_controller.programs.player import ProgramPlayer
+from tvist_controller.refusal import check_content
+from tvist_protocol import motions as m
+from tvist_protocol.replies import Accepted, Reply
+
+
+class GuidedCommands:
+    """Handlers of the commands for guided motions.
+
+    Args:
+        motion: The robot's motion.
+        programs: The program, which ends with every stop.
+    """
+
+    def __init__(self, motion: MotionControl, programs: ProgramPlayer) -> None:
+        self._guidance, self._programs = Guidance(motion), programs
+        self._description = motion.cycle.description
+        self.rows = (
+            Row(m.ServoJ, self._servo_j),
+            Row(m.SpeedJ, self._speed_j),
+            Row(m.SpeedL, self._speed_l),
+            Row(m.StopJ, self._stop_j),
+            Row(m.StopL, self._stop_l),
+        )
+
+    def _servo_j(self, call: Call[m.ServoJ]) -> Reply:
+        command = call.command
+        check_content(command, self._description)
+        q = np.array(command.q, dtype=float)
+        number = self._guidance.servo(q, command.lookahead, command.gain, shaped=command.shaped)
+        return Accepted(id=number)
+
+    def _speed_j(self, call: Call[m.SpeedJ]) -> Reply:
+        command = call.command
+        check_content(command, self._description)
+        qd = np.array(command.qd, dtype=float)
+        return Accepted(id=self._guidance.move_joints(qd, command.acceleration, shaped=command.shaped))
+
+    def _speed_l(self, call: Call[m.SpeedL]) -> Reply:
+        command = call.command
+        twist = np.array(command.xd, dtype=float)
+        accelerations = _accelerations(command)
+        return Accepted(id=self._guidance.move_tool(twist, *accelerations, shaped=command.shaped))
+
+    def _stop_j(self, call: Call[m.StopJ]) -> None:
+        self._programs.stop_moving()
+        self._guidance.stop_joints(call.command.acceleration)
+
+    def _stop_l(self, call: Call[m.StopL]) -> None:
+        self._programs.stop_moving()
+        self._guidance.stop_tool(*_accelerations(call.command))
+
+
+def _accelerations(command: m.SpeedL | m.StopL) -> tuple[float, float]:
+    """Acceleration [m/s^2] and angular acceleration [rad/s^2] of the tool."""
+    angular = command.angular_acceleration
+    return command.acceleration, command.acceleration if angular is None else angular

@@ -1,0 +1,66 @@
+"""Changes of velocity in one tick: how far they go, and at which rates of time they keep to limits."""
+
+import math
+
+import numpy as np
+
+from tvist_controller.trajectory.limits import Floats, MotionLimits
+
+HALVINGS = 8
+"""Number of times that a change of velocity is halved if the torque does not permit it."""
+STANDING = 1e-6
+"""Velocity below which all joints count as standing where a motion is taken over [rad/s]."""
+STEADY = 1e-12
+"""Velocity below which a motion whose time hardly passes counts as being at rest [rad/s or m/s]."""
+FLAT = 1e-12
+"""Factor of a rate that counts as zero."""
+ROUNDING = 1e-9
+"""Share of a tick by which rounding may delay the end of a change [-]."""
+
+
+def part_of(duration: float, time: float) -> float:
+    """Return the part of a change that is made in some time; exactly 1 if the time suffices.
+
+    Args:
+        duration: Time that the whole change takes [s].
+        time: Available time [s].
+    """
+    return 1.0 if duration <= time * (1.0 + ROUNDING) else time / duration
+
+
+def fitting_rates(x: Floats, y: Floats, low: Floats, high: Floats) -> tuple[float, float]:
+    """Return the lowest and the highest r with low ≤ x + r y ≤ high in every entry; the first is larger if none fits.
+
+    Args:
+        x: Constant part, shape (n,).
+        y: Factor of r, shape (n,).
+        low: Lower limits, shape (n,).
+        high: Upper limits, shape (n,).
+    """
+    lowest, highest = -math.inf, math.inf
+    for own, slope, least, most in zip(x.tolist(), y.tolist(), low.tolist(), high.tolist(), strict=True):
+        if abs(slope) < FLAT:
+            if not least <= own <= most:
+                return math.inf, -math.inf
+            continue
+        ends = (least - own) / slope, (most - own) / slope
+        lowest, highest = max(lowest, min(ends)), min(highest, max(ends))
+    return lowest, highest
+
+
+def rise_within(speed: Floats, limits: MotionLimits, period: float) -> Floats:
+    """Return the acceleration at which each joint may get faster, so that a stop keeps its velocity limit.
+
+    A stop ends the present acceleration with the limit's jerk, and the joint gets faster until it has. Two ticks are
+    reserved, since the acceleration of the newest reference is known as the mean of two ticks.
+
+    Args:
+        speed: Present speed of each joint, shape (n,) [rad/s].
+        limits: Limits of the joints.
+        period: Tick [s].
+    """
+    left, two = np.maximum(limits.velocity - speed, 0.0), 2.0 * period
+    rise: Floats = np.minimum(
+        limits.jerk * (np.sqrt(two * two + 2.0 * left / limits.jerk) - two), limits.acceleration
+    )
+    return rise
