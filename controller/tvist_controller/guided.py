@@ -5,7 +5,7 @@ from typing import TypeVar
 import numpy as np
 
 from tvist_controller.control.differentiator import Floats
-from tvist_controller.control.tool_kinematics import ToolKinematics
+from tvist_controller.kinematics.tool import ToolKinematics
 from tvist_controller.motion import MotionControl
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety import GENTLEST_STOP, GuidedTorqueRoom

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.control.kinematics import ForwardKinematics
-from tvist_controller.control.tool_kinematics import ToolKinematics
+from tvist_controller.kinematics.tool import ToolKinematics
 from tvist_controller.trajectory import JointSpeed, MotionLimits
 from tvist_controller.trajectory.servo import _step
 from tvist_protocol import commands as c

@@ -36,15 +36,3 @@ def placement(pose: Sequence[float] | None) -> Placement:
     if pose is None:
         return Placement(np.eye(3), np.zeros(3))
     return Placement(np.asarray(pin.exp3(np.array(pose[3:], dtype=float))), np.array(pose[:3], dtype=float))
-
-
-def turn(start: Floats, end: Floats) -> Floats:
-    """Rotation vector in the base frame that turns one orientation into another by the shortest way, [rad]."""
-    vector: Floats = np.asarray(pin.log3(end @ start.T))
-    return vector
-
-
-def turned(rotation: Floats, vector: Floats) -> Floats:
-    """Return an orientation, turned by a rotation vector in the base frame [rad]."""
-    result: Floats = np.asarray(pin.exp3(vector)) @ rotation
-    return result

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tvist_controller.kinematics.denavit_hartenberg import bias, dh_table, kinematics
-from tvist_controller.paths.poses import Placement, placement, turn
+from tvist_controller.kinematics.tool import ToolKinematics, turn
+from tvist_controller.paths.poses import Placement
 from tvist_controller.paths.tool_curves import ToolCurve, ToolState
 from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.spline import Knots, hermite
@@ -48,18 +48,16 @@ class Tracker:
     """
 
     def __init__(self, description: RobotDescription, tcp: Sequence[float]) -> None:
-        self._dh = dh_table(description)
-        self._tool = placement(tcp)
+        self._tool = ToolKinematics(description, tcp)
 
     def pose(self, q: Floats) -> Placement:
         """Return the pose of the tool at joint positions, shape (n,) [rad]."""
-        rotation, position, _ = kinematics(self._dh, *self._tool, q)
-        return Placement(rotation, position)
+        return Placement(*self._tool.pose(q))
 
     def solve(self, goal: Placement, q: Floats) -> Floats | None:
         """Return joint positions near q at which the tool has a pose, shape (n,) [rad]; None if Newton finds none."""
         for _ in range(ITERATIONS):
-            rotation, position, jacobian = kinematics(self._dh, *self._tool, q)
+            rotation, position, jacobian = self._tool.all(q)
             error = np.concatenate((goal.position - position, turn(rotation, goal.rotation)))
             size = float(np.abs(error).max())
             if size < EXACT:
@@ -74,11 +72,11 @@ class Tracker:
 
     def rates(self, q: Floats, state: ToolState) -> tuple[Floats, Floats] | None:
         """Return dq/ds and d²q/ds² of a posture on a path, each of shape (n,); None in a singular posture."""
-        jacobian = kinematics(self._dh, *self._tool, q)[2]
+        jacobian = self._tool.jacobian(q)
         first = _solved(jacobian, state.first)
         if first is None or np.abs(first).max() > STEEPEST:
             return None
-        second = _solved(jacobian, state.second - bias(self._dh, self._tool.position, q, first))
+        second = _solved(jacobian, state.second - self._tool.bias(q, first))
         return None if second is None else (first, second)
 
     def follow(self, curve: ToolCurve, q: Floats) -> Knots:
