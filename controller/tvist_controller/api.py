@@ -14,9 +14,11 @@ from tvist_controller.control.differentiator import Target, central_differences
 from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.controller import Controller
 from tvist_controller.cycle import STILL, ControlCycle
+from tvist_controller.kinematics.tool import ToolKinematics, turned
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.mode_source import ModeSource
 from tvist_controller.own_shapers import OwnShaper, RecordedShaper
+from tvist_controller.paths.poses import placement_vector
 from tvist_controller.presence import Presence
 from tvist_controller.reporting import truth_of
 from tvist_controller.safety import TORQUE_SHARE
@@ -42,6 +44,7 @@ __all__ = [
     "RecordedShaper",
     "Setup",
     "Target",
+    "ToolKinematics",
     "Trajectory",
     "body",
     "central_differences",
@@ -53,9 +56,11 @@ __all__ = [
     "mass_matrix",
     "modal_estimator",
     "paper_payload",
+    "placement_vector",
     "quickest_motion",
     "resting_after",
     "stopping",
     "truth_of",
+    "turned",
     "wanted_modes",
 ]

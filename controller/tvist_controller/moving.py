@@ -40,7 +40,8 @@ class RunningMove:
     """
 
     def __init__(self, planned: PlannedMove, cycle: ControlCycle) -> None:
-        self._velocity, self._window, self._cycle = planned.velocity, planned.window, cycle
+        self._velocity, self._cycle = planned.velocity, cycle
+        self._window, self._peak = planned.window, planned.peak
         self._held = False
         self._trajectory, *coming = planned.parts
         self.coming: tuple[PlannedMotion, ...] = tuple(coming)
@@ -59,10 +60,10 @@ class RunningMove:
         self._cycle.tvist.aim(self._trajectory.path.end)
 
     def _rate(self, speed: float, slowest: float | None) -> float:
-        """Rate of its time [-]: slower if a shaper that was chosen after it began is too slow for its bends."""
-        delay = self._cycle.tvist.delay
-        longest = 1.0 if delay <= self._window else self._window / delay
-        return min(rate_of(speed, self._velocity, slowest), longest)
+        """Rate of its time [-]: lower if it was not planned for a shaper as slow or as peaked as the present one."""
+        tvist = self._cycle.tvist
+        room = min(_fitting(self._window, tvist.delay), _fitting(self._peak, tvist.peak))
+        return min(rate_of(speed, self._velocity, slowest), room)
 
     @property
     def rate(self) -> float:
@@ -98,3 +99,8 @@ class RunningMove:
         if self._held:
             self._trajectory.release(self._rate(speed, slowest))
         self._held = False
+
+
+def _fitting(planned: float, present: float) -> float:
+    """Rate at which a property of the shaper is no larger than planned [-]."""
+    return 1.0 if present <= planned else planned / present

@@ -26,9 +26,16 @@ class Placement(NamedTuple):
         return Placement(back, -back @ self.position)
 
     @property
-    def vector(self) -> tuple[float, ...]:
+    def vector(self) -> tuple[float, float, float, float, float, float]:
         """X y z [m] and rotation vector [rad]."""
-        return (*self.position.tolist(), *np.asarray(pin.log3(self.rotation)).tolist())
+        return placement_vector(*self)
+
+
+def placement_vector(rotation: Floats, position: Floats) -> tuple[float, float, float, float, float, float]:
+    """Return x y z [m] and rotation vector [rad] of a rotation matrix and a position."""
+    x, y, z = position.tolist()
+    rx, ry, rz = np.asarray(pin.log3(rotation)).tolist()
+    return x, y, z, rx, ry, rz
 
 
 def placement(pose: Sequence[float] | None) -> Placement:

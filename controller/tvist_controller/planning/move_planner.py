@@ -40,6 +40,8 @@ class PlannedMove:
     """A sentence for each blend that is left out."""
     window: float = math.inf
     """Longest delay of a shaper with which the limits hold at full rate [s]."""
+    peak: float = math.inf
+    """Largest `Filter.peak` with which they do [-]."""
 
 
 class MovePlanner:

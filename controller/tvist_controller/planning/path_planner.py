@@ -90,6 +90,7 @@ class PathPlanner:
             next((one for one in excess if one is not None), None),
             tuple(skipped),
             window,
+            tvist.peak,
         )
 
     # ------------------------------------------------------------------ geometry

@@ -12,7 +12,6 @@ from tvist_controller.refusal import RefusalError, check_joints
 from tvist_plant.description import RobotDescription
 from tvist_protocol import kinematics as k
 from tvist_protocol.replies import Posture, ToolPose
-from tvist_protocol.values import Pose
 
 
 class Reachable:
@@ -57,9 +56,7 @@ class Reachable:
             q = np.array(question.q, dtype=float)
         tcp = basis.tcp if question.tcp_offset is None else question.tcp_offset
         found = placement(question.frame).inverse @ Tracker(self._description, tcp).pose(q)
-        x, y, z, rx, ry, rz = found.vector
-        pose: Pose = (x, y, z, rx, ry, rz)
-        return ToolPose(pose=pose)
+        return ToolPose(pose=found.vector)
 
     def refusal(
         self, error: WayError, field: str, share: float, goal: Placement, tcp: Sequence[float]

@@ -3,11 +3,13 @@
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from tvist_controller.api import CLEARANCE, STILL, CollisionModel, body, paper_payload
 from tvist_lab.recordings import Floats
+from tvist_lab.safety import space
 from tvist_lab.safety.changes import far_payload
 from tvist_lab.safety.stops import SHAPERS
 from tvist_lab.safety.subject import CLIENT, SESSION, Subject
@@ -107,9 +109,10 @@ class Sequence:
                 return q
 
     def _foresee(self) -> Undisturbed | None:
-        """Return the future references if no command comes, provided that the motion follows a line."""
+        """Return the future references if no command comes, provided that the motion follows a line of the joints."""
         motion, cycle = self.robot.controller.motion, self.robot.controller.cycle
-        if cycle.at_rest or cycle.trajectory.path is None:
+        path = cycle.trajectory.path
+        if cycle.at_rest or path is None or path.posture_of is not None:
             return None
         ahead = motion.outlook.foresee()
         return None if ahead is None else Undisturbed(ahead[1:], self.robot.controller.tick_number)
@@ -320,6 +323,10 @@ class Sequence:
         return reply
 
 
+def _sent_in_space(send: Callable[[Subject, np.random.Generator], object], it: Sequence) -> object:
+    return send(it.robot, it._random)  # noqa: SLF001  the sequence's own commands
+
+
 _SENT: dict[str, tuple[float, Callable[[Sequence], object]]] = {
     "move": (14.0, Sequence.move),
     "stream": (5.0, Sequence.stream),
@@ -340,5 +347,6 @@ _SENT: dict[str, tuple[float, Callable[[Sequence], object]]] = {
     "release": (1.0, Sequence.release),
     "reset": (1.0, Sequence.reset),
     "wait": (3.0, lambda it: it.robot.send(c.KeepAlive)),
+    **{name: (weight, partial(_sent_in_space, send)) for name, (weight, send) in space.SENT.items()},
 }
 """Commands and their relative frequencies."""
