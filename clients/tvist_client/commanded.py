@@ -34,6 +34,10 @@ class CommandedRobot(Protocol):
         """The present state."""
         ...
 
+    async def forward_kinematics(self) -> tuple[float, float, float, float, float, float]:
+        """The pose of the tool: x y z [m] and rotation vector [rad]."""
+        ...
+
     async def request(self, command: Command, timeout_s: float = ...) -> Answer:
         """Send a command."""
         ...

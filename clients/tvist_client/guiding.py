@@ -16,7 +16,8 @@ class Guiding(Leased):
     method returns after that much of the robot's time; in lockstep and free, time is stepped. The arm then **keeps its
     speed**, as after UR's `speedj`: `stop_j` and `stop_l` stop it, and so does the end of control.
 
-    All motions that take over from each other are one `Motion`, which ends when the arm rests.
+    Commands that take over from each other share one `Motion`. It ends when the arm has come to rest, or when a stop
+    begins.
     """
 
     async def servo_j(
