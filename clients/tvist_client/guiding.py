@@ -12,12 +12,11 @@ from tvist_protocol.motions import ServoJ, SpeedJ, SpeedL, StopJ, StopL
 class Guiding(Leased):
     """The part of `Arm` that guides it without a plan.
 
-    Each command takes over any motion at once, and the arm obeys the last one until another comes. With `duration`, a
+    Each command takes over any motion at once, and the arm obeys it until another comes. With `duration`, a
     method returns after that much of the robot's time; in lockstep and free, time is stepped. The arm then **keeps its
     speed**, as after UR's `speedj`: `stop_j` and `stop_l` stop it, and so does the end of control.
 
-    Commands that take over from each other share one `Motion`. It ends when the arm has come to rest, or when a stop
-    begins.
+    Such commands share one `Motion` until the arm rests or a stop begins. A planned motion that is taken over ends.
     """
 
     async def servo_j(
