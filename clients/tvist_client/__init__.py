@@ -21,23 +21,28 @@ from tvist_client.stream import Stream
 from tvist_client.transports import InProcessRobot, LoopbackTransport, Transport, ZenohTransport
 from tvist_protocol.errors import ProtocolError, RefusedError, TvistError
 from tvist_protocol.info import Info
+from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment
 from tvist_protocol.stream import Event, State, Telemetry, Truth
 from tvist_protocol.values import Payload
 
 __all__ = [
     "AnswerTimeoutError",
+    "ArcSegment",
     "ArgumentError",
     "Arm",
     "ClientError",
     "Event",
     "InProcessRobot",
     "Info",
+    "JointSegment",
+    "LineSegment",
     "LoopbackTransport",
     "MisuseError",
     "Motion",
     "MotionStoppedError",
     "NotConnectedError",
     "Payload",
+    "ProcessSegment",
     "ProtectiveStopError",
     "ProtocolError",
     "RefusedError",

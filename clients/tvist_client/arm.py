@@ -10,20 +10,19 @@ from tvist_client.errors import (
     AnswerTimeoutError,
     ClientError,
     ProtectiveStopError,
-    UnexpectedReplyError,
 )
 from tvist_client.granted import granted
-from tvist_client.motion import Motion
+from tvist_client.guiding import Guiding
+from tvist_client.moves import Moves
 from tvist_client.payload import make_payload
 from tvist_client.servo import Servo
 from tvist_client.simulation import Simulation
 from tvist_client.terminals import Terminals
 from tvist_client.transports.base import Transport
-from tvist_client.values import JointRange, floats, number, whole
+from tvist_client.values import JointRange, floats, number, pose_of, whole
 from tvist_protocol.commands import (
     HandOver,
     KeepAlive,
-    MoveJ,
     Pause,
     PowerOff,
     PowerOn,
@@ -44,7 +43,6 @@ from tvist_protocol.errors import RefusedError
 from tvist_protocol.io import SetTcp
 from tvist_protocol.keys import check_client_name
 from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramStop
-from tvist_protocol.replies import Accepted
 from tvist_protocol.stream import Event
 
 if TYPE_CHECKING:
@@ -58,7 +56,7 @@ second.
 """
 
 
-class Arm(Terminals, Simulation):
+class Arm(Moves, Guiding, Terminals, Simulation):
     """The arm that `Robot.control` yields. Joint values are any sequence of numbers [rad], one for each joint.
 
     Every command may raise RefusedError; it has then changed nothing.
@@ -69,44 +67,6 @@ class Arm(Terminals, Simulation):
     """
 
     # ------------------------------------------------------------------ motion
-
-    async def move_j(
-        self,
-        q: Iterable[float],
-        *,
-        velocity: float = 1.5,
-        acceleration: float = 2.0,
-        jerk: float = 100.0,
-        wait: bool = True,
-    ) -> Motion:
-        """Move to a joint configuration, all joints in phase.
-
-        Args:
-            q: Target [rad].
-            velocity: Largest velocity of any joint [rad/s].
-            acceleration: Largest acceleration of any joint [rad/s²].
-            jerk: Largest jerk of any joint [rad/s³].
-            wait: Whether to wait for the end; in lockstep and free, time is stepped until then.
-
-        Returns:
-            The motion; `started` and `done` are ticks once they are known.
-
-        Raises:
-            MotionStoppedError: The motion ended before its target.
-        """
-        reply = await self.robot.request(
-            MoveJ(
-                token=self.token,
-                q=floats(q, "q"),
-                velocity=number(velocity, "velocity"),
-                acceleration=number(acceleration, "acceleration"),
-                jerk=number(jerk, "jerk"),
-            )
-        )
-        if not isinstance(reply, Accepted) or reply.id is None:
-            raise UnexpectedReplyError(f"move_j was answered by {reply}, without the id of a motion")
-        motion = self.robot.motions.motion(reply.id)
-        return await motion.wait() if wait else motion
 
     @contextlib.asynccontextmanager
     async def servo(
@@ -284,8 +244,7 @@ class Arm(Terminals, Simulation):
         Args:
             offset: Tool centre point in the flange frame: x y z [m] and rotation vector [rad].
         """
-        x, y, z, rx, ry, rz = floats(offset, "offset", "x y z rx ry rz")
-        await self.robot.request(SetTcp(token=self.token, offset=(x, y, z, rx, ry, rz)))
+        await self.robot.request(SetTcp(token=self.token, offset=pose_of(offset, "offset")))
 
     # ------------------------------------------------------------------ lease
 

@@ -7,21 +7,23 @@ A call waits for its answer; Ctrl-C ends the wait. Callbacks run in the loop's t
 """
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
 from typing import Generic, Self, TypeVar
 
 from tvist_client import robot as asynchronous_robot
 from tvist_client import stream as asynchronous_stream
-from tvist_client.blocking_arm import Arm, Motion, Servo, Stepper
+from tvist_client.blocking_arm import Arm, Servo, Stepper
+from tvist_client.blocking_motion import Motion
+from tvist_client.commanded import Answer
 from tvist_client.portal import Portal
-from tvist_client.robot import ANSWER_S, BUFFER, ENDPOINT, NAME
+from tvist_client.published import BUFFER
+from tvist_client.robot import ANSWER_S, ENDPOINT, NAME
 from tvist_client.transports.base import Transport
 from tvist_client.transports.certificates import Folder
 from tvist_protocol.commands import Command
 from tvist_protocol.info import Clock, Info
 from tvist_protocol.io import Io
-from tvist_protocol.replies import Accepted, Done
 from tvist_protocol.stream import Event, State, Telemetry, Truth
 
 __all__ = ["Arm", "Motion", "Robot", "Servo", "Stepper", "Stream"]
@@ -132,9 +134,34 @@ class Robot:
         """Return inputs, outputs, registers and tool."""
         return self._portal.call(self._robot.io)
 
-    def request(self, command: Command, timeout_s: float = ANSWER_S) -> Accepted | Done:
+    def request(self, command: Command, timeout_s: float = ANSWER_S) -> Answer:
         """Send any command."""
         return self._portal.call(lambda: self._robot.request(command, timeout_s))
+
+    def inverse_kinematics(
+        self,
+        pose: Iterable[float],
+        *,
+        near: Iterable[float] | None = None,
+        tcp_offset: Iterable[float] | None = None,
+        frame: Iterable[float] | None = None,
+    ) -> tuple[float, ...]:
+        """Return joint positions at which the tool has a pose, the nearest of all."""
+        return self._portal.call(
+            lambda: self._robot.inverse_kinematics(pose, near=near, tcp_offset=tcp_offset, frame=frame)
+        )
+
+    def forward_kinematics(
+        self,
+        q: Iterable[float] | None = None,
+        *,
+        tcp_offset: Iterable[float] | None = None,
+        frame: Iterable[float] | None = None,
+    ) -> tuple[float, float, float, float, float, float]:
+        """Return the pose that the tool has at joint positions."""
+        return self._portal.call(
+            lambda: self._robot.forward_kinematics(q, tcp_offset=tcp_offset, frame=frame)
+        )
 
     def stop(self) -> None:
         """Bring the arm to rest now; no control is needed."""

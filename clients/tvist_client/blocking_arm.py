@@ -1,56 +1,16 @@
-"""Objects that the blocking client's robot returns: an arm, its motions and streams, and the clock."""
+"""Objects that the blocking client's robot returns: an arm, its streams, and the clock."""
 
 import contextlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Self
+from typing import Any
 
-from tvist_client import arm as asynchronous_arm
-from tvist_client import motion as asynchronous_motion
 from tvist_client import servo as asynchronous_servo
 from tvist_client import stepper as asynchronous_stepper
+from tvist_client.blocking_moves import Guiding, Moves
 from tvist_client.portal import Portal
 from tvist_protocol.io import Bank
 from tvist_protocol.simulation import StepSetpoint
-from tvist_protocol.stream import Event
 from tvist_protocol.values import Payload, ResetMode
-
-
-class Motion:
-    """One motion; see `tvist_client.motion.Motion`."""
-
-    def __init__(self, portal: Portal, motion: asynchronous_motion.Motion) -> None:
-        self._portal = portal
-        self._motion = motion
-
-    @property
-    def id(self) -> int:
-        """The robot's number for the motion."""
-        return self._motion.id
-
-    @property
-    def started(self) -> int | None:
-        """Tick at which it began; None until then."""
-        return self._motion.started
-
-    @property
-    def done(self) -> int | None:
-        """Tick at which it came to rest at the target; None until then, or if it never did."""
-        return self._motion.done
-
-    @property
-    def stopped(self) -> Event | None:
-        """The event that reports its end before the target; None if there is none."""
-        return self._motion.stopped
-
-    @property
-    def ended(self) -> bool:
-        """True once the motion has ended."""
-        return self._motion.ended
-
-    def wait(self) -> Self:
-        """Wait for the end; raise MotionStoppedError if it came before the target."""
-        self._portal.call(self._motion.wait)
-        return self
 
 
 class Servo:
@@ -79,32 +39,13 @@ class Servo:
         return self._portal.call(lambda: self._servo.step_through(qs))
 
 
-class Arm:
+class Arm(Moves, Guiding):
     """An arm under control; see `tvist_client.arm.Arm` for the arguments."""
-
-    def __init__(self, portal: Portal, arm: asynchronous_arm.Arm) -> None:
-        self._portal = portal
-        self._arm = arm
 
     @property
     def token(self) -> str:
         """Token of the lease."""
         return self._arm.token
-
-    def move_j(
-        self,
-        q: Iterable[float],
-        *,
-        velocity: float = 1.5,
-        acceleration: float = 2.0,
-        jerk: float = 100.0,
-        wait: bool = True,
-    ) -> Motion:
-        """Move to a joint configuration [rad]."""
-        motion = self._portal.call(
-            lambda: self._arm.move_j(q, velocity=velocity, acceleration=acceleration, jerk=jerk, wait=wait)
-        )
-        return Motion(self._portal, motion)
 
     @contextlib.contextmanager
     def servo(

@@ -6,8 +6,11 @@ from typing import Protocol
 from tvist_client.motion import MotionsByNumber
 from tvist_protocol.commands import Command
 from tvist_protocol.info import Clock, Info
-from tvist_protocol.replies import Accepted, Done
+from tvist_protocol.replies import Accepted, Done, Posture, ToolPose
 from tvist_protocol.stream import Event, State
+
+Answer = Accepted | Done | Posture | ToolPose
+"""Replies to a command that was not refused."""
 
 
 class CommandedRobot(Protocol):
@@ -31,7 +34,11 @@ class CommandedRobot(Protocol):
         """The present state."""
         ...
 
-    async def request(self, command: Command, timeout_s: float = ...) -> Accepted | Done:
+    async def forward_kinematics(self) -> tuple[float, float, float, float, float, float]:
+        """The pose of the tool: x y z [m] and rotation vector [rad]."""
+        ...
+
+    async def request(self, command: Command, timeout_s: float = ...) -> Answer:
         """Send a command."""
         ...
 
@@ -53,6 +60,10 @@ class CommandedRobot(Protocol):
 
     async def advance(self, ticks: int) -> int:
         """Advance time by a number of ticks."""
+        ...
+
+    async def pass_time(self, ticks: int) -> None:
+        """Let ticks pass, or wait for them if another client steps."""
         ...
 
     async def rest(self) -> State:

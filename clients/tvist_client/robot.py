@@ -1,52 +1,39 @@
 """A robot as a client sees it: its description, its messages, and control over it."""
 
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from types import TracebackType
 from typing import Self
 
 from tvist_client.arm import Arm, hold_control
+from tvist_client.commanded import Answer
 from tvist_client.errors import MisuseError, NotConnectedError
-from tvist_client.feed import Feed
+from tvist_client.kinematics import Kinematics
 from tvist_client.motion import Motion, MotionsByNumber
+from tvist_client.published import STATE_S, Published
 from tvist_client.stepper import MAX_STEP, Stepper, hold_clock
-from tvist_client.stream import Stream
 from tvist_client.transports.base import Transport
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.zenoh import ZenohTransport
 from tvist_client.understood import understood
 from tvist_client.values import whole
-from tvist_protocol.codec import (
-    decode_event,
-    decode_info,
-    decode_io,
-    decode_reply,
-    decode_state,
-    decode_telemetry,
-    decode_truth,
-    encode,
-)
+from tvist_protocol.codec import decode_info, decode_reply, encode
 from tvist_protocol.commands import Command, Stop
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.info import Clock, Info
-from tvist_protocol.io import Io
 from tvist_protocol.modes import RuntimeState
-from tvist_protocol.replies import Accepted, Done, Refused
-from tvist_protocol.stream import Event, State, Telemetry, Truth
+from tvist_protocol.replies import Refused
+from tvist_protocol.stream import State
 
 ENDPOINT = "tcp/127.0.0.1:7447"
 NAME = "ur5e"
 ANSWER_S = 10.0
 """Longest wait for the answer to a command [s]."""
-STATE_S = 5.0
-"""Longest pause between two states [s]; in lockstep the last one is repeated every second."""
-BUFFER = 5000
-"""Number of messages that an iterator buffers: 10 s of states."""
 CHUNK = 50
 """Ticks to step between two checks whether a motion has ended: a tenth of a second."""
 
 
-class Robot:
+class Robot(Published, Kinematics):
     """One robot, over an open transport, which `close` closes.
 
     Attributes:
@@ -56,16 +43,11 @@ class Robot:
     """
 
     def __init__(self, transport: Transport) -> None:
+        super().__init__(transport)
         self._transport = transport
         self._clock: Clock | None = None
         self.arm: Arm | None = None
         self.stepper: Stepper | None = None
-        self._states: Feed[State] = Feed(transport, "state", decode_state, once_a_tick=True)
-        self._events: Feed[Event] = Feed(transport, "event", decode_event, once_a_tick=False)
-        self._truths: Feed[Truth] = Feed(transport, "truth", decode_truth, once_a_tick=True)
-        self._telemetries: Feed[Telemetry] = Feed(transport, "telemetry", decode_telemetry, once_a_tick=False)
-        self._ios: Feed[Io] = Feed(transport, "io", decode_io, once_a_tick=False)
-        self._feeds = (self._states, self._events, self._truths, self._telemetries, self._ios)
         self.motions = MotionsByNumber(self._until_ended)
         # Listen before any command is sent, since an event may precede the answer.
         self._events.listen(self.motions.on_event)
@@ -147,50 +129,9 @@ class Robot:
             )
         return await self._next_state()
 
-    def states(self, buffer: int = BUFFER) -> Stream[State]:
-        """Iterate over every state from now on, one per tick. If the reader is slow, the oldest are dropped.
-
-        Args:
-            buffer: Number of messages that may wait; those dropped are counted in `Stream.dropped`.
-        """
-        return self._states.stream(buffer)
-
-    def events(self, buffer: int = BUFFER) -> Stream[Event]:
-        """Iterate over every event from now on."""
-        return self._events.stream(buffer)
-
-    def on_state(self, callback: Callable[[State], object]) -> Callable[[], None]:
-        """Call a function, which must not block, with every state; the function returned ends that."""
-        return self._states.listen(callback)
-
-    def on_event(self, callback: Callable[[Event], object]) -> Callable[[], None]:
-        """Call a function with every event; see `on_state`."""
-        return self._events.listen(callback)
-
-    def on_truth(self, callback: Callable[[Truth], object]) -> Callable[[], None]:
-        """Call a function with every truth message, if the server publishes them; see `on_state`."""
-        return self._truths.listen(callback)
-
-    def on_telemetry(self, callback: Callable[[Telemetry], object]) -> Callable[[], None]:
-        """Call a function with every telemetry message, once a second; see `on_state`."""
-        return self._telemetries.listen(callback)
-
-    def on_io(self, callback: Callable[[Io], object]) -> Callable[[], None]:
-        """Call a function with every message about inputs, outputs, registers and tool; see `on_state`."""
-        return self._ios.listen(callback)
-
-    async def io(self) -> Io:
-        """Return inputs, outputs, registers and tool: the latest known values, else the next ones within about 1 s.
-
-        Raises:
-            AnswerTimeoutError: No message arrived within `STATE_S`.
-        """
-        self._ios.subscribe()
-        return self._ios.latest or await self._ios.next(lambda _: True, STATE_S)
-
     # ------------------------------------------------------------------ commands
 
-    async def request(self, command: Command, timeout_s: float = ANSWER_S) -> Accepted | Done:
+    async def request(self, command: Command, timeout_s: float = ANSWER_S) -> Answer:
         """Send any command.
 
         Args:
@@ -285,10 +226,7 @@ class Robot:
         """
         ticks = whole(ticks, "ticks", 1)
         if await self.clock() == "realtime":
-            last = (await self._next_state()).tick + ticks
-            while (tick := (await self._next_state()).tick) < last:
-                pass
-            return tick
+            return await self._see_pass(ticks)
         by = self.stepper or self.arm
         if by is None:
             raise MisuseError(
@@ -298,6 +236,11 @@ class Robot:
         for first in range(0, ticks, MAX_STEP):
             tick = await by.step(min(MAX_STEP, ticks - first))
         return tick
+
+    async def pass_time(self, ticks: int) -> None:
+        """Let ticks pass as `advance` does, or wait for them if another client steps."""
+        if await self._let_pass(ticks) is None:
+            await self._see_pass(ticks)
 
     async def until(self, tick: int) -> State:
         """Wait until the state of a tick has arrived, without stepping time."""
@@ -324,6 +267,13 @@ class Robot:
             if await self._let_pass(CHUNK) is None:
                 await motion.wait_event()
 
+    async def _see_pass(self, ticks: int) -> int:
+        """Wait until ticks have passed, counted from the next state; return the last one."""
+        last = (await self._next_state()).tick + ticks
+        while (tick := (await self._next_state()).tick) < last:
+            pass
+        return tick
+
     async def _let_pass(self, ticks: int) -> int | None:
         """Step time; return None if this client cannot: in real time, or if another client holds the clock."""
         if await self.clock() == "realtime":
@@ -334,9 +284,6 @@ class Robot:
             if self.stepper is not None or (await self.info()).stepper is None:
                 raise
             return None
-
-    async def _next_state(self) -> State:
-        return await self._states.next(lambda _: True, STATE_S)
 
     def _on_lost(self, error: NotConnectedError) -> None:
         for feed in self._feeds:

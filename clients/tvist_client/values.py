@@ -4,12 +4,15 @@ import contextlib
 import math
 import operator
 from collections.abc import Iterable
+from typing import TypeVar
 
 from tvist_client.errors import ArgumentError
 from tvist_protocol.errors import quoted
 from tvist_protocol.info import Info
 
+T = TypeVar("T")
 Joints = tuple[float, ...]
+Six = tuple[float, float, float, float, float, float]
 
 
 def number(value: float, where: str) -> float:
@@ -27,6 +30,23 @@ def number(value: float, where: str) -> float:
         with contextlib.suppress(TypeError, ValueError, OverflowError):
             return float(value)
     raise ArgumentError(where, f"{where} is {quoted(value)}: must be a number")
+
+
+def optional_number(value: float | None, where: str) -> float | None:
+    """Convert a value to a float, and leave None as it is; see `number`."""
+    return None if value is None else number(value, where)
+
+
+def positive(value: float, where: str) -> float:
+    """Convert a value to a finite float above 0.
+
+    Raises:
+        ArgumentError: The value is not such a number.
+    """
+    found = number(value, where)
+    if not 0.0 < found < math.inf:
+        raise ArgumentError(where, f"{where} is {found:g}: must be more than 0, and finite", 0.0)
+    return found
 
 
 def whole(value: int, where: str, low: int, high: int | None = None) -> int:
@@ -69,16 +89,38 @@ def floats(values: Iterable[float], where: str, meaning: str | None = None) -> J
     return tuple(number(entry, f"{where}[{place}]") for place, entry in enumerate(listed))
 
 
-def entries(values: Iterable[float], where: str) -> tuple[float, ...]:
+def pose_of(values: Iterable[float], where: str) -> Six:
+    """Convert x y z [m] and a rotation vector [rad] to floats; see `floats`."""
+    x, y, z, rx, ry, rz = floats(values, where, "x y z rx ry rz")
+    return x, y, z, rx, ry, rz
+
+
+def optional_pose(values: Iterable[float] | None, where: str) -> Six | None:
+    """Convert a pose to floats, and leave None as it is; see `pose_of`."""
+    return None if values is None else pose_of(values, where)
+
+
+def twist_of(values: Iterable[float], where: str) -> Six:
+    """Convert a velocity [m/s] and an angular velocity [rad/s] to floats; see `floats`."""
+    vx, vy, vz, wx, wy, wz = floats(values, where, "vx vy vz wx wy wz")
+    return vx, vy, vz, wx, wy, wz
+
+
+def entries(values: Iterable[T], where: str, of: str = "numbers") -> tuple[T, ...]:
     """Return the entries of a sequence unchanged.
 
+    Args:
+        values: List, tuple or array.
+        where: Name of the argument, for error messages.
+        of: What the entries are, for error messages.
+
     Raises:
-        ArgumentError: The value has the wrong type or length.
+        ArgumentError: The value is not a sequence.
     """
     if not isinstance(values, str | bytes):
         with contextlib.suppress(TypeError):
             return tuple(values)
-    raise ArgumentError(where, f"{where} is {quoted(values)}: must be a list of numbers")
+    raise ArgumentError(where, f"{where} is {quoted(values)}: must be a list of {of}")
 
 
 class JointRange:

@@ -153,7 +153,11 @@ def _choice(fault: _Fault) -> ProtocolError:
 
 
 def _tag(fault: _Fault) -> ProtocolError:
-    return explain_unknown_type(fault.value, fault.types)
+    if fault.where == "type":
+        return explain_unknown_type(fault.value, fault.types)
+    given = "" if fault.value is ABSENT else f" is {quoted(fault.value)}:"
+    why = f"{fault.where}{given} must be one of {', '.join(map(repr, fault.place.tags))}"
+    return ProtocolError("unknown_type", fault.where, why)
 
 
 def _kind(fault: _Fault, wanted: str, got: str) -> ProtocolError:

@@ -28,6 +28,7 @@ class Place:
         """What is there."""
         self.kind = kind
         """The type that was expected there; None where nobody knows."""
+        self._holder: object = None
         end = 0
         for step in _STEP.finditer(path):
             self._go(*step.groups())
@@ -44,13 +45,19 @@ class Place:
         except (TypeError, LookupError):
             self.value = ABSENT
         self.where += f"[{index}]" if index is not None else f".{name}"
-        self.where, self.kind = self.where.removeprefix("."), entry
+        self.where, self._holder, self.kind = self.where.removeprefix("."), self.kind, entry
 
     @property
     def struct(self) -> type[msgspec.Struct] | None:
-        """The struct that was expected there, where it was one."""
-        found = (kind for kind in _choices(self.kind) if isinstance(kind, type))
-        return next((kind for kind in found if issubclass(kind, msgspec.Struct)), None)
+        """The struct that was expected there, where it was one: of several, the one that the value's tag names."""
+        found = list(_structs(self.kind))
+        tag = self.value.get("type") if isinstance(self.value, dict) else None
+        return next((kind for kind in found if kind.__struct_config__.tag == tag), next(iter(found), None))
+
+    @property
+    def tags(self) -> list[str]:
+        """The tags to choose from there, where it is the tag of one of several structs inside the whole."""
+        return [str(kind.__struct_config__.tag) for kind in _structs(self._holder)]
 
     @property
     def literals(self) -> list[str]:
@@ -68,6 +75,13 @@ def _choices(kind: object) -> Iterator[object]:
             yield from _choices(member)
     else:
         yield kind
+
+
+def _structs(kind: object) -> Iterator[type[msgspec.Struct]]:
+    """The structs among the members of a union."""
+    for member in _choices(kind):
+        if isinstance(member, type) and issubclass(member, msgspec.Struct):
+            yield member
 
 
 def _entry_type(kind: object, name: str | None, index: str | None) -> object:

@@ -1,6 +1,7 @@
 """A small robot for the client's tests: speaks the protocol, moves nothing, does what a test tells it."""
 
 import asyncio
+import math
 import queue
 import threading
 from contextlib import ExitStack, contextmanager
@@ -12,7 +13,7 @@ from tests.places import free_endpoint
 from tvist_client import LoopbackTransport, Robot
 from tvist_protocol.codec import decode_command, decode_setpoint, encode
 from tvist_protocol.info import Info, Limits
-from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.replies import Accepted, Done, Posture, Refused, ToolPose
 from tvist_protocol.stream import Event, State, Truth
 from tvist_protocol.values import Payload
 from tvist_server.gateways.network import Network
@@ -137,6 +138,28 @@ class FakeRobot:
         self.motion = (self.motions, self.tick + MOVE_TICKS, command.q)
         return Accepted(id=self.motions)
 
+    def _move_l(self, _):
+        self.motions += 1
+        self.put("event", Event(tick=self.tick + 1, kind="motion_started", id=self.motions))
+        self.motion = (self.motions, self.tick + MOVE_TICKS, self.q)
+        return Accepted(id=self.motions)
+
+    _move_c = _move_path = _move_l
+
+    def _servo_j(self, _):
+        if self.motion is None:
+            self._move_l(_)
+        self.motion = (self.motions, math.inf, None)
+        return Accepted(id=self.motions)
+
+    _speed_j = _speed_l = _servo_j
+
+    def _inverse_kinematics(self, _):
+        return Posture(q=(0.5,) * JOINTS)
+
+    def _forward_kinematics(self, _):
+        return ToolPose(pose=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6))
+
     def _servo_start(self, _):
         self.streaming = True
         return Done()
@@ -165,6 +188,8 @@ class FakeRobot:
             self.put("event", Event(tick=self.tick + 1, kind="motion_stopped", id=self.motion[0], why=why))
             self.motion = None
         return Done()
+
+    _stop_j = _stop_l = _stop
 
     def end_stream(self, why):
         self.streaming = False

@@ -12,7 +12,7 @@ from tvist_client import LoopbackTransport, MotionStoppedError, NotConnectedErro
 from tvist_client.blocking import Robot
 
 Q = (0.5, 0.0, 0.0, 0.0, 0.0, 0.0)
-INTERNAL = {"Robot": {"put_setpoint", "until", "watch"}, "Arm": {"keep_alive_every"}}
+INTERNAL = {"Robot": {"pass_time", "put_setpoint", "until", "watch"}, "Arm": {"keep_alive_every"}}
 INTERNAL |= {
     "Motion": {"on_event", "fail", "wait_event"},
     "Servo": {"check"},

@@ -7,8 +7,11 @@ import traceback
 import pytest
 
 from tvist_client import (
+    ArcSegment,
     ArgumentError,
     ClientError,
+    JointSegment,
+    LineSegment,
     MisuseError,
     NotConnectedError,
     ProtocolError,
@@ -24,6 +27,7 @@ from tvist_controller.loopback import LoopbackHost
 from tvist_lab.in_process import free_setup
 from tvist_protocol.keys import check_robot_name
 
+POSE = (0.4, 0.1, 0.5, 0.0, 3.1, 0.0)
 Q1 = (0.0, -3.1, 0.0, -1.57, 0.0, 0.0)
 MSGSPEC = re.compile(r"Expected `|Object (missing|contains)|Invalid enum|at `\$")
 
@@ -57,6 +61,34 @@ COMMANDS = {
     "text for a limit": (lambda arm: arm.move_j(Q1, velocity="fast"), "velocity is 'fast': must be a number"),
     "a negative limit": (lambda arm: arm.move_j(Q1, velocity=-1), "velocity is -1.0: must be more than 0"),
     "a limit above the arm's": (lambda arm: arm.move_j(Q1, velocity=9), "velocity is 9 rad/s; .* 3.14"),
+    "a pose without an orientation": (lambda arm: arm.move_l([0.4, 0.1, 0.5]), "pose has 3 numbers: must have 6"),
+    "text in a pose": (lambda arm: arm.move_l([*POSE[:5], "0"]), r"pose\[5\] is '0': must be a number"),
+    "a short frame": (lambda arm: arm.move_l(POSE, frame=[0, 0, 0]), "frame has 3 numbers: must have 6"),
+    "text for a duration": (lambda arm: arm.move_l(POSE, duration="2 s"), "duration is '2 s': must be a number"),
+    "no time": (lambda arm: arm.move_j(Q1, duration=0), "duration is 0.0: must be more than 0"),
+    "a point for via": (lambda arm: arm.move_c([0, 0, 0], POSE), "via has 3 numbers: must have 6, x y z rx ry rz"),
+    "an unknown orientation": (
+        lambda arm: arm.move_c(POSE, POSE, orientation="fixed"), "orientation is 'fixed': must be one of"
+    ),
+    "no segments": (lambda arm: arm.move_path([]), "segments has 0 entries: must have from 1 to 500"),
+    "too many segments": (lambda arm: arm.move_path([LineSegment(pose=POSE)] * 501), "segments has 501 entries"),
+    "one segment alone": (lambda arm: arm.move_path(LineSegment(pose=POSE)), "must be a list of segments"),
+    "a pose for a segment": (lambda arm: arm.move_path([POSE]), r"segments\[0\] is .*must be a LineSegment"),
+    "a short pose in a path": (
+        lambda arm: arm.move_path([LineSegment(pose=POSE), ArcSegment(via=POSE, pose=POSE[:3])]),
+        r"segments\[1\].pose has 3 numbers",
+    ),
+    "text in a path": (
+        lambda arm: arm.move_path([LineSegment(pose=POSE, blend="1 cm")]), r"segments\[0\].blend is '1 cm'"
+    ),
+    "text for a posture": (lambda arm: arm.move_path([JointSegment(q="Q1")]), r"segments\[0\].q is 'Q1'"),
+    "a short velocity": (lambda arm: arm.speed_l([0, 0, 0.1]), "xd has 3 numbers: must have 6, vx vy vz wx wy wz"),
+    "text for a velocity": (lambda arm: arm.speed_j("slow"), "qd is 'slow': must be a list of numbers"),
+    "to return in the past": (lambda arm: arm.speed_j([0] * 6, duration=-1), "duration is -1: must be more than 0"),
+    "never to return": (lambda arm: arm.servo_j(Q1, duration=math.inf), "duration is inf: .* finite"),
+    "text for a stop": (lambda arm: arm.stop_j("hard"), "acceleration is 'hard': must be a number"),
+    "a point without orientation": (lambda arm: arm.robot.inverse_kinematics([0.4, 0, 0.5]), "pose has 3 numbers"),
+    "no posture": (lambda arm: arm.robot.forward_kinematics("Q1"), "q is 'Q1': must be a list of numbers"),
     "a deceleration that is none": (lambda arm: arm.stop("hard"), "deceleration is 'hard'"),
     "a speed above 1": (lambda arm: arm.set_speed(2), "fraction is 2.0: must be at most 1"),
     "NaN for a speed": (lambda arm: arm.set_speed(math.nan), "fraction is NaN"),

@@ -28,6 +28,8 @@ RESET = {"type": "simulation.reset", "token": "t"}
 STEP = {"type": "simulation.step", "token": "t", "ticks": 1}
 FIXED = {"type": "set_estimator", "token": "t", "name": "fixed"}
 TAKE = {"type": "take_control", "client": "me"}
+LINE = {"type": "line", "pose": [0.0] * 6}
+PATH = {"type": "move_path", "token": "t"}
 
 
 def refused(decode, message):
@@ -102,6 +104,20 @@ WRONG = [
     (FIXED | {"calibration": {"a": {1: 2}}}, "malformed", "calibration.a", "not a string", None),
     (FIXED | {"calibration": {"a": msgpack.ExtType(9, b"x")}}, "malformed", "calibration.a", "Ext", None),
     (FIXED | {"calibration": {"a": msgpack.Timestamp(1)}}, "malformed", "calibration.a", "datetime", None),
+    (PATH | {"segments": []}, "out_of_range", "segments", "0 entries: must have at least 1", 1),
+    (PATH | {"segments": [LINE] * 501}, "out_of_range", "segments", "must have at most 500", 500),
+    (PATH | {"segments": [5]}, "malformed", "segments[0]", "a map, not an integer", None),
+    (PATH | {"segments": [{"pose": [0.0] * 6}]}, "missing_field", "segments[0].type", "is missing", None),
+    (PATH | {"segments": [LINE | {"type": 7}]}, "malformed", "segments[0].type", "a string", None),
+    (PATH | {"segments": [LINE, {"type": "joint"}]}, "missing_field", "segments[1].q", "is missing", None),
+    (
+        PATH | {"segments": [LINE | {"pos": 1}]},
+        "unknown_field",
+        "segments[0].pos",
+        "did you mean 'pose'",
+        None,
+    ),
+    (PATH | {"segments": [LINE | {"pose": [0] * 5}]}, "out_of_range", "segments[0].pose", "exactly 6", 6),
     (TAKE | {"client": ""}, "out_of_range", "client", "1 to 64 printable", None),
     (TAKE | {"client": "a" * 65}, "out_of_range", "client", "1 to 64 printable", None),
     (TAKE | {"client": "a\n"}, "out_of_range", "client", "printable", None),
@@ -119,6 +135,14 @@ def test_a_wrong_command_is_refused_with_code_field_sentence_and_limit(message, 
     assert (error.code, error.where, error.limit) == (code, where, limit)
     assert why in error.why
     assert len(error.why) < 250
+
+
+@pytest.mark.parametrize(("before", "given"), [(3, " is 'lin':"), (300, "")])
+def test_an_unknown_part_of_a_path_is_told_its_place_and_the_four_that_there_are(before, given):
+    """In a long message the value is not named."""
+    error = refused(decode_command, PATH | {"segments": [LINE] * before + [LINE | {"type": "lin"}]})
+    assert (error.code, error.where) == ("unknown_type", f"segments[{before}].type")
+    assert error.why == f"{error.where}{given} must be one of 'joint', 'line', 'process', 'arc'"
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """The `tvist` program: one JSON object with `--json`, words for people without, one sentence when it goes wrong."""
 
 import json
+import math
 import re
 import signal
 import subprocess
@@ -12,12 +13,14 @@ import pytest
 from tests.conformance.served import NOISE, PATIENCE, Served, free_endpoint
 from tests.conformance.wire import STOPPED, Wire
 
+from tvist_client.blocking import Robot
 from tvist_plant.description import load
 from tvist_plant.fingerprint import fingerprint
 
 pytestmark = pytest.mark.realtime
 
 HERE = "0.1,-3.1,0.1,-1.5,0.1,0.1"
+BENT = "0,-1.57,1.57,-1.57,-1.57,0"
 
 
 class Ended:
@@ -330,6 +333,37 @@ class TestMoveAndWatch:
             state = wire.state()
             assert state["runtime_state"] == STOPPED
             assert 0.1 < state["target_q"][0] < 2.9
+
+    def test_the_tool_moves_on_a_line_to_a_place_and_by_a_distance(self, realtime):
+        at = ("--endpoint", realtime.endpoint)
+        tvist("move", BENT, *at).assert_done()
+        assert (
+            "moved the tool by 0,0,-0.05 in"
+            in tvist("move", "--line", "--by", "0,0,-0.05", *at).assert_done().out
+        )
+        with Robot.connect(realtime.endpoint) as robot:
+            start = robot.forward_kinematics()
+            tvist("move", "--line", "-0.45,-0.1,0.5", *at).assert_done()
+            assert robot.forward_kinematics() == pytest.approx((-0.45, -0.1, 0.5, *start[3:]), abs=1e-9)
+            wanted = (-0.45, -0.1, 0.45, 2.2, 2.2, 0.1)
+            target = ",".join(map(str, (*wanted[:3], *map(math.degrees, wanted[3:]))))
+            said = (
+                tvist("move", "--line", target, "--degrees", "--duration", 1.5, "--json", *at)
+                .assert_done()
+                .json
+            )
+            assert robot.forward_kinematics() == pytest.approx(wanted, abs=1e-9)
+        assert said["seconds"] == pytest.approx(1.5, abs=0.15)  # and the delay of the shaper
+
+    def test_a_line_that_the_arm_cannot_follow_is_the_robots_sentence_with_a_next_step(self, realtime):
+        at = ("--endpoint", realtime.endpoint)
+        tvist("move", "Q1", *at).assert_done()
+        tvist("move", "--line", "0.5,0,0.5", *at).assert_failed(1, "singular", "Next: move the joints", BENT)
+        tvist("move", BENT, *at).assert_done()
+        tvist("move", "--line", "2,0,0.5", *at).assert_failed(1, "no_solution")
+        tvist("move", "--line", "--by", "0,0,-0.6", *at).assert_failed(
+            1, "collision", "floor", "% of the way"
+        )
 
     def test_a_name_of_no_pose_is_answered_with_the_robots_poses(self, realtime):
         ended = tvist("move", "there", "--endpoint", realtime.endpoint)

@@ -2,26 +2,34 @@
 
 import asyncio
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 from tvist_cli.failure import Failure, interrupted, told
-from tvist_cli.output import out, print_json
-from tvist_cli.poses import pose
+from tvist_cli.output import out, print_json, program
+from tvist_cli.poses import pose, tool_numbers
+from tvist_protocol.errors import RefusedError
 
 if TYPE_CHECKING:
     from tvist_client.arm import Arm
+    from tvist_client.motion import Motion
+
+BENT = "0,-1.57,1.57,-1.57,-1.57,0"
+"""A posture of arms like UR's that is far from any singular one [rad]."""
 
 
 def move(
     target: str,
     *,
+    line: bool = False,
+    by: bool = False,
     endpoint: str = "tcp/127.0.0.1:7447",
     name: str | None = None,
     security: Path | None = None,
     degrees: bool = False,
-    velocity: float = 1.5,
-    acceleration: float = 2.0,
-    jerk: float = 100.0,
+    velocity: float | None = None,
+    acceleration: float | None = None,
+    jerk: float | None = None,
+    duration: float | None = None,
     shaper: str | None = None,
     json: bool = False,
 ) -> None:
@@ -29,14 +37,20 @@ def move(
 
     Args:
         target: Name of a pose in the robot file that begins with a letter, such as Q1, or joint angles in rad separated
-            by commas: -0.5,-3.1,0,-1.57,0,0.
+            by commas: -0.5,-3.1,0,-1.57,0,0. With --line, the tool's position x,y,z in m in the base frame, or its
+            position and rotation vector x,y,z,rx,ry,rz in m and rad; with three numbers it keeps its orientation.
+        line: Move the tool on a straight line to the target.
+        by: Read the target of --line as the distance dx,dy,dz in m from the present position, in the base frame:
+            --line --by 0,0,-0.1 moves the tool 0.1 m down.
         endpoint: Zenoh endpoint of the robot.
         name: Name of the robot [ur5e; if there is none, the only robot at the endpoint].
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         degrees: Read the target's angles in degrees; the limits stay in rad.
-        velocity: Velocity limit of every joint in rad/s.
-        acceleration: Acceleration limit of every joint in rad/s².
-        jerk: Jerk limit of every joint in rad/s³.
+        velocity: Velocity limit of every joint in rad/s [1.5], or of the tool in m/s with --line [0.25].
+        acceleration: Acceleration limit of every joint in rad/s² [2], or of the tool in m/s² with --line [1.2].
+        jerk: Jerk limit of every joint in rad/s³ [100], or of the tool in m/s³ with --line [60].
+        duration: Duration of the motion in s before shaping, instead of these three limits; if it is too short for the
+            arm, the motion takes longer.
         shaper: Shaper to select before the motion.
         json: Print one JSON object.
     """
@@ -44,16 +58,16 @@ def move(
     from tvist_client.robot import NAME, Robot
     from tvist_client.transports.zenoh import only_robot
 
-    if "," in target or not target.strip()[:1].isalpha():
-        # A name begins with a letter; angles are checked before the robot is asked for anything.
-        pose(target, {}, "target", degrees=degrees)
+    given = _given(velocity, acceleration, jerk, duration)
+    numbers = _numbers(target, line=line, by=by, degrees=degrees)
     held = False
 
     async def run() -> tuple[int, int]:
         nonlocal held
         found = name if name is not None else await only_robot(endpoint, NAME, security)
         async with await Robot.connect(endpoint, found, security=security) as robot:
-            q = pose(target, (await robot.info()).poses, "target", degrees=degrees)
+            info = await robot.info()
+            q = () if line else pose(target, info.poses, "target", degrees=degrees)
             standing = await look(robot, unlock_command(endpoint, found, security))
             if not standing.ready:
                 raise Failure(f"{found} is not ready: {standing.sentence}")
@@ -62,7 +76,10 @@ def move(
                     await arm.set_shaper(shaper.lower())
                 held = True
                 try:
-                    motion = await arm.move_j(q, velocity=velocity, acceleration=acceleration, jerk=jerk)
+                    if line:
+                        motion = await _line(arm, numbers, given, by=by, joints=len(info.joints))
+                    else:
+                        motion = await arm.move_j(q, **given)
                 except asyncio.CancelledError:
                     await _stop(arm)
                     raise
@@ -77,7 +94,64 @@ def move(
     if json:
         print_json({"started_tick": started, "done_tick": done, "seconds": (done - started) * 0.002})
     else:
-        out.print(f"moved to {target.strip()} in {(done - started) * 0.002:.3f} s", markup=False)
+        moved = f"moved the tool {'by' if by else 'to'}" if line else "moved to"
+        out.print(f"{moved} {target.strip()} in {(done - started) * 0.002:.3f} s", markup=False)
+
+
+class _Limits(TypedDict, total=False):
+    """What is given of a motion."""
+
+    velocity: float
+    acceleration: float
+    jerk: float
+    duration: float
+
+
+def _given(
+    velocity: float | None, acceleration: float | None, jerk: float | None, duration: float | None
+) -> _Limits:
+    """The limits, or the duration instead."""
+    limits = _Limits()
+    if velocity is not None:
+        limits["velocity"] = velocity
+    if acceleration is not None:
+        limits["acceleration"] = acceleration
+    if jerk is not None:
+        limits["jerk"] = jerk
+    if duration is None:
+        return limits
+    if limits:
+        raise Failure(f"--{next(iter(limits))} and --duration exclude each other: give one of them", code=2)
+    return _Limits(duration=duration)
+
+
+def _numbers(target: str, *, line: bool, by: bool, degrees: bool) -> tuple[float, ...]:
+    """Check the target before the robot is asked for anything, and return its numbers with --line."""
+    if line:
+        return tool_numbers(target, by=by, degrees=degrees)
+    if by:
+        raise Failure("--by needs --line: only the tool is moved by a distance", code=2)
+    if "," in target or not target.strip()[:1].isalpha():
+        pose(target, {}, "target", degrees=degrees)
+    return ()
+
+
+async def _line(
+    arm: "Arm", numbers: tuple[float, ...], limits: _Limits, *, by: bool, joints: int
+) -> "Motion":
+    """Move the tool to a position, with an orientation or its own, or by a distance."""
+    goal = numbers
+    if len(numbers) == 3:
+        x, y, z, *turn = await arm.robot.forward_kinematics()
+        at = [x + numbers[0], y + numbers[1], z + numbers[2]] if by else numbers
+        goal = (*at, *turn)
+    try:
+        return await arm.move_l(goal, **limits)
+    except RefusedError as error:
+        if error.reply.code != "singular":
+            raise
+        example = f", for example with {program()} move {BENT}" if joints == 6 else ""
+        raise Failure(f"{error}. Next: move the joints to another posture first{example}") from error
 
 
 async def _stop(arm: "Arm") -> None:

@@ -7,13 +7,18 @@ from typing import Any
 import msgspec
 
 from tvist_protocol import commands as c
+from tvist_protocol import kinematics as k
+from tvist_protocol import motions as m
 from tvist_protocol.calibration import Calibration
 from tvist_protocol.codec import MAX_BYTES, encode
 from tvist_protocol.io import SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.motions import ServoJ, SpeedJ, SpeedL, StopJ, StopL
 from tvist_protocol.programs import ProgramLoad, ProgramPlay, ProgramStop
 from tvist_protocol.simulation import SimulationInject, SimulationStep
+from tvist_protocol.values import Pose
 
+TOOL = (-0.49, -0.13, 0.49, 2.22, 2.22, 0.0)
+"""A pose of the tool within reach [m, rad]."""
 POSE = (1.57, -1.57, 1.57, -1.57, -1.57, 0.0)
 STRANGER = "none of ours"
 """A token that belongs to no lease."""
@@ -49,6 +54,8 @@ class Messages:
         chance, token = self._random, self._random.choice((self._token, STRANGER))
         q = tuple(angle + chance.uniform(-NEAR, NEAR) for angle in POSE)
         mass = chance.uniform(0.0, 6.0)
+        via, pose = self._tool_pose(), self._tool_pose()
+        line = m.LineSegment(pose=via, blend=chance.uniform(0.0, 0.1))
         return [
             c.TakeControl(client=f"stranger {chance.randrange(9)}"),
             c.KeepAlive(token=token),
@@ -76,12 +83,23 @@ class Messages:
             ProgramPlay(token=token),
             ProgramStop(token=token),
             SetTcp(token=token, offset=(0.0, 0.0, 0.1, 0.0, 0.0, 0.0)),
+            m.MoveL(token=token, pose=pose),
+            m.MoveC(token=token, via=via, pose=pose),
+            m.MovePath(token=token, segments=(line, m.JointSegment(q=q), m.ArcSegment(via=via, pose=pose))),
+            k.InverseKinematics(pose=pose),
+            k.ForwardKinematics(q=q),
             SimulationSetInputs(token=token, digital_input_mask=255, digital_inputs=chance.randrange(256)),
             c.PowerOn(token=token),
             c.UnlockProtectiveStop(token=token),
             SimulationStep(token=token, ticks=10),
             SimulationInject(token=token, fault="nonsense"),
         ]
+
+    def _tool_pose(self) -> Pose:
+        """Return a pose of the tool near `TOOL`."""
+        x, y, z, *turn = (value + self._random.uniform(-NEAR, NEAR) for value in TOOL)
+        rx, ry, rz = turn
+        return x, y, z, rx, ry, rz
 
     def _unsound(self) -> bytes:
         """Return bytes that are not a command: truncated, modified or random."""

@@ -1,0 +1,148 @@
+"""Lines, paths and their refusals over the wire."""
+
+import math
+
+import pytest
+
+from .test_wire import validate
+from .wire import Q1, STOPPED
+
+BENT = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
+
+
+@pytest.fixture
+def bent(stepped):
+    """A robot in lockstep in a bent posture, the token of its lease, and the pose of its tool."""
+    stepped.listen("state", "event")
+    with stepped.control() as token:
+        stepped.command("simulation.reset", token=token, q=BENT, seed=0)
+        answer = stepped.command("forward_kinematics")
+        assert answer["type"] == "tool_pose", answer
+        yield stepped, token, answer["pose"]
+
+
+def after(pose, x=0.0, y=0.0, z=0.0):
+    """A pose shifted in the base frame."""
+    return [pose[0] + x, pose[1] + y, pose[2] + z, *pose[3:]]
+
+
+def played(wire, token, **command):
+    """The events of a motion, and the states until its end."""
+    begun = len(wire.received["event"]), len(wire.received["state"])
+    answer = wire.command(token=token, **command)
+    assert answer["type"] == "accepted", answer
+    ended = ("motion_done", "motion_stopped")
+
+    def events():
+        return [event for event in wire.received["event"][begun[0] :] if event.get("id") == answer["id"]]
+
+    while not any(event["kind"] in ended for event in events()):
+        wire.step(token, 100)
+    return events(), wire.received["state"][begun[1] :]
+
+
+def pose_at(wire, q):
+    answer = wire.command("forward_kinematics", q=q)
+    validate(answer)
+    return answer["pose"]
+
+
+def test_a_line_is_straight_and_ends_at_its_pose(bent):
+    wire, token, start = bent
+    goal = after(start, 0.1, 0.1, -0.05)
+    events, states = played(wire, token, type="move_l", pose=goal)
+    assert [event["kind"] for event in events] == ["motion_started", "motion_done"]
+    assert states[-1]["runtime_state"] == STOPPED
+    assert pose_at(wire, states[-1]["target_q"]) == pytest.approx(goal, abs=1e-9)
+    way = math.dist(goal[:3], start[:3])
+    for state in states[::25]:
+        at = pose_at(wire, state["target_q"])
+        there, left = math.dist(at[:3], start[:3]), math.dist(at[:3], goal[:3])
+        assert there + left == pytest.approx(way, abs=1e-5)
+        assert at[3:] == pytest.approx(start[3:], abs=1e-5)
+
+
+def test_a_motion_takes_the_duration_that_was_asked_for_and_the_delay_of_the_shaper(bent):
+    wire, token, start = bent
+    for command in ({"type": "move_l", "pose": after(start, z=0.1)}, {"type": "move_j", "q": BENT}):
+        events, _ = played(wire, token, duration=1.5, **command)
+        taken = (events[-1]["tick"] - events[0]["tick"]) * 0.002
+        assert 1.5 <= taken <= 1.65
+
+
+def test_an_arc_passes_its_point(bent):
+    wire, token, start = bent
+    via, goal = after(start, 0.05, 0.05), after(start, 0.1)
+    _, states = played(wire, token, type="move_c", via=via, pose=goal)
+    places = [pose_at(wire, state["target_q"])[:3] for state in states[::5]]
+    assert places[-1] == pytest.approx(goal[:3], abs=1e-9)
+    assert min(math.dist(place, via[:3]) for place in places) < 2e-3
+    centre = after(start, 0.05)[:3]
+    assert all(math.dist(place, centre) == pytest.approx(0.05, abs=1e-5) for place in places)
+
+
+def test_a_blended_path_does_not_stop_and_keeps_to_its_corners(bent):
+    wire, token, start = bent
+    corner, goal = after(start, 0.1), after(start, 0.1, 0.1)
+    parts = [{"type": "line", "pose": corner, "blend": 0.03}, {"type": "line", "pose": goal}]
+    events, states = played(wire, token, type="move_path", segments=parts)
+    assert [event["kind"] for event in events] == ["motion_started", "motion_done"]
+    places = [pose_at(wire, state["target_q"])[:3] for state in states[::5]]
+    nearest = min(places, key=lambda place: math.dist(place, corner[:3]))
+    assert 1e-3 < math.dist(nearest, corner[:3]) < 0.03
+    first, last = (next(at for at, state in enumerate(one) if moves(state)) for one in (states, states[::-1]))
+    assert all(moves(state) for state in states[first : len(states) - last])
+
+
+def moves(state):
+    return max(map(abs, state["target_qd"])) > 1e-3
+
+
+def test_overlapping_blends_are_told_in_a_warning(bent):
+    wire, token, start = bent
+    places = after(start, 0.1), after(start, 0.1, 0.1), after(start, 0.0, 0.1)
+    parts = [{"type": "line", "pose": pose, "blend": 0.06} for pose in places]
+    events, _ = played(wire, token, type="move_path", segments=parts)
+    assert [event["kind"] for event in events] == ["motion_started", "warning", "motion_done"]
+    assert events[1]["code"] == "blend_skipped"
+    assert "segments[1]" in events[1]["why"]
+
+
+def test_poses_are_read_in_a_frame(bent):
+    wire, token, start = bent
+    _, states = played(wire, token, type="move_l", pose=[0.0, 0.0, -0.05, 0.0, 0.0, 0.0], frame=start)
+    answer = wire.command("forward_kinematics", q=states[-1]["target_q"], frame=start)
+    assert answer["pose"] == pytest.approx([0.0, 0.0, -0.05, 0.0, 0.0, 0.0], abs=1e-9)
+
+
+def test_what_the_arm_cannot_follow_is_refused_with_its_field(bent):
+    wire, token, start = bent
+    far, under = after(start, x=-2.0), after(start, z=-0.6)
+    line = {"type": "line", "pose": after(start, z=0.05)}
+    for code, where, command in (
+        ("no_solution", "pose", {"type": "move_l", "pose": far}),
+        ("no_solution", "segments[1].pose", {"type": "move_path", "segments": [line, line | {"pose": far}]}),
+        ("collision", "", {"type": "move_l", "pose": under}),
+        ("singular", "pose", {"type": "move_l", "pose": after(start, -2.0 * start[0], -2.0 * start[1])}),
+        ("out_of_range", "via", {"type": "move_c", "via": line["pose"], "pose": line["pose"]}),
+        ("out_of_range", "velocity", {"type": "move_l", "pose": line["pose"], "velocity": 1e-4}),
+        ("limit_position", "segments[0].q[0]", {
+            "type": "move_path", "segments": [{"type": "joint", "q": [9.0, *BENT[1:]]}]
+        }),
+        ("unknown_type", "segments[1].type", {"type": "move_path", "segments": [line, {"type": "lin"}]}),
+    ):  # fmt: skip
+        answer = wire.command(token=token, **command)
+        validate(answer)
+        assert (answer["type"], answer["code"], answer["where"]) == ("refused", code, where), answer
+    wire.command("simulation.reset", token=token, q=Q1)
+    answer = wire.command("move_l", token=token, pose=start)
+    assert (answer["code"], answer["where"]) == ("singular", "pose")
+
+
+def test_poses_and_postures_are_answered_without_control(stepped):
+    pose = stepped.command("forward_kinematics", q=BENT)["pose"]
+    answer = stepped.command("inverse_kinematics", pose=pose, near=BENT)
+    validate(answer)
+    assert answer["q"] == pytest.approx(BENT, abs=1e-9)
+    refused = stepped.command("inverse_kinematics", pose=[2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert (refused["type"], refused["code"], refused["where"]) == ("refused", "no_solution", "pose")
