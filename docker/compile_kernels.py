@@ -1,6 +1,7 @@
 """Have every kernel compiled that a served robot calls, by driving one in process. Run while an image is built."""  # noqa: INP001  a script
 
 from tvist_controller.loopback import LoopbackHost
+from tvist_controller.planning.planner import Planner
 from tvist_protocol.codec import decode_reply, encode
 from tvist_protocol.commands import MoveJ, TakeControl
 from tvist_protocol.replies import Accepted, Done, Reply
@@ -20,3 +21,7 @@ assert isinstance(control, Accepted)
 assert control.token is not None
 assert isinstance(ask(MoveJ(token=control.token, q=(0.1, -3.0, 0.0, -1.5, 0.0, 0.0))), Accepted)
 assert isinstance(ask(SimulationStep(token=control.token, ticks=500)), Done)
+
+# What plans motions in space, for arms with and without closed-form inverse kinematics.
+for robot in ("ur5e", "one-joint"):
+    Planner(from_mapping({"robot": robot}, "configuration").setup()).rehearse()

@@ -43,7 +43,12 @@ def compile_kernels():
 
     async def move(shaper):
         async with robot_in_process(free_setup(shaper=shaper)) as robot, robot.control("compiler") as arm:
-            await arm.move_j([0.1, -3.0, 0.1, -1.5, 0.1, 0.1])
+            await arm.move_j([0.2, -1.4, 1.7, -1.8, -1.5, 0.3])
+            x, y, z, *turn = await robot.forward_kinematics()
+            await robot.inverse_kinematics([x, y, z + 0.05, *turn])
+            await arm.move_l([x, y, z + 0.05, *turn], velocity=1.0)
+            await arm.speed_l([0.0, 0.0, -0.1, 0.0, 0.0, 0.0], duration=0.1)
+            await arm.stop_l()
 
     for shaper in ("zv", "auto"):
         asyncio.run(move(shaper))

@@ -1,6 +1,7 @@
 """Compile functions with numba."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba import njit
@@ -11,3 +12,11 @@ F = TypeVar("F", bound=Callable[..., Any])
 def compiled(function: F) -> F:
     """Compile `function`; its Python source remains available as `.py_func`; the cache outlives the process."""
     return cast("F", njit(cache=True)(function))
+
+
+def is_cached(function: Callable[..., Any]) -> bool:
+    """Return whether a compiled function's machine code is on disk already; otherwise its first call takes seconds."""
+    stats = getattr(function, "stats", None)
+    if stats is None:  # pragma: no cover  it runs as Python: there is nothing to compile
+        return True
+    return any(Path(stats.cache_path).glob(f"*.{function.__name__}-*.nbi"))

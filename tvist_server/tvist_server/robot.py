@@ -55,7 +55,7 @@ class ServedRobot:
         self.driven = Mailbox(self._host)
         """The robot as seen by the clock."""
         # When a client advances time, nothing is late, and plans are made when they are needed.
-        self._plan_ahead = None if lockstep else PlanAhead(self._host, Planner(setup), self.driven.post)
+        self._plan_ahead = None if lockstep else PlanAhead(self._host, _planner(setup), self.driven.post)
         carry_out = self._carry_out if self._plan_ahead is None else self._plan_ahead.submit
         self.reception = Reception(self._host, self.driven.post, carry_out, self._publisher.answer)
         """Desk that gateways pass messages to."""
@@ -174,3 +174,10 @@ class ServedRobot:
     def _warn(self, why: str) -> None:
         """Publish a warning to clients and the console."""
         self.driven.post(lambda: self._host.warn(why))
+
+
+def _planner(setup: Setup) -> Planner:
+    """A planner that compiles nothing while the robot ticks."""
+    planner = Planner(setup)
+    planner.rehearse()
+    return planner

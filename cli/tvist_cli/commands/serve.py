@@ -89,10 +89,11 @@ def serve(
         "ur_ports": None if ur_port is None else dict(map(_ur_port, ur_port)),
     }  # fmt: skip
     began = time.monotonic()
+    from tvist_controller.kinematics.inverse import is_compiled as planning_is_compiled
     from tvist_plant.flexible_arm import is_compiled
 
-    if not is_compiled():
-        say("compiling the arm's equations; this happens once and takes a few seconds")
+    if not (is_compiled() and planning_is_compiled()):
+        say("compiling the arm's equations; this happens once and takes up to a minute")
     from tvist_server.config import ConfigError, from_mapping, read_toml
     from tvist_server.ending import Ending
     from tvist_server.gateways.base import GatewayError

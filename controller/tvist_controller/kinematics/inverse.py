@@ -5,6 +5,7 @@ from typing import Any, Literal
 import numpy as np
 from numba import float64, types
 
+from tvist_controller._compiled import is_cached
 from tvist_controller.kinematics.choice import FOUND, NO_SOLUTION, closest, improved_postures, search
 from tvist_controller.kinematics.denavit_hartenberg import Floats
 from tvist_controller.kinematics.geometry import ANY, arm_table
@@ -49,7 +50,8 @@ class InverseKinematics:
     UR arms, and arms with a spherical wrist, are solved in closed form (`postures`), others by damped least squares
     from 64 starts, which are the same for every call. There, a posture that no start leads to is missed.
 
-    Objects keep no state between calls. The constructor compiles what the methods use, or loads it from numba's cache.
+    Objects keep no state between calls. `prepare` compiles what `solve` uses, or loads it from numba's cache; else
+    the first call does so.
 
     Args:
         description: The robot.
@@ -62,7 +64,10 @@ class InverseKinematics:
         self._closed = bool(self._arm[-1, 0] != ANY)
         span = np.minimum(self._limits, np.pi)
         self._starts = np.random.default_rng(1).uniform(-span, span, (STARTS, description.joints))
-        _compile(self._closed)
+
+    def prepare(self) -> None:
+        """Compile what `solve` uses; this takes half a minute once, and then half a second in each process."""
+        _compile(*(CLOSED_FORM if self._closed else NUMERICAL))
 
     @property
     def closed_form(self) -> bool:
@@ -88,6 +93,7 @@ class InverseKinematics:
             InverseKinematicsError: No posture within the joints' ranges has this pose.
             TypeError: An array does not have 64-bit floats.
         """
+        self.prepare()
         if not self._closed:
             return self._search(rotation, position, near)
         q = near.copy()
@@ -156,18 +162,19 @@ def _distinct(found: Floats) -> Floats:
     return np.array(kept).reshape(len(kept), found.shape[1])
 
 
-def _compile(closed_form: bool) -> None:
-    """Compile the kernels for arrays of any layout, once: the first call of a method must not take seconds."""
-    table, result = types.Array(float64, 2, "C"), types.Array(float64, 1, "C")
-    vector, matrix = (types.Array(float64, axes, "A", readonly=True) for axes in (1, 2))
-    pose = (matrix, vector)
-    kernels: tuple[tuple[Any, Any], ...] = ((search, (table, table, *pose, vector, table)),)
-    if closed_form:
-        kernels = (
-            (closest, (table, *pose, vector, result)),
-            (improved_postures, (table, *pose, vector, table)),
-        )
-    for kernel, signature in kernels:
-        if signature not in kernel.overloads:
-            kernel.compile(signature)
-            kernel.disable_compile()  # arrays of another type are refused, not compiled for
+_TABLE, _RESULT = types.Array(float64, 2, "C"), types.Array(float64, 1, "C")
+_MATRIX, _VECTOR = (types.Array(float64, axes, "A", readonly=True) for axes in (2, 1))
+CLOSED_FORM = closest, (_TABLE, _MATRIX, _VECTOR, _VECTOR, _RESULT)
+NUMERICAL = search, (_TABLE, _TABLE, _MATRIX, _VECTOR, _VECTOR, _TABLE)
+"""Kernels of `solve`, with the types of their arguments: arrays of any layout."""
+
+
+def _compile(kernel: Any, signature: tuple[Any, ...]) -> None:
+    if signature not in kernel.overloads:
+        kernel.compile(signature)
+        kernel.disable_compile()  # arrays of another type are refused, not compiled for
+
+
+def is_compiled() -> bool:
+    """Return whether the closed form is compiled for this processor; otherwise that takes half a minute."""
+    return is_cached(closest)

@@ -106,6 +106,8 @@ def _cut(leg: Leg, then: Leg, left: float, tracker: Tracker) -> _Cut | str:
     for _ in range(TRIES):
         before = _within(leg, radius, tracker, from_end=True)
         after = _within(then, radius, tracker, from_end=False)
+        if np.isinf(before) or np.isinf(after):
+            return "is larger than the way of a part beside it"
         if before > left * INSIDE or after > then.way.length * INSIDE:
             return "does not fit between those beside it and the ends of its parts"
         before, after = min(before, left), min(after, then.way.length)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tvist_controller.ahead import MAX_AHEAD, Ahead
-from tvist_controller.collision import CLEARANCE, CollisionModel
+from tvist_controller.collision import CLEARANCE, CollisionModel, Meeting
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.control.shaped_reference import ShapedReference
@@ -100,32 +100,18 @@ class MovePlanner:
             motion = quickest_motion(path, spared, PERIOD, rate)
         except ValueError as error:
             raise RefusalError("out_of_range", "velocity", str(error)) from error
-        self.check_clear(motion, basis)
-        return PlannedMove((motion,), limits.velocity, self.excess_of_torque(motion, basis))
-
-    def check_clear(
-        self, motion: PlannedMotion, basis: MotionBasis, shares: tuple[float, float] | None = None
-    ) -> None:
-        """Check that nothing is in the way of a motion.
-
-        Args:
-            motion: The motion.
-            basis: State that it depends on.
-            shares: Shares of the whole way at its start and end, for a motion along a path; None for a joint move.
-
-        Raises:
-            RefusalError: It would lead to a collision.
-        """
-        if self._collisions.carried is not basis.carried:
-            self._collisions.carry(basis.carried)
-        found = self._collisions.on_way(motion.path.whole)
+        found = self.meeting(motion, basis)
         if found is not None:
             share, meeting = found
-            when = f"{motion.time_at(share):.2f} s after the start"
-            if shares is not None:
-                whole = shares[0] + share * (shares[1] - shares[0])
-                when = f"after {100.0 * whole:.0f} % of the way"
-            raise RefusalError("collision", "q" if shares is None else "", f"{meeting} {when}", CLEARANCE)
+            time = motion.time_at(share)
+            raise RefusalError("collision", "q", f"{meeting} {time:.2f} s after the start", CLEARANCE)
+        return PlannedMove((motion,), limits.velocity, self.excess_of_torque(motion, basis))
+
+    def meeting(self, motion: PlannedMotion, basis: MotionBasis) -> tuple[float, Meeting] | None:
+        """Return the share of a motion's way after which two bodies would meet, and which; None if it is clear."""
+        if self._collisions.carried is not basis.carried:
+            self._collisions.carry(basis.carried)
+        return self._collisions.on_way(motion.path.whole)
 
     def excess_of_torque(self, motion: PlannedMotion, basis: MotionBasis) -> str | None:
         """Say by how much a motion will exceed a torque limit; None if it will not."""

@@ -4,11 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from tvist_controller.collision import CLEARANCE
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.paths.legs import JointWay, Leg, Pacing
 from tvist_controller.paths.pacing import JointLimits, fastest, joined, law_of, timed
 from tvist_controller.paths.poses import Placement, placement
-from tvist_controller.paths.route import Run, runs_of
+from tvist_controller.paths.route import Piece, Run, runs_of
 from tvist_controller.paths.tool_curves import PER_RADIAN, SHORTEST, ToolArc, ToolCurve, ToolLine
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.planning.basis import MotionBasis
@@ -59,6 +60,17 @@ class PathPlanner:
         self._description, self._filters, self._moves = setup.description, filters, moves
         self._reachable = reachable
 
+    def rehearse(self) -> None:
+        """Compile what plans use, before any is needed."""
+        q = np.zeros(self._description.joints)
+        tracker = Tracker(self._description, (0.0,) * 6)
+        tracker.pose(q)
+        tracker.rates(q, ToolLine(*[tracker.pose(q)] * 2).at(0.0))
+        run = [Piece(JointWay(q, q + 0.1).part(0.0, 0.1 * PER_RADIAN), Pacing(1.0, 1.0), None, True, "")]
+        limits = self._description.limits
+        joints = JointLimits(np.array(limits.velocity), np.array(limits.acceleration), min(limits.jerk))
+        law_of(run, SplineCurve(joined(run)), joints, 60.0, LEAST_WINDOW)
+
     def plan(self, command: MoveL | MoveC | MovePath, basis: MotionBasis) -> PlannedMove:
         """Plan a motion from rest; the command's content has been checked.
 
@@ -73,16 +85,16 @@ class PathPlanner:
             raise self._reachable.refusal(error, "segments", 1.0, legs[-1].corner, basis.tcp) from error
         if not runs:
             runs = [[]]
-        length = sum(float(piece.knots.s[-1]) for run in runs for piece in run)
+        length = sum(map(_length, runs))
         tvist, done, motions = self._filters.present(basis.filter), 0.0, list[PlannedMotion]()
         window = velocity = 0.0
         for run in runs:
             motion, delay, highest = self._motion(run, command.jerk, tvist, basis)
             velocity = max(velocity, highest)
-            self._moves.check_clear(motion, basis, _shares(run, done, length))
+            self._check_clear(motion, run, (done, length), basis)
             motions.append(motion)
             window = max(window, delay)
-            done += sum(float(piece.knots.s[-1]) for piece in run)
+            done += _length(run)
         excess = [self._moves.excess_of_torque(motion, basis) for motion in motions]
         return PlannedMove(
             tuple(motions),
@@ -154,6 +166,23 @@ class PathPlanner:
             f"way; it goes to ±{most[joint]:g}"
         )
         raise RefusalError("limit_position", field, why, float(most[joint]))
+
+    def _check_clear(
+        self, motion: PlannedMotion, run: Run, part: tuple[float, float], basis: MotionBasis
+    ) -> None:
+        """Refuse a motion that something is in the way of; `part` is its start on the whole path and that's length."""
+        found = self._moves.meeting(motion, basis)
+        if found is None:
+            return
+        share, meeting = found
+        covered, where = share * _length(run), ""
+        for piece, end in zip(run, np.cumsum([piece.knots.s[-1] for piece in run]), strict=True):
+            where = _field(piece.where)
+            if end >= covered:
+                break
+        whole = 100.0 * (part[0] + covered) / part[1]
+        why = f"{where}: {meeting} after {whole:.0f} % of the way"
+        raise RefusalError("collision", where, why, CLEARANCE)
 
     # ------------------------------------------------------------------ time
 
@@ -227,8 +256,10 @@ def _pacing(segment: Segment) -> Pacing:
             return Pacing(segment.velocity, segment.acceleration, even=True)
 
 
-def _shares(run: Run, done: float, length: float) -> tuple[float, float]:
-    """Shares of the whole way at the start and at the end of a run."""
-    if not run:
-        return 0.0, 1.0
-    return done / length, (done + sum(float(piece.knots.s[-1]) for piece in run)) / length
+def _length(run: Run) -> float:
+    return sum(float(piece.knots.s[-1]) for piece in run)
+
+
+def _field(where: str) -> str:
+    """Field of the command for a part of the path: a segment, or the pose of a command for one part."""
+    return where or "pose"

@@ -63,6 +63,11 @@ class Planner:
         self._reachable = Reachable(setup.description)
         self._paths = PathPlanner(setup, self.filters, self._moves, self._reachable)
 
+    def rehearse(self) -> None:
+        """Compile what plans use, before any is needed: it takes long where nothing is in numba's cache."""
+        self._reachable.rehearse()
+        self._paths.rehearse()
+
     def plan(self, command: c.Command, basis: PlanBasis) -> Plan:
         """Plan a command; a refusal is a plan, too."""
         on: FilterBasis | MotionBasis | ToolBasis | None = basis.filter
