@@ -152,9 +152,9 @@ class Sequence:
                 raise self._broken(f"a reference is at {q[-1].tolist()}, beyond a joint's range")
             if (fast := np.abs(q[-1] - q[-2]).max() / PERIOD) > VELOCITY * min(limits.velocity):
                 raise self._broken(f"a reference moves at {fast:.4f} rad/s")
-            if (hard := np.abs(np.diff(q, 2, axis=0)).max() / PERIOD**2) > ACCELERATION * min(
-                limits.acceleration
-            ):
+            # Shapers with negative impulses exceed their reference by their peak.
+            most = ACCELERATION * robot.controller.cycle.line_filter.peak * min(limits.acceleration)
+            if (hard := np.abs(np.diff(q, 2, axis=0)).max() / PERIOD**2) > most:
                 raise self._broken(f"a reference accelerates by {hard:.3f} rad/s²")
             self._watch_clearance(q)
         if self._ahead is not None:
