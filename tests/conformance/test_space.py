@@ -122,7 +122,7 @@ def test_what_the_arm_cannot_follow_is_refused_with_its_field(bent):
     for code, where, command in (
         ("no_solution", "pose", {"type": "move_l", "pose": far}),
         ("no_solution", "segments[1].pose", {"type": "move_path", "segments": [line, line | {"pose": far}]}),
-        ("collision", "", {"type": "move_l", "pose": under}),
+        ("collision", "pose", {"type": "move_l", "pose": under}),
         ("singular", "pose", {"type": "move_l", "pose": after(start, -2.0 * start[0], -2.0 * start[1])}),
         ("out_of_range", "via", {"type": "move_c", "via": line["pose"], "pose": line["pose"]}),
         ("out_of_range", "velocity", {"type": "move_l", "pose": line["pose"], "velocity": 1e-4}),

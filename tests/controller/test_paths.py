@@ -244,7 +244,7 @@ def test_a_target_where_the_tool_is_ends_at_once():
     [
         (MoveL, {"pose": away((5.0, 0.0, 0.0))}, "no_solution", "pose", "no joint positions"),
         (MoveL, {"pose": away((0.7, 0.2, 0.2))}, "singular", "pose", "% of the way"),
-        (MoveL, {"pose": away((0.0, 0.0, -0.6))}, "collision", "", "% of the way"),
+        (MoveL, {"pose": away((0.0, 0.0, -0.6))}, "collision", "pose", "% of the way"),
         (
             MoveC,
             {"via": away((0.1, 0.0, 0.0)), "pose": away((0.2, 0.0, 0.0))},
