@@ -97,4 +97,6 @@ def test_slider_and_pauses_stay_on_the_path_and_lead_to_its_end(seed):
     assert turned <= 1e-4
     assert np.abs(np.diff(q, axis=0)).max() / H <= 1.01 * min(UR5E.limits.velocity)
     assert np.abs(np.diff(q, 2, axis=0)).max() / H**2 <= 1.01 * min(UR5E.limits.acceleration)
-    assert [event.kind for event in robot.events if event.kind in {"motion_done", "motion_stopped"}] == ["motion_done"]
+    assert [event.kind for event in robot.events if event.kind in {"motion_done", "motion_stopped"}] == [
+        "motion_done"
+    ]

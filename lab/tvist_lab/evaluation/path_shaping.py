@@ -13,9 +13,15 @@ from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration
 from tvist_shaping.base import Filter
 
-ALONG, JOINTS = "along", "joints"
-WAYS = {ALONG: "along the path", JOINTS: "joint by joint"}
-"""Ways to shape a path, by name."""
+ALONG, JOINTS, UNSLOWED = "along", "joints", "joints_unslowed"
+WAYS = {
+    ALONG: "along the path",
+    JOINTS: "joint by joint",
+    UNSLOWED: "joint by joint, not slowed down",
+}
+"""Ways to shape a path, by name. The first two shape the reference that the robot plans for the shaper; the third one
+shapes what it plans without a shaper, which is quicker in bends.
+"""
 SPACING = 2e-4
 """Distance of the postures at which a path is sampled, in units of its parameter [m]."""
 
@@ -70,7 +76,7 @@ def shaped(reference: Reference, tvist: Filter, way: str) -> Floats:
     """Shape a reference from rest.
 
     Args:
-        reference: The reference.
+        reference: The reference, planned for the shaper or without one, whichever the way asks for.
         tvist: The filter; it is not changed.
         way: Name of one of `WAYS`.
 
@@ -81,7 +87,7 @@ def shaped(reference: Reference, tvist: Filter, way: str) -> Floats:
         ShaperFaultError: The shaper's function fails.
     """
     path, mine = reference.motion.path, tvist.fork()
-    if way == JOINTS:
+    if way != ALONG:
         mine.reset(path.posture(path.start))
         mine.aim(path.posture(path.end))
         return shape(sound(mine), reference.q)[0]

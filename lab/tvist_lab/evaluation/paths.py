@@ -8,7 +8,7 @@ import numpy as np
 from tvist_controller.api import RefusalError, body, paper_payload
 from tvist_lab.evaluation.evaluate import WORTH, measured
 from tvist_lab.evaluation.line import control_line, simulate
-from tvist_lab.evaluation.path_shaping import WAYS, Reference, planned, shaped
+from tvist_lab.evaluation.path_shaping import ALONG, JOINTS, UNSLOWED, WAYS, Reference, planned, shaped
 from tvist_lab.evaluation.random_paths import KINDS, Kind, PathDraw, ToolMove
 from tvist_lab.evaluation.shaperbench import kinematics
 from tvist_lab.evaluation.tool_path import ToolPath
@@ -45,15 +45,17 @@ class PathJob:
     """Seed of all paths."""
     place: int
     """Number of this path, from 0."""
+    kinds: tuple[Kind, ...] = KINDS
+    """Kinds of paths, which take turns."""
 
     @property
     def kind(self) -> Kind:
         """Kind of this path."""
-        return KINDS[self.place % len(KINDS)]
+        return self.kinds[self.place % len(self.kinds)]
 
     @property
     def motions(self) -> int:
-        """Number of motions: unshaped, and two for each shaper."""
+        """Number of motions: unshaped, and each way for each shaper."""
         return 1 + len(WAYS) * len(self.shapers)
 
 
@@ -146,6 +148,12 @@ def judge(job: PathJob) -> JudgedPath:
             peaks[0][1] / peaks[1][1],
         )
 
+    def in_every_way(reference: Reference, tvist: Filter) -> dict[str, Followed]:
+        ways = {way: follow(reference, shaped(reference, tvist, way)) for way in (ALONG, JOINTS)}
+        same = np.array_equal(reference.q, unshaped.q)
+        ways[UNSLOWED] = ways[JOINTS] if same else follow(unshaped, shaped(unshaped, tvist, UNSLOWED))
+        return ways
+
     return JudgedPath(
         move,
         path.length,
@@ -153,10 +161,7 @@ def judge(job: PathJob) -> JudgedPath:
         found.stopping,
         follow(unshaped, unshaped.q),
         {name: found.plans[name][0].motion.duration for name in job.shapers},
-        {
-            name: {way: follow(found.plans[name][0], shaped(*found.plans[name], way)) for way in WAYS}
-            for name in job.shapers
-        },
+        {name: in_every_way(*found.plans[name]) for name in job.shapers},
     )
 
 

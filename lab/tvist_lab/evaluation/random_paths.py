@@ -1,7 +1,7 @@
 """Random paths of the tool: lines, arcs and chains of lines with blends, from postures away from the singular ones."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -13,6 +13,7 @@ from tvist_lab.recordings import Floats
 from tvist_lab.workspace import ranges, workspace
 from tvist_plant.description import RobotDescription
 from tvist_protocol.motions import ArcSegment, LineSegment, MovePath, Segment
+from tvist_protocol.values import Pose
 
 Kind = Literal["line", "arc", "blends"]
 KINDS: tuple[Kind, ...] = ("line", "arc", "blends")
@@ -24,7 +25,7 @@ LENGTH, TURN = (0.1, 0.6), 0.6
 RADIUS, ANGLE = (0.05, 0.25), (np.pi / 3.0, 1.5 * np.pi)
 """Ranges of the radius [m] and angle [rad] of an arc."""
 LINES, PART, PART_TURN, BLEND = (3, 5), (0.1, 0.3), 0.3, (0.01, 0.05)
-"""Ranges of the number of lines of a chain, of their lengths [m], their largest turn [rad] and the blends' radii [m]."""
+"""Ranges of the number of lines of a chain and of their lengths [m], largest turn [rad], range of the blends [m]."""
 REGULAR = 0.05
 """Smallest singular value of the Jacobian at the start, with turns counted as lengths [m]."""
 WRIST = np.pi
@@ -44,6 +45,13 @@ class ToolMove:
     """The path, without a token."""
 
 
+class _Pace(NamedTuple):
+    """Speed [m/s] and acceleration [m/s²] of the tool on a path."""
+
+    velocity: float
+    acceleration: float
+
+
 class PathDraw:
     """Draws paths for one robot and one payload.
 
@@ -61,10 +69,7 @@ class PathDraw:
         """Draw a path; whether the robot can follow it is for its planner to say."""
         start = self._posture(random)
         position, matrix = self._at(start)
-        pace = {
-            "velocity": float(random.uniform(*SPEED)),
-            "acceleration": float(random.uniform(*ACCELERATION)),
-        }
+        pace = _Pace(float(random.uniform(*SPEED)), float(random.uniform(*ACCELERATION)))
         make = {"line": _line, "arc": _arc, "blends": _chain}[kind]
         segments = make(random, position, Rotation.from_matrix(matrix), pace)
         return ToolMove(kind, tuple(start.tolist()), self._mass, MovePath(token="", segments=segments))
@@ -83,14 +88,14 @@ class PathDraw:
 
 
 def _line(
-    random: np.random.Generator, position: Floats, rotation: Rotation, pace: dict[str, float]
+    random: np.random.Generator, position: Floats, rotation: Rotation, pace: _Pace
 ) -> tuple[Segment, ...]:
-    end = position + random.uniform(*LENGTH) * _direction(random)
-    return (LineSegment(pose=pose_of(end, _turned(random, rotation, TURN)), **pace),)
+    pose = pose_of(position + random.uniform(*LENGTH) * _direction(random), _turned(random, rotation, TURN))
+    return (LineSegment(pose=pose, velocity=pace.velocity, acceleration=pace.acceleration),)
 
 
 def _arc(
-    random: np.random.Generator, position: Floats, rotation: Rotation, pace: dict[str, float]
+    random: np.random.Generator, position: Floats, rotation: Rotation, pace: _Pace
 ) -> tuple[Segment, ...]:
     axis, aside = _direction(random), _direction(random)
     out = np.cross(axis, aside)
@@ -99,22 +104,32 @@ def _arc(
     via, end = (
         position - out + Rotation.from_rotvec(share * angle * axis).apply(out) for share in (0.5, 1.0)
     )
+    turned = _turned(random, rotation, TURN)
     return (
         ArcSegment(
-            via=pose_of(via, rotation), pose=pose_of(end, _turned(random, rotation, TURN)), **pace
+            via=pose_of(via, rotation),
+            pose=pose_of(end, turned),
+            velocity=pace.velocity,
+            acceleration=pace.acceleration,
         ),
     )
 
 
 def _chain(
-    random: np.random.Generator, position: Floats, rotation: Rotation, pace: dict[str, float]
+    random: np.random.Generator, position: Floats, rotation: Rotation, pace: _Pace
 ) -> tuple[Segment, ...]:
     segments = []
     for _ in range(int(random.integers(LINES[0], LINES[1] + 1))):
         position = position + random.uniform(*PART) * _direction(random)
         rotation = _turned(random, rotation, PART_TURN)
-        blend = float(random.uniform(*BLEND))
-        segments.append(LineSegment(pose=pose_of(position, rotation), blend=blend, **pace))
+        segments.append(
+            LineSegment(
+                pose=pose_of(position, rotation),
+                blend=float(random.uniform(*BLEND)),
+                velocity=pace.velocity,
+                acceleration=pace.acceleration,
+            )
+        )
     return tuple(segments)
 
 
@@ -129,6 +144,8 @@ def _turned(random: np.random.Generator, rotation: Rotation, most: float) -> Rot
     return Rotation.from_rotvec(random.uniform(0.0, most) * _direction(random)) * rotation
 
 
-def pose_of(position: Floats, rotation: Rotation) -> tuple[float, ...]:
+def pose_of(position: Floats, rotation: Rotation) -> Pose:
     """Return a pose as messages have it: position [m] and rotation vector [rad]."""
-    return (*position.tolist(), *rotation.as_rotvec().tolist())
+    x, y, z = map(float, position)
+    a, b, c = map(float, rotation.as_rotvec())
+    return (x, y, z, a, b, c)
