@@ -16,13 +16,13 @@ SHOWN = {ALONG: SHAPED, JOINTS: UNSHAPED}
 """Ways that the figures compare, and their colours."""
 FLOOR = 0.01
 """Smaller shares of the vibration are drawn at this value [%]."""
-AROUND = 1.3
-"""Half the width of the view of a corner, relative to the blend [-]."""
+BEYOND = 0.15
+"""Width of the view of a corner beyond the blend on each side, relative to it [-]."""
 
 
 def corner_figure(corner: Corner) -> Figure:
     """Draw a corner from above, with the shaped references in both ways, and their distances from the path."""
-    figure, (above, below) = panels(2, 6.4, share_x=False, ratios=(5, 2))
+    figure, (above, below) = panels(2, 7.6, share_x=False, ratios=(7, 2))
     path = 1e3 * corner.path
     above.plot(path[:, 0], path[:, 1], color=FAINT, linewidth=3.0, alpha=0.6, label="Path")
     for way, color in SHOWN.items():
@@ -30,19 +30,15 @@ def corner_figure(corner: Corner) -> Figure:
         above.plot(x, y, ".-", color=color, markersize=3.5, linewidth=0.9, label=f"Shaped {WAYS[way]}")
         off = 1e3 * corner.off[way]
         below.plot(PERIOD * np.arange(len(off)), off, color=color, linewidth=1.2)
-    middle = path[np.argmin(np.linalg.norm(path, axis=1))]
-    half = AROUND * 0.5 * 1e3 * BLEND
+    around = 1e3 * BLEND * np.array([-BEYOND, 1.0 + BEYOND])
     above.set(
-        xlim=(middle[0] - 1.6 * half, middle[0] + 1.6 * half),
-        ylim=(middle[1] - half, middle[1] + half),
-        xlabel="x from the corner (mm)",
-        ylabel="y (mm)",
+        xlim=-around[::-1], ylim=around, xlabel="x from the corner (mm)", ylabel="y from the corner (mm)"
     )
     above.set_aspect("equal")
     below.set(xlabel="Time (s)", ylabel="Distance (mm)")
     title(
         above,
-        f"Corner with a blend of {1e3 * BLEND:g} mm at {CORNER_SPEED:g} m/s, {CORNER_SHAPER}, from above",
+        f"{1e3 * BLEND:g} mm blend at {CORNER_SPEED:g} m/s, {CORNER_SHAPER}; a point every 2 ms",
     )
     title(below, "Distance from the path")
     legend(figure, above)
@@ -66,8 +62,12 @@ def path_shaping_figure(judged: Sequence[JudgedPath]) -> Figure:
             _boxes(panel, values, at, color)
         above.plot([], [], color=color, linewidth=5.0, alpha=0.5, label=f"Shaped {WAYS[way]}")
     above.set_yscale("log")
+    for axis in (above.yaxis.set_major_formatter, above.yaxis.set_minor_formatter):
+        axis(lambda value, _: f"{value:g}" if str(value).strip("0.")[:1] in "125" else "")
     above.axhline(5.0, color=FAINT, linewidth=0.8, linestyle=":")
-    note(above, "5 %", (len(names) - 0.5, 5.0), color=FAINT, ha="right", va="bottom")
+    for panel in (above, below):
+        panel.set_xlim(-0.5, len(names) - 0.5)
+    note(above, "5 %", (len(names) - 0.52, 5.0), color=FAINT, ha="right", va="bottom")
     above.set_ylabel("Peak after the stop (% of unshaped)")
     below.set_ylabel("rms during the motion / unshaped")
     below.axhline(1.0, color=FAINT, linewidth=0.8)
