@@ -84,7 +84,7 @@ def paths(
         if markdown is not None:
             markdown.write_text(page(result), encoding="utf-8")
         if figures is not None:
-            _draw(judged, plant, known, figures)
+            _draw(result["paths"], plant, known, figures)
     if json:
         print_json(result)
     else:
@@ -153,12 +153,12 @@ def _command(
 
 
 def _draw(
-    judged: "list[JudgedPath]", description: "RobotDescription", known: "Calibration", folder: Path
+    paths: list[dict[str, Any]], description: "RobotDescription", known: "Calibration", folder: Path
 ) -> None:
     from tvist_lab.evaluation.path_examples import corner
     from tvist_lab.figures import corner_figure, path_shaping_figure, save
 
-    err.print(str(save(path_shaping_figure(judged), folder / "path_shaping.png")))
+    err.print(str(save(path_shaping_figure(paths), folder / "path_shaping.png")))
     err.print(str(save(corner_figure(corner(description, known)), folder / "path_corner.png")))
 
 

@@ -188,7 +188,7 @@ def circle_in_words(circle: dict[str, Any]) -> str:
 
 
 def _table(columns: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
-    rule = "|".join(["---", "---", *["---:"] * (len(columns) - 2)])
+    rule = " | ".join(["---", "---", *["---:"] * (len(columns) - 2)])
     return "\n".join(f"| {line} |" for line in (" | ".join(columns), rule, *map(" | ".join, lines)))
 
 

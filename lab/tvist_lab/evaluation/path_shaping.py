@@ -22,7 +22,7 @@ WAYS = {
 """Ways to shape a path, by name. The first two shape the reference that the robot plans for the shaper; the third one
 shapes what it plans without a shaper, which is quicker in bends.
 """
-SPACING = 2e-4
+SPACING = 5e-5
 """Distance of the postures at which a path is sampled, in units of its parameter [m]."""
 
 

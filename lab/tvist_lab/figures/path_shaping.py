@@ -1,15 +1,16 @@
 """Figures of paths shaped along their parameter and joint by joint."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from tvist_lab.evaluation.evaluate import WORTH
 from tvist_lab.evaluation.path_examples import BLEND, CORNER_SHAPER, CORNER_SPEED, Corner
 from tvist_lab.evaluation.path_shaping import ALONG, JOINTS, WAYS
-from tvist_lab.evaluation.paths import JudgedPath
-from tvist_lab.figures.style import FAINT, SHAPED, UNSHAPED, legend, note, panels, title
+from tvist_lab.figures.style import FAINT, SHAPED, UNSHAPED, legend, panels, title
 from tvist_plant.plant import PERIOD
 
 SHOWN = {ALONG: SHAPED, JOINTS: UNSHAPED}
@@ -45,35 +46,39 @@ def corner_figure(corner: Corner) -> Figure:
     return figure
 
 
-def path_shaping_figure(judged: Sequence[JudgedPath]) -> Figure:
-    """Draw the residual vibration and the vibration during the motion as boxes, by shaper and way."""
-    figure, (above, below) = panels(2, 6.0)
-    counted = [one for one in judged if one.counts]
-    names = list(judged[0].shaped)
-    for place, (way, color) in enumerate(SHOWN.items()):
-        at = np.arange(len(names)) + (-0.18, 0.18)[place]
-        left = [
-            [max(100.0 - one.reduction(one.shaped[name][way]), FLOOR) for one in counted] for name in names
-        ]
-        moving = [
-            [one.shaped[name][way].in_motion / one.unshaped.in_motion for one in judged] for name in names
-        ]
-        for panel, values in ((above, left), (below, moving)):
+def path_shaping_figure(paths: Sequence[dict[str, Any]]) -> Figure:
+    """Draw boxes of the vibration after the stop and during the motion, and of the distance from the path.
+
+    Args:
+        paths: The paths of a report, see `tvist_lab.evaluation.path_report.report`.
+    """
+    figure, panes = panels(3, 8.4)
+    counted = [one for one in paths if one["unshaped_peak_m_s2"] >= WORTH]
+    names = list(paths[0]["shaped"])
+    for (way, color), aside in zip(SHOWN.items(), (-0.18, 0.18), strict=True):
+        at = np.arange(len(names)) + aside
+        for panel, rows, key in zip(
+            panes, (counted, paths, paths), ("reduction_percent", "in_motion_ratio", "off_mm"), strict=True
+        ):
+            values = [[one["shaped"][name][way][key] for one in rows] for name in names]
+            if key == "reduction_percent":
+                values = [[max(100.0 - reduction, FLOOR) for reduction in column] for column in values]
             _boxes(panel, values, at, color)
-        above.plot([], [], color=color, linewidth=5.0, alpha=0.5, label=f"Shaped {WAYS[way]}")
+        panes[0].plot([], [], color=color, linewidth=5.0, alpha=0.5, label=f"Shaped {WAYS[way]}")
+    above, middle, below = panes
     above.set_yscale("log")
     for axis in (above.yaxis.set_major_formatter, above.yaxis.set_minor_formatter):
         axis(lambda value, _: f"{value:g}" if str(value).strip("0.")[:1] in "125" else "")
     above.axhline(5.0, color=FAINT, linewidth=0.8, linestyle=":")
-    for panel in (above, below):
-        panel.set_xlim(-0.5, len(names) - 0.5)
-    note(above, "5 %", (len(names) - 0.52, 5.0), color=FAINT, ha="right", va="bottom")
-    above.set_ylabel("Peak after the stop (% of unshaped)")
-    below.set_ylabel("rms during the motion / unshaped")
-    below.axhline(1.0, color=FAINT, linewidth=0.8)
+    above.set_ylabel("Peak (% of unshaped)")
+    middle.axhline(1.0, color=FAINT, linewidth=0.8)
+    middle.set_ylabel("rms / unshaped")
+    below.set_ylabel("Largest distance (mm)")
     below.set_xticks(np.arange(len(names)), names)
+    below.set_xlim(-0.5, len(names) - 0.5)
     title(above, f"Vibration after the stop, {len(counted)} paths")
-    title(below, f"Vibration during the motion, {len(judged)} paths")
+    title(middle, f"Vibration during the motion, {len(paths)} paths")
+    title(below, f"Distance of the shaped reference from the path, {len(paths)} paths")
     legend(figure, above)
     return figure
 
