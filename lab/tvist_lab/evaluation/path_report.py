@@ -99,6 +99,7 @@ def _way(group: list[JudgedPath], name: str, way: str) -> dict[str, Any]:
     pairs = [(one, one.shaped[name][way]) for one in group]
     reductions = np.array([one.reduction(found) for one, found in pairs if one.counts])
     return {
+        "peak_m_s2": _percentiles([found.peak for one, found in pairs if one.counts], median=50, p95=95),
         "reduction_percent": _percentiles(reductions, median=50, p5=5, min=0),
         "reduction_percent_interval": interval(reductions, 50),
         "delay_ms": _percentiles([_delay(*pair) for pair in pairs], median=50, max=100),

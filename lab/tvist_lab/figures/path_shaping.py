@@ -69,6 +69,7 @@ def path_shaping_figure(paths: Sequence[dict[str, Any]]) -> Figure:
     above.set_yscale("log")
     for axis in (above.yaxis.set_major_formatter, above.yaxis.set_minor_formatter):
         axis(lambda value, _: f"{value:g}" if str(value).strip("0.")[:1] in "125" else "")
+    above.tick_params(which="both", labelsize=8)
     above.axhline(5.0, color=FAINT, linewidth=0.8, linestyle=":")
     above.set_ylabel("Peak (% of unshaped)")
     middle.axhline(1.0, color=FAINT, linewidth=0.8)
