@@ -22,6 +22,7 @@ COMMANDS = {
     "shapers": "List the shapers with their durations and their robustness to a wrong frequency.",
     "identify": "Calibrate a robot from its own accelerometer.",
     "evaluate": "Compare the vibration of any moves unshaped and shaped.",
+    "paths": "Compare paths shaped along the path with the same paths shaped joint by joint.",
     "shaperbench": "Rank shapers, your own included, on eight simulated arms.",
     "search": "Search for cases in which a robot breaks its promises.",
     "bench": "Measure how fast tvist runs on this machine.",

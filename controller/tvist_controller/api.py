@@ -19,12 +19,14 @@ from tvist_controller.loopback import LoopbackHost
 from tvist_controller.mode_source import ModeSource
 from tvist_controller.own_shapers import OwnShaper, RecordedShaper
 from tvist_controller.paths.poses import placement_vector
+from tvist_controller.planning.from_rest import plan_from_rest
 from tvist_controller.presence import Presence
+from tvist_controller.refusal import RefusalError
 from tvist_controller.reporting import truth_of
 from tvist_controller.safety import TORQUE_SHARE
 from tvist_controller.setup import Setup, body, paper_payload
 from tvist_controller.stopping import stopping
-from tvist_controller.trajectory import JointLine, MotionLimits, Trajectory, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Trajectory, quickest_motion
 
 __all__ = [
     "CLEARANCE",
@@ -40,8 +42,10 @@ __all__ = [
     "ModeSource",
     "MotionLimits",
     "OwnShaper",
+    "PlannedMotion",
     "Presence",
     "RecordedShaper",
+    "RefusalError",
     "Setup",
     "Target",
     "ToolKinematics",
@@ -57,6 +61,7 @@ __all__ = [
     "modal_estimator",
     "paper_payload",
     "placement_vector",
+    "plan_from_rest",
     "quickest_motion",
     "resting_after",
     "stopping",

@@ -1,4 +1,4 @@
-"""`tvist evaluate` and `tvist shaperbench` from a shell: seconds, one JSON object, one sentence when it goes wrong."""
+"""`tvist evaluate`, `paths` and `shaperbench` from a shell: seconds, one JSON object, one sentence if it goes wrong."""
 
 import json
 from pathlib import Path
@@ -7,6 +7,7 @@ import pytest
 from tests.system.test_command_line import tvist
 
 from tvist_cli.commands.evaluate import evaluate
+from tvist_cli.commands.paths import paths
 from tvist_cli.commands.shaperbench import shaperbench
 from tvist_cli.failure import Failure
 
@@ -132,6 +133,54 @@ class TestEvaluate:
         path = tmp_path / "moves.json"
         path.write_text(json.dumps([MOVES[0], {**MOVES[0], "target": [0, 0, 7, 0, 0, 0]}]), encoding="utf-8")
         tvist("evaluate", "--moves", path).assert_failed(2, "move 2", "joint 3", "elbow", "6.28319")
+
+
+class TestPaths:
+    def test_a_path_has_the_keys_that_are_promised(self, tmp_path):
+        told = tvist(
+            "paths", "--random", 1, "--kind", "arc", "--shapers", "zv", "auto", "--seed", 3, "--payload", 5, "--clean",
+            "--markdown", tmp_path / "page.md", "--json",
+        ).assert_done().json  # fmt: skip
+        (path,) = told["paths"]
+        assert (path["kind"], path["payload_kg"], told["plant"]) == ("arc", 5.0, "clean")
+        assert list(path["shaped"]) == ["zv", "auto"]
+        for ways in path["shaped"].values():
+            assert list(ways) == ["along", "joints", "joints_unslowed"]
+            assert ways["along"]["off_mm"] < ways["joints"]["off_mm"]
+            for one in ways.values():
+                assert one["peak_m_s2"] < path["unshaped_peak_m_s2"]
+                assert one["delay_ms"] > 0.0
+        assert set(told["summary"]) == {"all", "arc"}
+        assert {"refused", "stopping", "circle", "seed", "calibration"} <= set(told)
+        assert told["command"] in (tmp_path / "page.md").read_text(encoding="utf-8")
+
+    @pytest.mark.slow
+    def test_words_and_figures_are_for_people(self, tmp_path):
+        said = tvist(
+            "paths", "--random", 3, "--shapers", "auto", "--figures", tmp_path / "figures"
+        ).assert_done()  # fmt: skip
+        for words in ("paths with blends", "joint by joint", "in motion", "circle"):
+            assert words in said.out
+        assert "refused by the planner" in said.err
+        assert {path.name for path in (tmp_path / "figures").iterdir()} == {
+            "path_shaping.png", "path_corner.png"
+        }  # fmt: skip
+
+    @pytest.mark.parametrize(
+        ("arguments", "words"),
+        [
+            ({"random": 0}, ("random is 0", "1 to 100000")),
+            ({"random": 1, "seed": -1}, ("seed is -1",)),
+            ({"random": 1, "shapers": ["zz"]}, ("zz", "zv")),
+            ({"random": 1, "payload": "heavy"}, ("payload", "heavy")),
+            ({"random": 1, "calibration": "none.json"}, ("none.json",)),
+            ({"random": 1, "calibration": "one-joint_1kg"}, ("one-joint", "UR5e")),
+            ({"random": 1, "shapers": ["auto"], "calibration": "ur5e_5kg"}, ("auto", "modes")),
+            ({"random": 1, "disturbances": "gear", "clean": True}, ("--clean", "--disturbances")),
+        ],
+    )
+    def test_misuse_is_said(self, arguments, words):
+        assert_misuse(paths, arguments, words)
 
 
 class TestShaperBench:

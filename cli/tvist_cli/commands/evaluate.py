@@ -1,6 +1,5 @@
 """`tvist evaluate`: run any moves unshaped and shaped, and compare."""
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +9,7 @@ from tvist_cli.evaluated import print_evaluation
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import err, print_json, progress
 from tvist_cli.shapers_of import loaded
+from tvist_cli.simulated_arm import disturbed, masses_of, named
 
 if TYPE_CHECKING:
     from tvist_controller.own_shapers import OwnShaper
@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from tvist_lab.evaluation.moves import Move
     from tvist_plant.description import RobotDescription
     from tvist_protocol.calibration import Calibration
-
-UNIFORM = "uniform"
-"""Value of --payload that draws a payload for each move, up to the arm's rating."""
 
 
 def evaluate(
@@ -77,11 +74,11 @@ def evaluate(
     _check(moves, random, seed, modes, frequency_error, wrists=wrists)
     with told(DescriptionError, code=2):
         description = load(robot)
-    masses = _masses(payload, description)
+    masses = masses_of(payload, description)
     shaper, own = loaded(shaper)
     known = _calibration(calibration, shaper, own, modes, description)
     chosen, share = _moves(moves, random, seed, masses, description, wrists=wrists)
-    plant, kept = _disturbed(description, disturbances, clean=clean)
+    plant, kept = disturbed(description, disturbances, clean=clean)
     recipe, others = _recipe(shaper, own, modes, known, plant, frequency_error, masses, baselines=baselines)
     jobs = [
         MoveJob(plant, move, recipe, others, seed=_arm_seed(seed, place)) for place, move in enumerate(chosen)
@@ -107,7 +104,7 @@ def evaluate(
     result = {
         "shaper": shaper,
         "calibration": None if known is None else known.name,
-        "plant": _named(kept),
+        "plant": named(kept),
         "disturbances": list(kept),
         "seed": seed,
         "free_of_collision": share,
@@ -137,45 +134,6 @@ def _check(
         raise Failure(f"modes is {modes}: must be 1 to 6", code=2)
     if not -90.0 <= frequency_error <= 900.0:
         raise Failure(f"frequency-error is {frequency_error:g} %: must be -90 to 900 %", code=2)
-
-
-def _disturbed(
-    description: "RobotDescription", wanted: str | None, *, clean: bool
-) -> tuple["RobotDescription", tuple[str, ...]]:
-    """Return the arm with the requested disturbances, and their names."""
-    from tvist_plant.description import DISTURBANCES, DescriptionError
-
-    if clean and wanted is not None:
-        raise Failure("give either --clean or --disturbances", code=2)
-    if wanted is None:
-        wanted = "none" if clean else ",".join(DISTURBANCES)
-    names = [] if wanted == "none" else [name.strip() for name in wanted.split(",")]
-    with told(DescriptionError, code=2):
-        return description.disturbed_by(names), tuple(name for name in DISTURBANCES if name in names)
-
-
-def _named(kept: tuple[str, ...]) -> str:
-    """Describe an arm with these disturbances."""
-    from tvist_plant.description import DISTURBANCES
-
-    if kept == DISTURBANCES:
-        return "as described"
-    return f"with {' and '.join(kept)} alone" if kept else "clean"
-
-
-def _masses(payload: str | None, description: "RobotDescription") -> tuple[float, float]:
-    """Least and largest mass."""
-    if payload == UNIFORM:
-        return 0.0, description.limits.payload
-    if payload is None:
-        return description.payload.mass, description.payload.mass
-    try:
-        mass = float(payload)
-    except ValueError:
-        mass = math.nan
-    if not 0.0 <= mass <= 100.0:
-        raise Failure(f"payload is {payload!r}: must be a mass from 0 to 100 kg, or {UNIFORM}", code=2)
-    return mass, mass
 
 
 def _calibration(

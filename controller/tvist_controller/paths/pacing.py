@@ -9,7 +9,7 @@ from tvist_controller.paths.legs import Pacing
 from tvist_controller.paths.route import Piece, Run
 from tvist_controller.paths.tool_curves import PER_RADIAN
 from tvist_controller.trajectory.limits import Floats
-from tvist_controller.trajectory.retiming import Cells, RetimedLaw, quickest_law
+from tvist_controller.trajectory.retiming import Cells, RetimedLaw, Way, quickest_law
 from tvist_controller.trajectory.spline import Knots, SplineCurve
 from tvist_plant.plant import PERIOD
 
@@ -61,18 +61,17 @@ def law_of(run: Run, curve: SplineCurve, limits: JointLimits, jerk: float, windo
         jerk: Largest jerk along the path [m/s^3].
         window: Time over which the shaper mixes moments of the motion [s].
     """
-    softest = (1.0 - 2.0 * JOLT_SHARE) * limits.jerk / float(curve.bends.slope.max())
     asked = [piece.pacing.duration for piece in run]
-    if not any(asked):
-        return _kept(quickest_law(_cells(run, curve, limits, 1.0), min(jerk, softest), window), curve, limits)
-    law = quickest_law(_cells(run, curve, limits, 1.0), softest, window)
-    if not all(asked):
-        return _kept(law, curve, limits)
-    wanted, hurry = sum({piece.where: piece.pacing.duration or 0.0 for piece in run}.values()), 1.0
-    while law.duration > wanted * (1.0 + CLOSE) and hurry < FASTEST:
-        hurry *= 1.05 * law.duration / wanted
-        law = quickest_law(_cells(run, curve, limits, hurry), softest, window)
-    return _kept(law.slowed(wanted), curve, limits)
+    if any(asked):
+        jerk = FASTEST * limits.jerk  # durations leave the jerk to the joints
+    law = quickest_law(_way(run, curve, limits, 1.0), jerk, window)
+    if all(asked):
+        wanted, hurry = sum({piece.where: piece.pacing.duration or 0.0 for piece in run}.values()), 1.0
+        while law.duration > wanted * (1.0 + CLOSE) and hurry < FASTEST:
+            hurry *= 1.05 * law.duration / wanted
+            law = quickest_law(_way(run, curve, limits, hurry), jerk, window)
+        law = law.slowed(wanted)
+    return _kept(law, curve, limits)
 
 
 def _kept(law: RetimedLaw, curve: SplineCurve, limits: JointLimits) -> RetimedLaw:
@@ -91,7 +90,7 @@ def fastest(law: RetimedLaw, curve: SplineCurve) -> float:
     return float(np.abs(curve.derivatives(s)[1] * sd[:, None]).max())
 
 
-def _cells(run: Run, curve: SplineCurve, limits: JointLimits, hurry: float) -> Cells:
+def _way(run: Run, curve: SplineCurve, limits: JointLimits, hurry: float) -> Way:
     length = float(curve.end[0])
     largest = max(length / CELLS, FINEST)
     starts = np.concatenate(([0.0], np.cumsum([piece.knots.s[-1] for piece in run])))
@@ -109,16 +108,21 @@ def _cells(run: Run, curve: SplineCurve, limits: JointLimits, hurry: float) -> C
     looks = _looks(places)
     slope, second = (_largest(np.abs(values)) for values in curve.derivatives(looks)[1:])
     bend, jolt = second.max(axis=1), _largest(np.abs(curve.third(looks))).max(axis=1)
-    fastest = np.minimum(np.concatenate(speeds), (limits.velocity / np.maximum(slope, LEAST)).min(axis=1))
-    fastest = np.minimum(fastest, np.cbrt(JOLT_SHARE * limits.jerk / np.maximum(jolt, LEAST)))
     # Joints jerk by the third derivative times ṡ³, by 3 q'' ṡ s̈, and by q' s⃛: the first two take a share each.
-    bent = 3.0 * bend * fastest / (JOLT_SHARE * limits.jerk)
-    p, q = slope / limits.acceleration, second / limits.acceleration
-    return Cells(
+    smooth = np.cbrt(JOLT_SHARE * limits.jerk / np.maximum(jolt, LEAST))
+    even = np.minimum(np.concatenate(speeds), smooth)
+    fastest = (limits.velocity / np.maximum(slope, LEAST)).min(axis=1)
+    bent = 3.0 * bend * np.minimum(even, fastest) / (JOLT_SHARE * limits.jerk)
+    return Way(
         places,
-        fastest,
-        np.column_stack((p, np.concatenate(tool_p), bent)),
-        np.column_stack((q, np.concatenate(tool_q), np.zeros(len(bent)))),
+        Cells(fastest, slope / limits.acceleration, second / limits.acceleration),
+        Cells(
+            even,
+            np.column_stack((np.concatenate(tool_p), bent)),
+            np.column_stack((np.concatenate(tool_q), np.zeros(len(bent)))),
+        ),
+        slope.max(axis=1),
+        (1.0 - 2.0 * JOLT_SHARE) * limits.jerk,
     )
 
 

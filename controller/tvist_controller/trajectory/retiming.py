@@ -6,7 +6,8 @@ with bounds that do not depend on the sign of s̈). Its motion has steps of the 
 last `ramp` seconds has none, and bounded jerk.
 
 Such a mean, and every shaper behind it, mixes moments of the motion, so it passes a place at speeds that belong to
-its neighbourhood. The limits of a cell therefore hold for all cells that the motion is in within a window of time.
+its neighbourhood. The joints' limits in a cell therefore hold for all cells that the motion is in within a window of
+time.
 """
 
 from bisect import bisect_right
@@ -17,6 +18,12 @@ import numpy as np
 from tvist_controller._compiled import compiled
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 
+TOOL_SHARE = 0.25
+"""Share of the shaper's window for which limits of the tool hold [-]. The speed changes so little within it that the
+shaped tool exceeds its acceleration in a bend by a hundredth. The whole window would cost half a second for a few bends.
+"""
+LEAST = 1e-9
+"""Smallest value that is divided by."""
 SHORTLY = 1e-9
 """Time before and after a change of the acceleration at which it is looked at [s]."""
 
@@ -25,14 +32,28 @@ SHORTLY = 1e-9
 class Cells:
     """Limits along a curve, constant in each of c cells: ṡ ≤ fastest, and p |s̈| + q ṡ² ≤ 1 for each of r rows."""
 
-    edges: Floats
-    """Ends of the cells, rising from 0, shape (c + 1,)."""
     fastest: Floats
     """Largest ṡ in each cell, shape (c,) [1/s]."""
     p: Floats
     """Shape (c, r) [s^2 per unit of s]."""
     q: Floats
     """Shape (c, r) [s^2 per unit of s, squared]."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """Everything that limits a motion along a curve."""
+
+    edges: Floats
+    """Ends of the cells, rising from 0, shape (c + 1,)."""
+    joints: Cells
+    """Limits of the joints, which the shaped motion keeps, too."""
+    tool: Cells
+    """Limits of the tool, which it may exceed a little."""
+    slope: Floats
+    """Bound of |dq/ds| of any joint in each cell, shape (c,)."""
+    jerk: float
+    """Jerk of the joints that changes of s̈ may cause [rad/s^3]."""
 
 
 @compiled
@@ -168,26 +189,39 @@ def arrivals(edges: Floats, b: Floats) -> Floats:
     return np.concatenate(([0.0], np.cumsum(2.0 * np.diff(edges) / (speeds[:-1] + speeds[1:]))))
 
 
-def quickest_law(cells: Cells, jerk: float, window: float) -> RetimedLaw:
-    """Return the quickest law within the limits of the cells.
+def quickest_law(way: Way, jerk: float, window: float) -> RetimedLaw:
+    """Return the quickest law within the limits along a curve.
 
     Args:
-        cells: Limits along the curve.
+        way: The limits.
         jerk: Jerk limit of s [1/s^3].
         window: Time over which a shaper mixes moments of the motion [s].
     """
-    highest = cells.fastest**2
-    b = passes(cells.edges, highest, cells.p, cells.q)
-    hardest = float(np.abs(0.5 * np.diff(b) / np.diff(cells.edges)).max())
-    ramp = hardest / jerk
-    law = _law(cells, b, ramp, window)
+    lengths = np.diff(way.edges)
+    b = _passed(way, np.zeros(len(way.edges)), 0.0)
+    accelerations = np.abs(0.5 * np.diff(b) / lengths)
+    ramp = float(max(accelerations.max() / jerk, (way.slope * accelerations).max() / way.jerk))
+    law = _law(way, b, ramp, window)
     if law.limits.jerk > jerk * (1.0 + 1e-6):  # it changes from speeding up to braking within a ramp
-        law = _law(cells, b, ramp * law.limits.jerk / jerk, window)
+        law = _law(way, b, ramp * law.limits.jerk / jerk, window)
     return law
 
 
-def _law(cells: Cells, b: Floats, ramp: float, window: float) -> RetimedLaw:
-    times, around = arrivals(cells.edges, b), window + ramp
-    fastest = widened(times, around, cells.fastest[:, None], True)[:, 0]
-    p, q = widened(times, around, cells.p, False), widened(times, around, cells.q, False)
-    return RetimedLaw(cells.edges, passes(cells.edges, fastest**2, p, q), ramp)
+def _law(way: Way, b: Floats, ramp: float, window: float) -> RetimedLaw:
+    return RetimedLaw(way.edges, _passed(way, arrivals(way.edges, b), window + ramp), ramp)
+
+
+def _passed(way: Way, times: Floats, window: float) -> Floats:
+    """Largest ṡ² at the edges if limits hold for a window of time around a motion that is there at these times."""
+    near = [
+        Cells(
+            widened(times, share * window, cells.fastest[:, None], True)[:, 0],
+            widened(times, share * window, cells.p, False),
+            widened(times, share * window, cells.q, False),
+        )
+        for cells, share in ((way.joints, 1.0), (way.tool, TOOL_SHARE))
+    ]
+    joints, tool = near if window > 0.0 else (way.joints, way.tool)
+    p, q = np.hstack((joints.p, tool.p)), np.hstack((joints.q, tool.q))
+    highest = np.minimum(joints.fastest, tool.fastest) ** 2
+    return passes(way.edges, np.minimum(highest, 1.0 / np.maximum(q.max(axis=1), LEAST)), p, q)

@@ -8,6 +8,7 @@ from tvist_lab.figures.identified import identified_figure
 from tvist_lab.figures.mean_delay import mean_delay_figure
 from tvist_lab.figures.one_joint import figure_2
 from tvist_lab.figures.pareto import pareto_figure
+from tvist_lab.figures.path_shaping import corner_figure, path_shaping_figure
 from tvist_lab.figures.recorded import Recorded, motion_figure, observed_figure
 from tvist_lab.figures.residual import figure_16
 from tvist_lab.figures.sensitivity import figure_4
@@ -17,6 +18,7 @@ __all__ = [
     "Recorded",
     "after_stop_figure",
     "catalogue_figure",
+    "corner_figure",
     "figure_2",
     "figure_4",
     "figure_7",
@@ -26,6 +28,7 @@ __all__ = [
     "motion_figure",
     "observed_figure",
     "pareto_figure",
+    "path_shaping_figure",
     "residual_by_move_figure",
     "save",
     "vibration_figure",
