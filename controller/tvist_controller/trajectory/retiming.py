@@ -20,7 +20,7 @@ from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 TOOL_SHARE = 0.25
 """Share of the shaper's window for which limits of the tool hold [-]. The speed changes so little within it that the
-shaped tool exceeds its acceleration in a bend by a hundredth. The whole window would cost half a second for a few bends.
+shaped tool exceeds its acceleration in a bend by a hundredth. The whole window would cost half a second on some bends.
 """
 LEAST = 1e-9
 """Smallest value that is divided by."""
