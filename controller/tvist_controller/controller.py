@@ -300,7 +300,7 @@ class Controller:
 
     def _move_by_program(self, command: c.MoveJ) -> int:
         """Plan and start a motion of the program; return its number."""
-        self.motion.check_move()
+        self.motion.check("move_j")
         return self.motion.move(self._found(self._planner.plan(command, self.basis)))
 
     def _found(self, plan: Plan) -> Any:

@@ -73,14 +73,6 @@ class MotionControl:
         """Whether the robot follows a stream of set-points."""
         return self.streams.stream is not None
 
-    def check_move(self) -> None:
-        """Check that a point-to-point motion may begin.
-
-        Raises:
-            RefusalError: The arm is busy, without power or stopped for safety.
-        """
-        self.check("move_j")
-
     @property
     def may_move(self) -> bool:
         """Whether a point-to-point motion may begin in the present activity."""
@@ -114,7 +106,7 @@ class MotionControl:
             trigger: `type` of the command that it carries out.
 
         Raises:
-            RefusalError: See `check_move`.
+            RefusalError: See `check`.
         """
         self.go(trigger)
         return self.motions.begin(planned)
@@ -344,17 +336,14 @@ class MotionControl:
         if self.cycle.refused is not None and self.activity is not Activity.STOPPING:
             self.end("interruption", *self.cycle.refused)
         if self.cycle.at_rest and self.activity.moving and (target := after(self.activity, "at_rest")):
-            self._rest(target)
+            goes_on = self.activity is Activity.MOVING and self.motions.go_on()
+            if not goes_on:
+                self.activity = target
+                self.motions.done()
         if self.activity.robot_mode is RobotMode.RUNNING:
             for danger in self._protection.dangers(sample):
                 self.protect(danger.why, danger.code)
         return sample
-
-    def _rest(self, target: Activity) -> None:
-        if self.activity is Activity.MOVING and self.motions.go_on():
-            return
-        self.activity = target
-        self.motions.done()
 
     def _end_stream(self, why: str, code: Code | None = None, **told: Unpack[Told]) -> None:
         if self.streams.end():

@@ -42,8 +42,9 @@ class MotionCommands:
 
     def _move(self, call: Call[Any]) -> Reply:
         check_content(call.command, self._description)
-        self._motion.check_move()
-        return Accepted(id=self._motion.move(call.planned(), tag(type(call.command))))
+        trigger = tag(type(call.command))
+        self._motion.check(trigger)
+        return Accepted(id=self._motion.move(call.planned(), trigger))
 
     def _servo_start(self, call: Call[c.ServoStart]) -> None:
         command = call.command

@@ -158,7 +158,7 @@ class MovePath(ClientMessage, frozen=True, kw_only=True, tag="move_path", omit_d
     frame: Pose | None = None
     """Frame in which all poses are given, as a pose in the base frame; null: the base frame."""
     jerk: ToolJerk = 60.0
-    """Largest jerk of the tool [m/s³]; of the joints on joint segments, twice the number [rad/s³]."""
+    """Largest jerk of the tool [m/s³]; of the joints on joint segments, four times the number [rad/s³]."""
 
 
 class ServoJ(ClientMessage, frozen=True, kw_only=True, tag="servo_j"):
@@ -173,9 +173,10 @@ class ServoJ(ClientMessage, frozen=True, kw_only=True, tag="servo_j"):
     q: Joints
     """Posture, one angle per joint [rad]."""
     lookahead: Annotated[float, Meta(gt=0, le=10)] = 0.1
-    """Time constant with which the arm approaches the posture [s]; the range is 0.03 to 0.2, and others are clipped."""
+    """Lag behind a moving posture, to which two steps are added [s]; the range is 0.03 to 0.2, and others are clipped."""
     gain: Annotated[float, Meta(gt=0, le=1e6)] = 300.0
-    """Proportional gain of the approach [-]; the range is 100 to 2000, and others are clipped."""
+    """How abruptly the arm begins to approach it [1/s²]; the range is 100 to 2000, and others are clipped. It does not
+    change the lag, and is raised where the arm would overshoot."""
     shaped: bool = False
     """Whether the shaper is used; only for a motion that begins at rest."""
 

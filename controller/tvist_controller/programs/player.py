@@ -134,7 +134,7 @@ class ProgramPlayer:
             if self._motion.activity is Activity.PAUSED:
                 self._motion.resume()
         else:
-            self._motion.check_move()
+            self._motion.check("move_j")
         self.state = "PLAYING"
 
     def _pause(self, _: Call[ProgramPause]) -> None:
