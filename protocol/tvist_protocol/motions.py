@@ -173,7 +173,7 @@ class ServoJ(ClientMessage, frozen=True, kw_only=True, tag="servo_j"):
     q: Joints
     """Posture, one angle per joint [rad]."""
     lookahead: Annotated[float, Meta(gt=0, le=10)] = 0.1
-    """Lag behind a moving posture, to which two steps are added [s]; the range is 0.03 to 0.2, and others are clipped."""
+    """Lag behind a moving posture, in addition to two steps [s]; the range is 0.03 to 0.2, and others are clipped."""
     gain: Annotated[float, Meta(gt=0, le=1e6)] = 300.0
     """How abruptly the arm begins to approach it [1/s²]; the range is 100 to 2000, and others are clipped. It does not
     change the lag, and is raised where the arm would overshoot."""
