@@ -10,8 +10,11 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def compiled(function: F) -> F:
-    """Compile `function`; its Python source remains available as `.py_func`; the cache outlives the process."""
-    return cast("F", njit(cache=True)(function))
+    """Compile `function`; its Python source remains available as `.py_func`; the cache outlives the process.
+
+    Other threads can run while it does.
+    """
+    return cast("F", njit(cache=True, nogil=True)(function))
 
 
 def is_cached(function: Callable[..., Any]) -> bool:

@@ -77,10 +77,10 @@ class RunningMove:
 
     def hold(self) -> None:
         """Slow down to a standstill within the torque limits, if that takes less time; see `PlannedMotion.hold`."""
-        if self._held:
+        if self._held or self._cycle.at_rest:  # at rest, it is between two parts
             return
         trajectory, cycle = self._trajectory, self._cycle
-        most = trajectory.limits.acceleration
+        most = trajectory.agility.acceleration
         newest = cycle.along.newest
         speed = max(trajectory.velocity, float(np.abs(newest.qd).max()))
         left = trajectory.path.end - newest.q

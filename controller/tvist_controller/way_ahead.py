@@ -93,9 +93,10 @@ class WayAhead:
         Args:
             tvist: A new filter; None for the present one.
         """
-        cycle, collisions = self._cycle, self._collisions
+        cycle = self._cycle
+        coming = [part.path.whole for part in self.coming()]
         if cycle.at_rest:
-            return None
+            return self._first(coming)
         trajectory = cycle.trajectory
         if not trajectory.foreseeable:
             guard = self._guard if cycle.guard is None else cycle.guard
@@ -107,9 +108,11 @@ class WayAhead:
         forecast = trajectory.forecast
         if forecast is None:
             return self._on(self._outlook.foresee(tvist))
-        ways = [forecast.path.way(cycle.along.position, forecast.end)]
-        ways += [part.path.whole for part in self.coming()]
-        return next((found[1] for way in ways if (found := collisions.on_way(way))), None)
+        return self._first([forecast.path.way(cycle.along.position, forecast.end), *coming])
+
+    def _first(self, ways: Sequence[Way]) -> Meeting | None:
+        """Return the first meeting on several ways, one after the other."""
+        return next((found[1] for way in ways if (found := self._collisions.on_way(way))), None)
 
     def check_payload(self, payload: Payload, tvist: Filter | None) -> None:
         """Check the rest of the motion with another payload, and put the payload into the collision model.

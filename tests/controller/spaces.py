@@ -6,13 +6,18 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation, Slerp
 
+from tvist_controller.setup import paper_payload
 from tvist_lab.safety.subject import Subject
 from tvist_plant.description import Payload
 from tvist_plant.model import FLANGE, rigid_model
-from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, MovePath, ProcessSegment
+from tvist_protocol.io import SetTcp
+from tvist_protocol.motions import ArcSegment, LineSegment, MovePath, ProcessSegment
 
 from .robots import UR5E
 
+BENT = np.array([0.2, -1.4, 1.7, -1.8, -1.5, 0.3])
+"""A posture far from any singular one [rad]."""
+NO_TOOL = (0.0,) * 6
 TOOL = (0.02, -0.03, 0.12, 0.4, -0.2, 0.9)
 """A tool centre point, in the flange frame [m, rad]."""
 _MODEL = rigid_model(UR5E, Payload())
@@ -166,4 +171,13 @@ def errors(q, legs: list[Leg], tcp=TOOL) -> tuple[float, float]:
     return float(worst[0]), float(worst[1])
 
 
-__all__ = ["JointSegment", "Leg", "errors", "moved", "pose_of", "random_path", "start_posture", "tool_pose"]
+def begun(q=BENT, shaper: str = "none", tcp=NO_TOOL) -> Subject:
+    robot = Subject(UR5E, np.array(q), paper_payload(UR5E, 1.0), shaper=shaper)
+    robot.send(SetTcp, offset=tcp)
+    return robot
+
+
+def away(dx, turn=(0.0, 0.0, 0.0), q=BENT, tcp=NO_TOOL) -> tuple[float, ...]:
+    """The tool's pose at a posture, moved and turned in the base frame."""
+    position, rotation = tool_pose(q, tcp)
+    return pose_of(position + np.array(dx), Rotation.from_rotvec(turn) * rotation)

@@ -10,10 +10,15 @@ from tvist_controller.setup import body
 from tvist_lab.safety.stops import KINDS, PAUSES, SHAPERS
 from tvist_lab.safety.subject import torques
 from tvist_protocol import commands as c
+from tvist_protocol.commands import MoveJ, Pause, Resume, SetPayload, Stop
+from tvist_protocol.motions import LineSegment, MoveL, MovePath
+from tvist_protocol.replies import Accepted
+from tvist_protocol.simulation import SimulationInject
+from tvist_protocol.transitions import Activity
 
 from .paths import Progress, journey
 from .robots import UR5E, H
-from .spaces import errors
+from .spaces import BENT, away, begun, errors, tool_pose
 
 QUICK, SLOW, ALL = 8, 40, 500
 
@@ -106,3 +111,67 @@ def test_slider_and_pauses_stay_on_the_path_and_lead_to_its_end(seed):
     assert [event.kind for event in robot.events if event.kind in {"motion_done", "motion_stopped"}] == [
         "motion_done"
     ]
+
+
+def two_parts(shaper: str = "zv"):
+    """A robot that moves along a path that stops at its corner, and is about to come to rest there."""
+    robot = begun(shaper=shaper)
+    robot.send(
+        MovePath, segments=tuple(LineSegment(pose=away(to)) for to in ((0.1, 0.0, 0.0), (0.1, 0.1, 0.0)))
+    )
+    cycle = robot.controller.cycle
+    while cycle.trajectory.duration - cycle.trajectory.time > 0.02:
+        robot.tick()
+    return robot
+
+
+@pytest.mark.parametrize("again", [Pause, SimulationInject])
+def test_a_pause_between_two_parts_lasts_until_it_ends(again):
+    """The first part is about to end, so it does; the pause then holds the arm at the corner."""
+    robot = two_parts()
+    robot.send(Pause)
+    robot.tick(200)
+    assert robot.controller.cycle.at_rest
+    assert robot.controller.motion.activity is Activity.PAUSED
+    robot.send(again, **({"fault": "safeguard_stop"} if again is SimulationInject else {}))
+    robot.tick(100)
+    assert robot.controller.cycle.at_rest
+    robot.send(SimulationInject, fault="normal")
+    robot.send(Resume)
+    robot.until_rest()
+    assert [event.kind for event in robot.events][-1] == "motion_done"
+
+
+def test_a_payload_is_checked_on_the_parts_that_have_not_begun():
+    robot = begun(shaper="none")
+    position = tool_pose(BENT, (0.0,) * 6)[0]
+    low = (0.0, 0.0, 0.2 - position[2])
+    reply = robot.send(
+        MovePath, segments=(LineSegment(pose=away((0.05, 0.0, 0.0))), LineSegment(pose=away(low)))
+    )
+    assert isinstance(reply, Accepted), reply
+    robot.tick(40)
+    robot.send(Pause)
+    robot.tick(300)
+    long = {"mass": 1.0, "com": (0.0, 0.0, 0.4), "inertia": (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)}
+    assert robot.send(SetPayload, **long).code == "collision"
+
+
+@pytest.mark.parametrize("kind", [MoveL, MoveJ])
+def test_a_motion_slow_by_its_duration_is_paused_at_once(kind):
+    robot = begun(shaper="zv")
+    target = {"pose": away((0.05, 0.1, 0.0))} if kind is MoveL else {"q": tuple(BENT + 0.2)}
+    assert isinstance(robot.send(kind, duration=300.0, **target), Accepted)
+    robot.tick(5000)
+    robot.send(Pause)
+    robot.tick(150)
+    before = robot.references[-1]
+    robot.tick(200)
+    assert np.abs(robot.references[-1] - before).max() < 1e-9
+    robot.send(Resume)
+    robot.tick(500)
+    assert np.abs(robot.references[-1] - before).max() > 1e-5
+    robot.send(Stop)
+    robot.tick(200)
+    assert robot.controller.cycle.at_rest
+    assert [event.kind for event in robot.events if event.id is not None][-1] == "motion_stopped"

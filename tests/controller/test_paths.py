@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from tests.plant.arms import chain
 
+from tvist_controller.kinematics.tool import ToolKinematics
 from tvist_controller.setup import paper_payload
 from tvist_lab.safety.stops import SHAPERS
 from tvist_lab.safety.subject import Subject
@@ -22,10 +24,8 @@ from tvist_protocol.replies import Accepted, Refused
 
 from .paths import journey
 from .robots import Q1, UR5E, H
-from .spaces import TOOL, errors, pose_of, tool_pose
+from .spaces import BENT, NO_TOOL, TOOL, away, begun, errors, pose_of, tool_pose
 
-BENT = np.array([0.2, -1.4, 1.7, -1.8, -1.5, 0.3])
-FLANGE = (0.0,) * 6
 QUICK, SLOW, ALL = 11, 55, 1000
 
 
@@ -65,25 +65,13 @@ def is_where_it_should_be(seed):
     assert kinds == ["motion_started", "motion_done"]
 
 
-def begun(q=BENT, shaper: str = "none", tcp=FLANGE) -> Subject:
-    robot = Subject(UR5E, np.array(q), paper_payload(UR5E, 1.0), shaper=shaper)
-    robot.send(SetTcp, offset=tcp)
-    return robot
-
-
-def away(dx, turn=(0.0, 0.0, 0.0), q=BENT, tcp=FLANGE) -> tuple[float, ...]:
-    """The tool's pose at a posture, moved and turned in the base frame."""
-    position, rotation = tool_pose(q, tcp)
-    return pose_of(position + np.array(dx), Rotation.from_rotvec(turn) * rotation)
-
-
 def went(robot: Subject, kind, **fields) -> np.ndarray:
     """The tool's positions in a motion, one for each tick, shape (k, 3)."""
     reply = robot.send(kind, **fields)
     assert isinstance(reply, Accepted), reply
     begun_at = len(robot.references) - 1
     robot.until_rest()
-    return np.array([tool_pose(q, FLANGE)[0] for q in robot.references[begun_at:]])
+    return np.array([tool_pose(q, NO_TOOL)[0] for q in robot.references[begun_at:]])
 
 
 def speeds(positions) -> np.ndarray:
@@ -153,7 +141,7 @@ def test_the_second_of_two_blends_that_overlap_is_skipped_and_the_arm_stops_ther
     warned = [event for event in robot.events if event.code == "blend_skipped"]
     assert [event.why.split(":")[0] for event in warned] == ["segments[1]"]
     assert warned[0].id == 1
-    corner = tool_pose(BENT, FLANGE)[0] + np.array(corners[1])
+    corner = tool_pose(BENT, NO_TOOL)[0] + np.array(corners[1])
     near = np.linalg.norm(positions - corner, axis=1)
     assert near.min() <= 1e-6
     assert speeds(positions)[np.argmin(near) - 1] < 1e-3
@@ -176,9 +164,9 @@ def test_joint_moves_blend_with_lines_inside_the_radius(way):
     segments = (joint, line) if way == "joint to line" else (line, joint)
     robot = begun()
     positions = went(robot, MovePath, segments=segments)
-    corner = tool_pose(BENT + 0.3, FLANGE)[0]
+    corner = tool_pose(BENT + 0.3, NO_TOOL)[0]
     if way == "line to joint":
-        corner = tool_pose(BENT, FLANGE)[0] + 0.1
+        corner = tool_pose(BENT, NO_TOOL)[0] + 0.1
     near = np.linalg.norm(positions - corner, axis=1).min()
     assert 1e-3 < near < 0.05
     assert speeds(positions)[50:-50].min() > 0.02
@@ -193,7 +181,7 @@ def test_a_path_that_goes_back_as_it_came_turns_inside_its_blend():
         LineSegment(pose=away((0.1, 0.0, 0.0)), blend=0.04),
         LineSegment(pose=away((0.0, 0.0, 0.0))),
     )
-    positions = went(begun(), MovePath, segments=segments) - tool_pose(BENT, FLANGE)[0]
+    positions = went(begun(), MovePath, segments=segments) - tool_pose(BENT, NO_TOOL)[0]
     assert 0.06 < positions[:, 0].max() < 0.1
     assert np.abs(positions[:, 1:]).max() < 1e-6
     assert np.abs(positions[-1]).max() < 1e-6
@@ -324,3 +312,61 @@ def test_a_change_of_the_tool_is_part_of_the_plan():
     assert stale.holds(controller.basis)
     robot.send(SetTcp, offset=TOOL)
     assert not stale.holds(controller.basis)
+
+
+@pytest.mark.parametrize("radius", [1e-9, 1e-6, 1e-4])
+def test_a_blend_too_small_to_be_worthwhile_is_a_stop(radius):
+    robot = begun()
+    segments = (
+        LineSegment(pose=away((0.1, 0.0, 0.0)), blend=radius),
+        LineSegment(pose=away((0.1, 0.1, 0.0))),
+    )
+    positions = went(robot, MovePath, segments=segments)
+    assert [event.code for event in robot.events if event.kind == "warning"][-1] == "blend_skipped"
+    assert len(positions) * H < 2.0
+
+
+@pytest.mark.parametrize("rest", [1e-10, 1e-8, 1e-6, 1e-4])
+def test_a_sliver_between_two_blends_slows_nothing_down(rest):
+    corners = [(0.1, 0.0, 0.0), (0.1, 0.1, 0.0), (0.0, 0.1, 0.0)]
+    blends = (0.05, 0.05 - rest, 0.0)
+    segments = tuple(
+        LineSegment(pose=away(to), blend=blend) for to, blend in zip(corners, blends, strict=True)
+    )
+    positions = went(begun(), MovePath, segments=segments)
+    assert speeds(positions)[100:-100].min() > 0.1
+
+
+@pytest.mark.parametrize("duration", [1e-300, 3600.0])
+def test_any_duration_is_planned_within_a_moment(duration):
+    """Planning looks at the places where limits may bind, whose number does not grow with the duration."""
+    robot = begun()
+    segments = (
+        LineSegment(pose=away((0.1, 0.0, 0.0)), duration=duration),
+        JointSegment(q=tuple(BENT), duration=duration),
+    )
+    assert isinstance(robot.send(MovePath, segments=segments), Accepted)
+    assert isinstance(begun().send(MoveL, pose=away((0.1, 0.0, 0.0)), duration=duration), Accepted)
+    law = robot.controller.cycle.trajectory._law
+    assert len(law.moments) < 5000
+
+
+def test_a_redundant_arm_makes_blends_too():
+    description = chain(7)
+    q = np.linspace(0.5, 1.2, 7) * np.where(np.arange(7) % 2, 1.0, -1.0)
+    robot = Subject(description, q, paper_payload(description, 0.0), shaper="none")
+    tool = ToolKinematics(description)
+    rotation, position = tool.pose(q)
+    targets = [
+        position + np.array(moved) for moved in ((0.03, 0.0, 0.0), (0.03, 0.03, 0.0), (0.0, 0.03, 0.03))
+    ]
+    segments = tuple(
+        LineSegment(pose=pose_of(to, Rotation.from_matrix(rotation)), blend=0.01, velocity=0.1)
+        for to in targets
+    )
+    reply = robot.send(MovePath, segments=segments)
+    assert isinstance(reply, Accepted), reply
+    robot.until_rest()
+    steps = np.abs(np.diff(robot.references, 2, axis=0)).max() / H**2
+    assert steps <= min(description.limits.acceleration)
+    assert np.linalg.norm(tool.pose(robot.references[-1])[1] - targets[-1]) < 1e-6

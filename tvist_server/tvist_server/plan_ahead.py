@@ -11,7 +11,8 @@ from tvist_controller.host import Host
 from tvist_controller.planning.basis import PlanBasis
 from tvist_controller.planning.planner import PLANNED, QUESTIONS, Plan, Planner
 from tvist_controller.refusal import RefusalError
-from tvist_protocol.commands import Command, PowerOff, Stop
+from tvist_protocol.commands import Command, KeepAlive, PowerOff, Stop
+from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
 from tvist_protocol.motions import StopJ, StopL
 from tvist_protocol.programs import ProgramStop
 from tvist_protocol.replies import Posture, Refused, Reply, ToolPose
@@ -54,7 +55,8 @@ class PlanAhead:
     """Passes commands to the controller in their order; those that take long to plan come with a finished plan.
 
     A plan is based on the state that the controller last published. If something that the plan depends on has changed
-    by the time the controller gets it, it is made again. A command waits while an earlier one is being planned. A
+    by the time the controller gets it, it is made again. A command waits while an earlier one is being planned, unless
+    it only renews the lease. A
     command that stops the arm is carried out at once, and again in its turn: so it ends the present motion, and also
     a motion that was sent before it and would begin after it.
 
@@ -67,7 +69,7 @@ class PlanAhead:
     def __init__(self, host: Host, planner: Planner, post: Callable[[Callable[[], None]], None]) -> None:
         self._host, self._planner, self._post = host, planner, post
         self._lock = threading.Lock()
-        self._count = 0
+        self._count, self._commands = 0, 0
         self._closing = False
         self._queue: SimpleQueue[_Waiting | None] = SimpleQueue()
         self._thread = threading.Thread(target=self._run, name="tvist-plan", daemon=True)
@@ -99,12 +101,14 @@ class PlanAhead:
             answer: Takes the reply, in the controller's thread.
         """
         stops = isinstance(admitted.command, STOPPING)
+        asks = isinstance(admitted.command, QUESTIONS)
         with self._lock:
-            waits = self._count > 0 or isinstance(admitted.command, PLANNED)
-            most = MAX_ASKING if isinstance(admitted.command, QUESTIONS) else MAX_WAITING
-            full = self._count >= most or self._closing
+            waits = asks or isinstance(admitted.command, PLANNED)
+            waits |= self._commands > 0 and not isinstance(admitted.command, KeepAlive)
+            full = self._count >= (MAX_ASKING if asks else MAX_WAITING) or self._closing
             if waits and not full:
                 self._count += 1
+                self._commands += not asks
                 self._queue.put(_Waiting(admitted, _nobody if stops else answer))
         if not waits or stops:
             self._post(lambda: answer(self._host.carry_out(admitted)))
@@ -116,6 +120,7 @@ class PlanAhead:
             self._hand_over(waiting)
             with self._lock:
                 self._count -= 1
+                self._commands -= not isinstance(waiting.admitted.command, QUESTIONS)
 
     def _hand_over(self, waiting: _Waiting) -> None:
         command = waiting.admitted.command
@@ -143,10 +148,12 @@ class PlanAhead:
 
     def _reply(self, question: Command, answer: Answer) -> None:
         """Answer a question, which anyone may ask: it does not reach the controller or its journal."""
-        present: SimpleQueue[PlanBasis] = SimpleQueue()
-        self._post(lambda: present.put(self._host.controller.basis))
+        basis, present = self._host.standing.basis, SimpleQueue[PlanBasis]()
+        if isinstance(question, InverseKinematics | ForwardKinematics) and _about_now(question):
+            self._post(lambda: present.put(self._host.controller.basis))
+            basis = present.get()
         try:
-            found = self._planner.plan(question, present.get()).found
+            found = self._planner.plan(question, basis).found
         except Exception:
             log.exception("a question is refused, since looking for the answer failed")
             self._post(lambda: answer(_FAILED))
@@ -162,6 +169,11 @@ class PlanAhead:
             return False
         waiting.answer(self._host.carry_out(waiting.admitted, plan))
         return True
+
+
+def _about_now(question: InverseKinematics | ForwardKinematics) -> bool:
+    """Return whether the answer depends on the present posture, which changes with every tick."""
+    return (question.near if isinstance(question, InverseKinematics) else question.q) is None
 
 
 def _nobody(reply: Reply) -> None:

@@ -11,7 +11,6 @@ from tvist_controller.paths.tool_curves import PER_RADIAN
 from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.retiming import Cells, RetimedLaw, Way, quickest_law
 from tvist_controller.trajectory.spline import Knots, SplineCurve
-from tvist_plant.plant import PERIOD
 
 FINEST, CELLS = 5e-4, 400
 """Smallest length of a cell [m], and the number of cells that a run is divided into if they are not smaller."""
@@ -21,6 +20,8 @@ FASTEST = 1e3
 """Factor beyond which a motion is not hurried for its duration, since the joints limit it by far [-]."""
 JOLT_SHARE = 0.3
 """Share of the joints' jerk that each effect of the curve may use [-]."""
+BRIEFEST = 1e-3
+"""Shortest duration that is planned for: shorter ones are as impossible [s]."""
 MOMENTS = 500
 """Number of moments at which a motion's velocity is looked at."""
 LEAST = 1e-3
@@ -62,13 +63,13 @@ def law_of(run: Run, curve: SplineCurve, limits: JointLimits, jerk: float, windo
         window: Time over which the shaper mixes moments of the motion [s].
     """
     asked = [piece.pacing.duration for piece in run]
-    if any(asked):
+    if all(asked):
         jerk = FASTEST * limits.jerk  # durations leave the jerk to the joints
     law = quickest_law(_way(run, curve, limits, 1.0), jerk, window)
     if all(asked):
         wanted, hurry = sum({piece.where: piece.pacing.duration or 0.0 for piece in run}.values()), 1.0
         while law.duration > wanted * (1.0 + CLOSE) and hurry < FASTEST:
-            hurry *= 1.05 * law.duration / wanted
+            hurry = min(1.05 * hurry * law.duration / wanted, FASTEST)
             law = quickest_law(_way(run, curve, limits, hurry), jerk, window)
         law = law.slowed(wanted)
     return _kept(law, curve, limits)
@@ -76,7 +77,7 @@ def law_of(run: Run, curve: SplineCurve, limits: JointLimits, jerk: float, windo
 
 def _kept(law: RetimedLaw, curve: SplineCurve, limits: JointLimits) -> RetimedLaw:
     """The law, slowed down by the per mille by which limits may be exceeded between the samples of a cell."""
-    s, sd, sdd = law.states(np.arange(0.0, law.duration, PERIOD))
+    s, sd, sdd = law.states(law.moments)
     _, slope, second = curve.derivatives(s)
     qd = np.abs(slope * sd[:, None])
     qdd = np.abs(slope * sdd[:, None] + second * (sd**2)[:, None])
@@ -160,5 +161,6 @@ def timed(pacing: Pacing, length: float) -> Pacing:
     """Return the pacing of a leg; for a duration, that of a trapezoid which speeds up and brakes for a third of it."""
     if pacing.duration is None:
         return pacing
-    velocity = 1.5 * length / pacing.duration
-    return Pacing(velocity, 3.0 * velocity / pacing.duration, pacing.duration, pacing.even)
+    duration = max(pacing.duration, BRIEFEST)
+    velocity = 1.5 * length / duration
+    return Pacing(velocity, 3.0 * velocity / duration, duration, pacing.even)

@@ -1,20 +1,22 @@
 """Paths of several legs: blends between them, and stops where there are none."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from tvist_controller.paths.by_length import EvenBlend, evenly
 from tvist_controller.paths.legs import JointWay, Leg, Pacing
-from tvist_controller.paths.tool_curves import ToolBlend, ToolPart, ToolState
+from tvist_controller.paths.tool_curves import ToolBlend, ToolCurve, ToolPart, ToolState
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.spline import Knots, hermite
 
 INSIDE, CLOSE = 1.0 + 1e-9, 1e-6
 """Factor by which rounding, and length by which the joints' interpolation, may exceed a blend's radius [-, m]."""
+SMALLEST, SLIVER = 2e-4, 5e-4
+"""Smallest radius of a blend, and shortest rest of a part between two: rounding would slow shorter ones down [m]."""
 SAME = 1e-9
 """Difference between postures that is rounding [rad]."""
 SHARPEST = 0.15
@@ -51,6 +53,8 @@ class _Cut:
     after: float
     """Length of the second leg that it replaces [m]."""
     piece: Piece
+    curve: ToolCurve | None
+    """Way of the tool; None if the joints' way is the blend."""
 
 
 def runs_of(legs: Sequence[Leg], tracker: Tracker) -> tuple[list[Run], list[str]]:
@@ -68,6 +72,7 @@ def runs_of(legs: Sequence[Leg], tracker: Tracker) -> tuple[list[Run], list[str]
     """
     runs, skipped, begun = [Run()], list[str](), 0.0
     cut: _Cut | None
+    here = legs[0].q if legs else np.empty(0)
     for number, leg in enumerate(legs):
         cut, length = None, leg.way.length
         if leg.blend > 0.0 and number + 1 < len(legs):
@@ -78,7 +83,11 @@ def runs_of(legs: Sequence[Leg], tracker: Tracker) -> tuple[list[Run], list[str]
                 cut = found
         end = length - (0.0 if cut is None else cut.before)
         if end - begun > 1e-9 * length:
-            runs[-1].append(_rest_of(leg, begun, end, runs[-1], tracker))
+            runs[-1].append(_rest_of(leg, begun, end, here, tracker))
+            here = runs[-1][-1].knots.q[-1]
+        if cut is not None:
+            cut = _from(here, cut, tracker)
+            here = cut.piece.knots.q[-1]
         if cut is None:
             runs.append(Run())
             begun = 0.0
@@ -92,17 +101,27 @@ def runs_of(legs: Sequence[Leg], tracker: Tracker) -> tuple[list[Run], list[str]
     return [run for run in runs if run], skipped
 
 
-def _rest_of(leg: Leg, start: float, end: float, before: Run, tracker: Tracker) -> Piece:
-    """The part of a leg that its blends leave."""
+def _from(q: Floats, cut: _Cut, tracker: Tracker) -> _Cut:
+    """A blend of the tool that begins where the joints are: a redundant arm may come there in other postures."""
+    piece = cut.piece
+    if cut.curve is None or np.abs(piece.knots.q[0] - q).max() <= SAME:
+        return cut
+    return replace(cut, piece=replace(piece, knots=tracker.follow(cut.curve, q)))
+
+
+def _rest_of(leg: Leg, start: float, end: float, q: Floats, tracker: Tracker) -> Piece:
+    """The part of a leg that its blends leave, from where the joints are."""
     if isinstance(leg.way, JointWay):
-        return Piece(leg.way.part(start, end), leg.pacing, None, True, leg.where)
-    q = before[-1].knots.q[-1] if before else leg.q
+        way = leg.way if start > 0.0 else JointWay(q, leg.way.end)
+        return Piece(way.part(start, min(end, way.length)), leg.pacing, None, True, leg.where)
     return Piece(tracker.follow(ToolPart(leg.way, start, end), q), leg.pacing, None, False, leg.where)
 
 
 def _cut(leg: Leg, then: Leg, left: float, tracker: Tracker) -> _Cut | str:
     """The blend between two legs, or why there is none."""
     radius = leg.blend
+    if radius < SMALLEST:
+        return "is too small to be worthwhile"
     for _ in range(TRIES):
         before = _within(leg, radius, tracker, from_end=True)
         after = _within(then, radius, tracker, from_end=False)
@@ -111,29 +130,34 @@ def _cut(leg: Leg, then: Leg, left: float, tracker: Tracker) -> _Cut | str:
         if before > left * INSIDE or after > then.way.length * INSIDE:
             return "does not fit between those beside it and the ends of its parts"
         before, after = min(before, left), min(after, then.way.length)
+        if 1e-9 * left < left - before < SLIVER and before > SLIVER:
+            radius *= 1.0 - (SLIVER - (left - before)) / before
+            continue
         try:
-            piece = _blend(leg, then, before, after, tracker)
+            piece, curve = _blend(leg, then, before, after, tracker)
         except WayError:
             return "passes a singular posture"
         postures = _middle(piece.knots)
         off = [np.linalg.norm(tracker.pose(q).position - leg.corner.position) for q in postures]
         if max(off) <= leg.blend * INSIDE + CLOSE:
-            return _Cut(before, after, piece)
+            return _Cut(before, after, piece, curve)
         radius *= SHRINK
     return "cannot keep to its radius"
 
 
-def _blend(leg: Leg, then: Leg, before: float, after: float, tracker: Tracker) -> Piece:
+def _blend(
+    leg: Leg, then: Leg, before: float, after: float, tracker: Tracker
+) -> tuple[Piece, ToolCurve | None]:
     pacing, start = leg.pacing.meeting(then.pacing), leg.way.length - before
     if isinstance(leg.way, JointWay) or isinstance(then.way, JointWay):
         ends = (_joints(leg, start, leg.end, tracker), _joints(then, after, then.q, tracker))
         s = np.array([0.0, before + after])
         knots = Knots(s, *(np.array(pair) for pair in zip(*ends, strict=True)))
-        return Piece(knots, pacing, None, True, leg.where)
+        return Piece(knots, pacing, None, True, leg.where), None
     states = leg.way.at(start), then.way.at(after)
     curve = evenly(ToolBlend(*states, leg.corner.rotation, _rounding(leg, *states) * (before + after)))
     q, _, _ = _joints(leg, start, leg.end, tracker)
-    return Piece(tracker.follow(curve, q), pacing, None if pacing.even else curve, False, leg.where)
+    return Piece(tracker.follow(curve, q), pacing, None if pacing.even else curve, False, leg.where), curve
 
 
 def _rounding(leg: Leg, start: ToolState, end: ToolState) -> float:

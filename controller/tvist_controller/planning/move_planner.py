@@ -16,12 +16,21 @@ from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety import largest_torque, rate_of, torque_along
 from tvist_controller.setup import Setup, body
-from tvist_controller.trajectory import JointLine, MotionLimits, Path, PlannedMotion, quickest_motion
+from tvist_controller.trajectory import (
+    JointLine,
+    MotionLimits,
+    Path,
+    PlannedMotion,
+    at_least,
+    quickest_motion,
+)
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
 
 LOOKS = 64
 """Number of moments of a motion at which the torque is checked before the motion is simulated."""
+AGILE = MotionLimits(1.5, 2.0, 100.0)
+"""Limits of pauses and changes of the speed for motions that are slower by themselves: those of `move_j` by default."""
 BLUNTED = 1.05
 """Largest ratio of the shaped motion's torque to that of the unshaped motion, behind which it lags [-]."""
 
@@ -67,9 +76,10 @@ class MovePlanner:
         """
         path = JointLine(basis.q, np.array(command.q, dtype=float))
         limits = MotionLimits(command.velocity, command.acceleration, command.jerk)
-        if command.duration is not None:
-            limits = self._lasting(path, command.duration, basis)
-        return self.along(path, limits, basis)
+        if command.duration is None:
+            return self.along(path, limits, basis)
+        limits = self._lasting(path, command.duration, basis)
+        return self.along(path, limits, basis, at_least(limits, AGILE.acceleration, AGILE.jerk))
 
     def _lasting(self, path: JointLine, duration: float, basis: MotionBasis) -> MotionLimits:
         """Limits with which a motion takes a duration [s], or those of the arm if it takes longer with these."""
@@ -83,13 +93,16 @@ class MovePlanner:
             limits.velocity * slower, limits.acceleration * slower**2, limits.jerk * slower**3
         )
 
-    def along(self, path: Path, limits: MotionLimits, basis: MotionBasis) -> PlannedMove:
+    def along(
+        self, path: Path, limits: MotionLimits, basis: MotionBasis, agility: MotionLimits | None = None
+    ) -> PlannedMove:
         """Plan a motion along a path, from rest to rest.
 
         Args:
             path: Path of the motion; it begins where the reference is at rest.
             limits: Limits for every joint.
             basis: State that the motion depends on.
+            agility: Limits of pauses and changes of the speed; None for those of the motion.
 
         Raises:
             RefusalError: There is no such motion, or it would lead to a collision.
@@ -97,7 +110,7 @@ class MovePlanner:
         spared = replace(limits, acceleration=limits.acceleration * (1.0 - basis.excess))
         rate = rate_of(basis.speed, limits.velocity, basis.slowest)
         try:
-            motion = quickest_motion(path, spared, PERIOD, rate)
+            motion = quickest_motion(path, spared, PERIOD, rate, agility)
         except ValueError as error:
             raise RefusalError("out_of_range", "velocity", str(error)) from error
         found = self.meeting(motion, basis)

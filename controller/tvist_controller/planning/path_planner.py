@@ -19,7 +19,7 @@ from tvist_controller.planning.reachable import Reachable
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety import rate_of
 from tvist_controller.setup import Setup
-from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, quickest_motion
+from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, at_least, quickest_motion
 from tvist_controller.trajectory.spline import SplineCurve
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import (
@@ -40,6 +40,8 @@ SPARED = 0.995
 """Share of the joints' limits that paths use: a shaper whose weights vary may exceed its reference a little [-]."""
 LEAST_WINDOW = 0.08
 """Delay of a shaper for which a path has room in any case, so that few changes of the shaper slow it down [s]."""
+AGILE = MotionLimits(0.25, 1.2, 60.0)
+"""Limits of pauses and changes of the speed for motions that are slower by themselves: those of `move_l` by default."""
 VARIATION = 1.1
 """Factor by which the delay may be longer between them [-]."""
 
@@ -206,7 +208,8 @@ class PathPlanner:
         law = law_of(run, curve, joints, jerk, delay)
         highest = fastest(law, curve)
         rate = rate_of(basis.speed, highest, basis.slowest)
-        return PlannedMotion(curve, law, PERIOD, rate), delay, highest
+        agility = at_least(law.limits, AGILE.acceleration, AGILE.jerk)
+        return PlannedMotion(curve, law, PERIOD, rate, agility), delay, highest
 
     @staticmethod
     def _delay(curve: SplineCurve, tvist: Filter) -> float:

@@ -7,7 +7,7 @@ from tvist_controller.trajectory.guided import Guided, StuckError
 from tvist_controller.trajectory.joint_speed import JointSpeed
 from tvist_controller.trajectory.known import Known
 from tvist_controller.trajectory.limits import MotionLimits
-from tvist_controller.trajectory.motion import PlannedMotion, quickest_motion
+from tvist_controller.trajectory.motion import PlannedMotion, at_least, quickest_motion
 from tvist_controller.trajectory.path import JointLine, Path, Way
 from tvist_controller.trajectory.path_stop import PathStop
 from tvist_controller.trajectory.servo import Servo
@@ -37,5 +37,6 @@ __all__ = [
     "ToolSpeed",
     "Trajectory",
     "Way",
+    "at_least",
     "quickest_motion",
 ]

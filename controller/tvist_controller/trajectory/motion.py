@@ -48,19 +48,24 @@ class PlannedMotion(Trajectory):
         law: Time law, from the path's start to its end.
         period: Tick [s].
         speed: Initial rate of its time relative to the clock's [-].
+        agility: Limits of a change of the rate, at least those of the law, which may be slow; None for the same.
     """
 
     path: Path
     limits: MotionLimits
 
-    def __init__(self, path: Path, law: TimeLaw, period: float, speed: float = 1.0) -> None:
+    def __init__(
+        self, path: Path, law: TimeLaw, period: float, speed: float = 1.0, agility: MotionLimits | None = None
+    ) -> None:
         self.path, self._law, self._period = path, law, period
+        self.agility = law.limits if agility is None else agility
+        """Limits that a change of the rate keeps."""
         self.limits = law.limits
         self.duration = law.duration
         """Duration from rest to rest at full speed [s]."""
         self.speed = speed
         """Target of the rate of its time, 0 to 1 [-]."""
-        self._pace = Pace(law.limits, period, speed)
+        self._pace = Pace(self.agility, period, speed)
         # Time on the path, as whole ticks since the rate last changed, so that rounding errors do not add up.
         self._since, self._ticks = 0.0, 0
 
@@ -109,7 +114,7 @@ class PlannedMotion(Trajectory):
 
     def _paced(self, time: float) -> Floats:
         x, xd, xdd = (np.array(values) for values in self._law.at(time))
-        return self.path.paced(x, xd, xdd, self.limits.acceleration)
+        return self.path.paced(x, xd, xdd, self.agility.acceleration)
 
     @property
     def rate(self) -> float:
@@ -126,11 +131,12 @@ class PlannedMotion(Trajectory):
         """Forecast of its motion; the time of braking is known only while its rate is constant."""
         time, rate = self.time, self._pace.rate
         known = rate > 0.0 and self.steady
+        limits = self.limits if self.steady else self.agility
         return Forecast(
             self.path,
             self.path.end,
-            self.limits.acceleration,
-            self.limits.jerk,
+            limits.acceleration,
+            limits.jerk,
             max(self._law.brakes_at - time, 0.0) / rate if known else 0.0,
         )
 
@@ -150,17 +156,17 @@ class PlannedMotion(Trajectory):
         Near the end hardly any acceleration is left for a pause, which would only draw the end out.
 
         Args:
-            acceleration: Limit for every entry of the parameter while slowing down, at most the motion's own
-                [rad/s^2].
+            acceleration: Limit for every entry of the parameter while slowing down, at most that of its agility.
 
         Returns:
             Whether it pauses.
         """
         paused = self.fork()
         paused.speed, paused._pace.acceleration = 0.0, acceleration  # noqa: SLF001  one of its own kind
-        most, forecast = self.limits.acceleration, self.forecast
+        most, forecast = self.limits.acceleration, self.forecast  # it brakes so by itself
         longer = self.velocity * (1.0 / acceleration - 1.0 / most) + 2.0 * most / self.limits.jerk
-        if forecast.steady == 0.0 and self.rate == 1.0 and self.steady:
+        hardest = self.agility.acceleration <= most
+        if forecast.steady == 0.0 and self.rate == 1.0 and self.steady and hardest:
             return False  # it brakes as hard as it can
         if forecast.steady < longer + SURELY and not _stands_sooner(paused, self.fork()):
             return False
@@ -169,7 +175,7 @@ class PlannedMotion(Trajectory):
 
     def release(self, speed: float) -> None:
         """Resume after a pause, at a rate [-]."""
-        self.speed, self._pace.acceleration = speed, self.limits.acceleration
+        self.speed, self._pace.acceleration = speed, self.agility.acceleration
 
     def fork(self) -> Self:
         """Return an independent copy of the present state, with a pace of its own."""
@@ -188,7 +194,9 @@ class PlannedMotion(Trajectory):
         return self.time >= self.duration
 
 
-def quickest_motion(path: Path, limits: MotionLimits, period: float, speed: float = 1.0) -> PlannedMotion:
+def quickest_motion(
+    path: Path, limits: MotionLimits, period: float, speed: float = 1.0, agility: MotionLimits | None = None
+) -> PlannedMotion:
     """Return the double-S motion along a path from rest to rest within limits.
 
     Args:
@@ -196,11 +204,12 @@ def quickest_motion(path: Path, limits: MotionLimits, period: float, speed: floa
         limits: Limits for every joint.
         period: Tick [s].
         speed: Initial rate of its time relative to the clock's [-].
+        agility: See `PlannedMotion`.
 
     Raises:
         ValueError: There is no such motion within these limits, or it would last for hours.
     """
-    return PlannedMotion(path, DoubleS(path.start, path.end, path.planned(limits)), period, speed)
+    return PlannedMotion(path, DoubleS(path.start, path.end, path.planned(limits)), period, speed, agility)
 
 
 def _stands_sooner(paused: PlannedMotion, free: PlannedMotion) -> bool:
@@ -215,3 +224,8 @@ def _stands_sooner(paused: PlannedMotion, free: PlannedMotion) -> bool:
     for _ in range(SOONER):
         free.next()
     return not free.standing
+
+
+def at_least(limits: MotionLimits, acceleration: float, jerk: float) -> MotionLimits:
+    """Return limits of which acceleration and jerk are at least these."""
+    return MotionLimits(limits.velocity, max(limits.acceleration, acceleration), max(limits.jerk, jerk))

@@ -148,6 +148,12 @@ class RetimedLaw:
         self.limits = MotionLimits(float(speeds.max()) * rate, most * rate**2, jerk * rate**3)
         """Limits that it keeps."""
 
+    @property
+    def moments(self) -> Floats:
+        """Times at which velocity or acceleration may be largest: where a cell begins, half a ramp and a ramp later."""
+        times = self._times[1:]
+        return np.concatenate((times, times + 0.5 * self._ramp, times + self._ramp)) / self._rate
+
     def slowed(self, duration: float) -> "RetimedLaw":
         """Return the same law in a longer duration [s]; this one if it takes as long already."""
         if duration <= self.duration:

@@ -128,6 +128,7 @@ class SplineCurve(Curve):
         return self._bends(low, high)
 
     def _posture(self, x: Floats) -> Floats:
+        assert x.shape == (1,), "a parameter is one number, and compiled code does not check"
         evaluate(self._knots, self._coefficients, x, self._one)
         q: Floats = self._one[0, 0].copy()
         return q
