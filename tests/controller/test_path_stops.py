@@ -20,7 +20,7 @@ from .paths import Progress, journey
 from .robots import UR5E, H
 from .spaces import BENT, away, begun, errors, tool_pose
 
-QUICK, SLOW, ALL = 8, 40, 500
+QUICK, SLOW, ALL = 8, 24, 500
 
 
 @pytest.mark.parametrize("seed", range(QUICK))

@@ -63,11 +63,13 @@ class InverseKinematics:
         self._limits = self._arm[:-1, 4]
         self._closed = bool(self._arm[-1, 0] != ANY)
         span = np.minimum(self._limits, np.pi)
+        self._prepared = False
         self._starts = np.random.default_rng(1).uniform(-span, span, (STARTS, description.joints))
 
     def prepare(self) -> None:
         """Compile what `solve` uses; this takes half a minute once, and then half a second in each process."""
         _compile(*(CLOSED_FORM if self._closed else NUMERICAL))
+        self._prepared = True
 
     @property
     def closed_form(self) -> bool:
@@ -93,7 +95,8 @@ class InverseKinematics:
             InverseKinematicsError: No posture within the joints' ranges has this pose.
             TypeError: An array does not have 64-bit floats.
         """
-        self.prepare()
+        if not self._prepared:
+            self.prepare()
         if not self._closed:
             return self._search(rotation, position, near)
         q = near.copy()
