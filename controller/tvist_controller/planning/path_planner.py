@@ -36,7 +36,7 @@ from tvist_shaping.base import Filter
 
 POSTURES = 9
 """Number of postures of a run at which the shaper's delay is looked up."""
-SPARED = 0.995
+SPARED = 0.99
 """Share of the joints' limits that paths use: a shaper whose weights vary may exceed its reference a little [-]."""
 LEAST_WINDOW = 0.08
 """Delay of a shaper for which a path has room in any case, so that few changes of the shaper slow it down [s]."""
