@@ -32,8 +32,8 @@ class Guiding(Leased):
 
         Args:
             q: Posture [rad].
-            lookahead: Time constant of the approach [s]; values outside 0.03 to 0.2 are clipped.
-            gain: Proportional gain of the approach [-]; values outside 100 to 2000 are clipped.
+            lookahead: Lag behind a moving posture, besides two steps [s]; values outside 0.03 to 0.2 are clipped.
+            gain: How abruptly the arm begins to approach it [1/s²]; values outside 100 to 2000 are clipped.
             shaped: Whether the shaper is used; only for a motion that begins at rest.
             duration: Time after which this returns [s]; None for at once.
         """

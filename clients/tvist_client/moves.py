@@ -169,7 +169,7 @@ class Moves(Leased):
                 `JointSegment`, each of which begins where the previous one ends. A blend that does not fit is left
                 out; an event of the kind `warning` and the code `blend_skipped` then says so.
             frame: Frame in which all poses are given, as a pose in the base frame; None for the base frame.
-            jerk: Largest jerk of the tool [m/s³]; of the joints on joint segments, twice the number [rad/s³].
+            jerk: Largest jerk of the tool [m/s³]; of the joints on joint segments, four times the number [rad/s³].
             wait: Whether to wait for the end; see `move_j`.
 
         Raises:

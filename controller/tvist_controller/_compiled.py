@@ -17,9 +17,6 @@ def compiled(function: F) -> F:
     return cast("F", njit(cache=True, nogil=True)(function))
 
 
-def is_cached(function: Callable[..., Any]) -> bool:
+def is_cached(function: Any) -> bool:
     """Return whether a compiled function's machine code is on disk already; otherwise its first call takes seconds."""
-    stats = getattr(function, "stats", None)
-    if stats is None:  # pragma: no cover  it runs as Python: there is nothing to compile
-        return True
-    return any(Path(stats.cache_path).glob(f"*.{function.__name__}-*.nbi"))
+    return any(Path(function.stats.cache_path).glob(f"*.{function.__name__}-*.nbi"))

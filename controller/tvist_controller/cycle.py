@@ -11,7 +11,7 @@ from tvist_controller.control.joint_controllers import JointControllers
 from tvist_controller.control.shaped_reference import ShapedReference
 from tvist_controller.line_filter import LineFilter
 from tvist_controller.look_ahead import LookAhead, Obstacle
-from tvist_controller.safety import StreamTorqueRoom
+from tvist_controller.safety import StreamTorqueRoom, arm_limits
 from tvist_controller.trajectory import (
     JointLine,
     JointStop,
@@ -77,9 +77,7 @@ class ControlCycle:
         plant: Plant | None = None,
     ) -> None:
         self.description = description
-        limits = description.limits
-        most = MotionLimits(min(limits.velocity), min(limits.acceleration), min(limits.jerk))
-        self.line_filter = LineFilter(tvist, most)
+        self.line_filter = LineFilter(tvist, arm_limits(description))
         self._plant: Plant = FlexibleArm(description, carried) if plant is None else plant
         self.inverse_dynamics = InverseDynamics(description, declared)
         self._joint_controllers = JointControllers(description, PERIOD)

@@ -8,8 +8,8 @@ from tvist_controller.control.differentiator import Floats
 from tvist_controller.kinematics.tool import ToolKinematics
 from tvist_controller.motion import MotionControl
 from tvist_controller.refusal import RefusalError
-from tvist_controller.safety import GENTLEST_STOP, GuidedTorqueRoom
-from tvist_controller.trajectory import Guided, JointSpeed, MotionLimits, Servo, ToolSpeed
+from tvist_controller.safety import GENTLEST_STOP, GuidedTorqueRoom, arm_limits
+from tvist_controller.trajectory import Guided, JointSpeed, Servo, ToolSpeed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.transitions import Activity
 
@@ -28,9 +28,8 @@ class Guidance:
 
     def __init__(self, motion: MotionControl) -> None:
         self._motion, self._cycle = motion, motion.cycle
-        limits = motion.cycle.description.limits
-        self._limits = MotionLimits(min(limits.velocity), min(limits.acceleration), min(limits.jerk))
-        self._reach = np.array(limits.position)
+        self._limits = arm_limits(motion.cycle.description)
+        self._reach = np.array(motion.cycle.description.limits.position)
         self._torque = GuidedTorqueRoom(motion.cycle.description, motion.cycle.inverse_dynamics)
         self._tcp, self._kinematics = motion.tcp, ToolKinematics(motion.cycle.description)
 

@@ -91,12 +91,12 @@ class Motions:
             self._running.pace(self.wanted_speed, self.slowest)
 
     def hold(self) -> None:
-        """Bring a point-to-point motion to a standstill on its path."""
+        """Bring a planned motion to a standstill on its path."""
         if isinstance(self._running, RunningMove):
             self._running.hold()
 
     def release(self) -> None:
-        """Resume a point-to-point motion."""
+        """Resume a planned motion."""
         if isinstance(self._running, RunningMove):
             self._running.release(self.wanted_speed, self.slowest)
 

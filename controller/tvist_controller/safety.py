@@ -7,7 +7,7 @@ import numpy as np
 
 from tvist_controller.control.differentiator import Floats, Target, central_differences
 from tvist_controller.control.inverse_dynamics import InverseDynamics
-from tvist_controller.trajectory import JointStop, Path, PathStop
+from tvist_controller.trajectory import JointStop, MotionLimits, Path, PathStop
 from tvist_plant.description import RobotDescription
 
 TORQUE_SHARE = 0.9
@@ -26,6 +26,12 @@ LOOK_EVERY = 4
 """Ticks between two checks of the torque along known references."""
 REDUCED_SHARE = 0.25
 """Share of the joints' velocity that remains while the safety system reduces the speed [-]."""
+
+
+def arm_limits(description: RobotDescription) -> MotionLimits:
+    """Return the limits that suit every joint: the smallest of all."""
+    limits = description.limits
+    return MotionLimits(min(limits.velocity), min(limits.acceleration), min(limits.jerk))
 
 
 def rate_of(speed: float, velocity: float, slowest: float | None) -> float:

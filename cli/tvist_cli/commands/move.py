@@ -99,7 +99,7 @@ def move(
 
 
 class _Limits(TypedDict, total=False):
-    """What is given of a motion."""
+    """The limits or the duration that the user has set."""
 
     velocity: float
     acceleration: float

@@ -45,10 +45,10 @@ class JointLimits:
 def joined(run: Run) -> Knots:
     """Return the knots of a whole run."""
     first, *rest = (piece.knots for piece in run)
-    s, parts = [first.s], [first[1:]]
+    s, parts = [first.s], list[tuple[Floats, ...]]([first[1:]])
     for knots in rest:
         s.append(s[-1][-1] + knots.s[1:])
-        parts.append(tuple(values[1:] for values in knots[1:]))  # type: ignore[arg-type]
+        parts.append(tuple(values[1:] for values in knots[1:]))
     return Knots(np.concatenate(s), *(np.concatenate(values) for values in zip(*parts, strict=True)))
 
 

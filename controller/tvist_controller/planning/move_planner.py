@@ -14,7 +14,7 @@ from tvist_controller.line_filter import LineFilter
 from tvist_controller.planning.basis import MotionBasis
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.refusal import RefusalError
-from tvist_controller.safety import largest_torque, rate_of, torque_along
+from tvist_controller.safety import arm_limits, largest_torque, rate_of, torque_along
 from tvist_controller.setup import Setup, body
 from tvist_controller.trajectory import (
     JointLine,
@@ -83,8 +83,7 @@ class MovePlanner:
 
     def _lasting(self, path: JointLine, duration: float, basis: MotionBasis) -> MotionLimits:
         """Limits with which a motion takes a duration [s], or those of the arm if it takes longer with these."""
-        most = self._description.limits
-        limits = MotionLimits(min(most.velocity), min(most.acceleration), min(most.jerk))
+        limits = arm_limits(self._description)
         spared = replace(limits, acceleration=limits.acceleration * (1.0 - basis.excess))
         slower = min(quickest_motion(path, spared, PERIOD).duration / duration, 1.0)
         if slower == 0.0:

@@ -17,7 +17,7 @@ from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.refusal import RefusalError
-from tvist_controller.safety import rate_of
+from tvist_controller.safety import arm_limits, rate_of
 from tvist_controller.setup import Setup
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, at_least, quickest_motion
 from tvist_controller.trajectory.spline import SplineCurve
@@ -177,10 +177,10 @@ class PathPlanner:
         if found is None:
             return
         share, meeting = found
-        covered, where = share * _length(run), ""
+        covered, where = share * _length(run), _field(run[-1].where)
         for piece, end in zip(run, np.cumsum([piece.knots.s[-1] for piece in run]), strict=True):
-            where = _field(piece.where)
             if end >= covered:
+                where = _field(piece.where)
                 break
         whole = 100.0 * (part[0] + covered) / part[1]
         why = f"{where}: {meeting} after {whole:.0f} % of the way"
@@ -194,8 +194,8 @@ class PathPlanner:
         """A motion, the delay of the shaper on it [s], and the largest velocity of a joint [rad/s]."""
         limits, spared = self._description.limits, 1.0 - basis.excess
         if not run:  # the arm is there already
-            rest = MotionLimits(min(limits.velocity), min(limits.acceleration), min(limits.jerk))
-            return quickest_motion(JointLine(basis.q, basis.q), rest, PERIOD, basis.speed), 0.0, 0.0
+            still = JointLine(basis.q, basis.q)
+            return quickest_motion(still, arm_limits(self._description), PERIOD, basis.speed), 0.0, 0.0
         knots = joined(run)
         self._check_range(knots.s / knots.s[-1], knots.q, run[0].where)
         acceleration = np.array(limits.acceleration) * spared

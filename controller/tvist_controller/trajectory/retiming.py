@@ -204,7 +204,7 @@ def quickest_law(way: Way, jerk: float, window: float) -> RetimedLaw:
         window: Time over which a shaper mixes moments of the motion [s].
     """
     lengths = np.diff(way.edges)
-    b = _passed(way, np.zeros(len(way.edges)), 0.0)
+    b = _passed(way.edges, way.joints, way.tool)
     accelerations = np.abs(0.5 * np.diff(b) / lengths)
     ramp = float(max(accelerations.max() / jerk, (way.slope * accelerations).max() / way.jerk))
     law = _law(way, b, ramp, window)
@@ -214,20 +214,22 @@ def quickest_law(way: Way, jerk: float, window: float) -> RetimedLaw:
 
 
 def _law(way: Way, b: Floats, ramp: float, window: float) -> RetimedLaw:
-    return RetimedLaw(way.edges, _passed(way, arrivals(way.edges, b), window + ramp), ramp)
+    times, around = arrivals(way.edges, b), window + ramp
+    joints, tool = _lasting(way.joints, times, around), _lasting(way.tool, times, TOOL_SHARE * around)
+    return RetimedLaw(way.edges, _passed(way.edges, joints, tool), ramp)
 
 
-def _passed(way: Way, times: Floats, window: float) -> Floats:
-    """Largest ṡ² at the edges if limits hold for a window of time around a motion that is there at these times."""
-    near = [
-        Cells(
-            widened(times, share * window, cells.fastest[:, None], True)[:, 0],
-            widened(times, share * window, cells.p, False),
-            widened(times, share * window, cells.q, False),
-        )
-        for cells, share in ((way.joints, 1.0), (way.tool, TOOL_SHARE))
-    ]
-    joints, tool = near if window > 0.0 else (way.joints, way.tool)
+def _lasting(cells: Cells, times: Floats, window: float) -> Cells:
+    """Limits that hold for a window of time around a motion that is at the edges at these times."""
+    return Cells(
+        widened(times, window, cells.fastest[:, None], True)[:, 0],
+        widened(times, window, cells.p, False),
+        widened(times, window, cells.q, False),
+    )
+
+
+def _passed(edges: Floats, joints: Cells, tool: Cells) -> Floats:
+    """Largest ṡ² at the edges within the limits of joints and tool."""
     p, q = np.hstack((joints.p, tool.p)), np.hstack((joints.q, tool.q))
     highest = np.minimum(joints.fastest, tool.fastest) ** 2
-    return passes(way.edges, np.minimum(highest, 1.0 / np.maximum(q.max(axis=1), LEAST)), p, q)
+    return passes(edges, np.minimum(highest, 1.0 / np.maximum(q.max(axis=1), LEAST)), p, q)
