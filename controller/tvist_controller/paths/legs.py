@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tvist_controller.paths.poses import Placement
-from tvist_controller.paths.tool_curves import PER_RADIAN, ToolCurve
+from tvist_controller.paths.tool_curves import PER_RADIAN, ToolWay
 from tvist_controller.trajectory.limits import Floats
 from tvist_controller.trajectory.spline import Knots
 
@@ -92,11 +92,9 @@ class Pacing:
 class Leg:
     """One part of a path, as it was asked for."""
 
-    way: ToolCurve | JointWay
-    q: Floats
-    """Joint positions at its start, shape (n,) [rad]."""
-    end: Floats
-    """Joint positions at its end, shape (n,) [rad]."""
+    way: ToolWay | JointWay
+    knots: Knots
+    """The joints' way along all of it."""
     corner: Placement
     """Pose of the tool at its end."""
     pacing: Pacing
@@ -104,3 +102,9 @@ class Leg:
     """Radius of the blend at its end [m]."""
     where: str
     """Field of the command that it comes from, for messages."""
+
+    @property
+    def q(self) -> Floats:
+        """Joint positions at its start, shape (n,) [rad]."""
+        start: Floats = self.knots.q[0]
+        return start

@@ -65,12 +65,13 @@ def law_of(run: Run, curve: SplineCurve, limits: JointLimits, jerk: float, windo
     asked = [piece.pacing.duration for piece in run]
     if all(asked):
         jerk = FASTEST * limits.jerk  # durations leave the jerk to the joints
-    law = quickest_law(_way(run, curve, limits, 1.0), jerk, window)
+    ground = _ground(run, curve)
+    law = quickest_law(ground.way(limits, 1.0), jerk, window)
     if all(asked):
         wanted, hurry = sum({piece.where: piece.pacing.duration or 0.0 for piece in run}.values()), 1.0
         while law.duration > wanted * (1.0 + CLOSE) and hurry < FASTEST:
             hurry = min(1.05 * hurry * law.duration / wanted, FASTEST)
-            law = quickest_law(_way(run, curve, limits, hurry), jerk, window)
+            law = quickest_law(ground.way(limits, hurry), jerk, window)
         law = law.slowed(wanted)
     return _kept(law, curve, limits)
 
@@ -91,40 +92,62 @@ def fastest(law: RetimedLaw, curve: SplineCurve) -> float:
     return float(np.abs(curve.derivatives(s)[1] * sd[:, None]).max())
 
 
-def _way(run: Run, curve: SplineCurve, limits: JointLimits, hurry: float) -> Way:
-    length = float(curve.end[0])
-    largest = max(length / CELLS, FINEST)
+@dataclass(frozen=True)
+class _Ground:
+    """What limits a run, cell by cell, before it is hurried."""
+
+    places: Floats
+    """Ends of the cells, shape (c + 1,) [m]."""
+    speed: Floats
+    """Speed of the tool that was asked for, shape (c,) [m/s]."""
+    p: Floats
+    """Share of its acceleration per unit of s̈, shape (c,) [s^2/m]."""
+    q: Floats
+    """Share of its acceleration per unit of ṡ², shape (c,) [s^2/m^2]."""
+    slope: Floats
+    """Bound of |dq/ds|, shape (c, n) [rad/m]."""
+    second: Floats
+    """Bound of |d²q/ds²|, shape (c, n) [rad/m^2]."""
+    third: Floats
+    """Bound of |d³q/ds³| of any joint, shape (c,) [rad/m^3]."""
+
+    def way(self, limits: JointLimits, hurry: float) -> Way:
+        """Return the limits of the motion that is faster than asked for by a factor."""
+        # Joints jerk by the third derivative times ṡ³, by 3 q'' ṡ s̈, and by q' s⃛: the first two take a share each.
+        smooth = np.cbrt(JOLT_SHARE * limits.jerk / np.maximum(self.third, LEAST))
+        even = np.minimum(hurry * self.speed, smooth)
+        fastest = (limits.velocity / np.maximum(self.slope, LEAST)).min(axis=1)
+        bent = 3.0 * self.second.max(axis=1) * np.minimum(even, fastest) / (JOLT_SHARE * limits.jerk)
+        return Way(
+            self.places,
+            Cells(fastest, self.slope / limits.acceleration, self.second / limits.acceleration),
+            Cells(
+                even,
+                np.column_stack((self.p / hurry**2, bent)),
+                np.column_stack((self.q / hurry**2, np.zeros(len(bent)))),
+            ),
+            self.slope.max(axis=1),
+            (1.0 - 2.0 * JOLT_SHARE) * limits.jerk,
+        )
+
+
+def _ground(run: Run, curve: SplineCurve) -> _Ground:
+    largest = max(float(curve.end[0]) / CELLS, FINEST)
     starts = np.concatenate(([0.0], np.cumsum([piece.knots.s[-1] for piece in run])))
-    edges, speeds, tool_p, tool_q = [np.zeros(1)], [], [], []
+    edges, tool = [np.zeros(1)], []
     for piece, (start, end) in zip(run, pairwise(starts.tolist()), strict=True):
         count = max(int(np.ceil((end - start) / largest)), 2)
         places = np.linspace(0.0, end - start, count + 1)
         edges.append(start + places[1:])
         along, bent = _joints(curve, start + places) if piece.by_joints else _tool(piece, places)
         pacing = piece.pacing
-        speeds.append(hurry * pacing.velocity / along)
-        tool_p.append(along / (hurry**2 * pacing.acceleration))
-        tool_q.append(bent / (hurry**2 * pacing.acceleration))
+        tool.append((pacing.velocity / along, along / pacing.acceleration, bent / pacing.acceleration))
     places = np.concatenate(edges)
     looks = _looks(places)
     slope, second = (_largest(np.abs(values)) for values in curve.derivatives(looks)[1:])
-    bend, jolt = second.max(axis=1), _largest(np.abs(curve.third(looks))).max(axis=1)
-    # Joints jerk by the third derivative times ṡ³, by 3 q'' ṡ s̈, and by q' s⃛: the first two take a share each.
-    smooth = np.cbrt(JOLT_SHARE * limits.jerk / np.maximum(jolt, LEAST))
-    even = np.minimum(np.concatenate(speeds), smooth)
-    fastest = (limits.velocity / np.maximum(slope, LEAST)).min(axis=1)
-    bent = 3.0 * bend * np.minimum(even, fastest) / (JOLT_SHARE * limits.jerk)
-    return Way(
-        places,
-        Cells(fastest, slope / limits.acceleration, second / limits.acceleration),
-        Cells(
-            even,
-            np.column_stack((np.concatenate(tool_p), bent)),
-            np.column_stack((np.concatenate(tool_q), np.zeros(len(bent)))),
-        ),
-        slope.max(axis=1),
-        (1.0 - 2.0 * JOLT_SHARE) * limits.jerk,
-    )
+    third = _largest(np.abs(curve.third(looks))).max(axis=1)
+    speed, p, q = (np.concatenate(values) for values in zip(*tool, strict=True))
+    return _Ground(places, speed, p, q, slope, second, third)
 
 
 def _tool(piece: Piece, places: Floats) -> tuple[Floats, Floats]:

@@ -11,7 +11,7 @@ from tvist_controller.paths.legs import JointWay, Leg, Pacing
 from tvist_controller.paths.tool_curves import ToolBlend, ToolCurve, ToolPart, ToolState
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.trajectory.limits import Floats
-from tvist_controller.trajectory.spline import Knots, hermite
+from tvist_controller.trajectory.spline import Knots, SplineCurve
 
 INSIDE, CLOSE = 1.0 + 1e-9, 1e-6
 """Factor by which rounding, and length by which the joints' interpolation, may exceed a blend's radius [-, m]."""
@@ -21,6 +21,8 @@ SAME = 1e-9
 """Difference between postures that is rounding [rad]."""
 SHARPEST = 0.15
 """Smallest ratio of a blend's chord to its radius for its length; it is 0 where the tool goes back as it came [-]."""
+BETWEEN = 8
+"""Number of places for each knot of a blend at which its distance from the corner is looked at."""
 SHRINK, TRIES = 0.85, 12
 """Factor by which a blend that leaves its radius begins closer to the corner, and how often that is tried."""
 
@@ -111,6 +113,8 @@ def _from(q: Floats, cut: _Cut, tracker: Tracker) -> _Cut:
 
 def _rest_of(leg: Leg, start: float, end: float, q: Floats, tracker: Tracker) -> Piece:
     """The part of a leg that its blends leave, from where the joints are."""
+    if start == 0.0 and end == leg.way.length and (q == leg.q).all():
+        return Piece(leg.knots, leg.pacing, None, isinstance(leg.way, JointWay), leg.where)
     if isinstance(leg.way, JointWay):
         way = leg.way if start > 0.0 else JointWay(q, leg.way.end)
         return Piece(way.part(start, min(end, way.length)), leg.pacing, None, True, leg.where)
@@ -150,13 +154,13 @@ def _blend(
 ) -> tuple[Piece, ToolCurve | None]:
     pacing, start = leg.pacing.meeting(then.pacing), leg.way.length - before
     if isinstance(leg.way, JointWay) or isinstance(then.way, JointWay):
-        ends = (_joints(leg, start, leg.end, tracker), _joints(then, after, then.q, tracker))
+        ends = (_joints(leg, start, tracker, from_end=True), _joints(then, after, tracker, from_end=False))
         s = np.array([0.0, before + after])
         knots = Knots(s, *(np.array(pair) for pair in zip(*ends, strict=True)))
         return Piece(knots, pacing, None, True, leg.where), None
     states = leg.way.at(start), then.way.at(after)
     curve = evenly(ToolBlend(*states, leg.corner.rotation, _rounding(leg, *states) * (before + after)))
-    q, _, _ = _joints(leg, start, leg.end, tracker)
+    q, _, _ = _joints(leg, start, tracker, from_end=True)
     return Piece(tracker.follow(curve, q), pacing, None if pacing.even else curve, False, leg.where), curve
 
 
@@ -174,13 +178,12 @@ def _rounding(leg: Leg, start: ToolState, end: ToolState) -> float:
     return float(0.625 * ratio**0.55)
 
 
-def _joints(leg: Leg, s: float, near: Floats, tracker: Tracker) -> tuple[Floats, Floats, Floats]:
-    """Joint positions on a leg and their derivatives, followed from the posture at its corner."""
+def _joints(leg: Leg, s: float, tracker: Tracker, *, from_end: bool) -> tuple[Floats, Floats, Floats]:
+    """Joint positions on a leg and their derivatives, followed from the posture at one of its ends."""
     if isinstance(leg.way, JointWay):
         return leg.way.at(s)
-    corner = leg.way.length if near is leg.end else 0.0
+    corner, near, sign = (leg.way.length, leg.knots.q[-1], -1.0) if from_end else (0.0, leg.knots.q[0], 1.0)
     knots = tracker.follow(ToolPart(leg.way, corner, s), near)
-    sign = 1.0 if s >= corner else -1.0
     return knots.q[-1], sign * knots.slope[-1], knots.second[-1]
 
 
@@ -190,11 +193,6 @@ def _within(leg: Leg, radius: float, tracker: Tracker, *, from_end: bool) -> flo
     return leg.way.within(radius)
 
 
-def _middle(knots: Knots) -> list[Floats]:
-    """Postures at the knots and between them."""
-    found = []
-    for number, length in enumerate(np.diff(knots.s)):
-        ends = [(knots.q[at], knots.slope[at], knots.second[at]) for at in (number, number + 1)]
-        c = hermite(float(length), ends[0], ends[1])
-        found += [(share * length) ** np.arange(6) @ c for share in np.linspace(0.0, 1.0, 9)]
-    return found
+def _middle(knots: Knots) -> Floats:
+    """Postures at the knots and between them, shape (k, n)."""
+    return SplineCurve(knots).derivatives(np.linspace(0.0, knots.s[-1], BETWEEN * (len(knots.s) - 1) + 1))[0]

@@ -40,15 +40,19 @@ class ToolCurve(ABC):
     def at(self, s: float) -> ToolState:
         """Return the state at a length from the start [m]."""
 
+
+class ToolWay(ToolCurve):
+    """Way of the tool that may be blended with the next one."""
+
+    @abstractmethod
     def within(self, radius: float) -> float:
         """Return the length from either end within which the tool is no farther from that end than this [m].
 
         It may exceed the curve's length, or be infinite for one that does not move the tool centre point.
         """
-        raise NotImplementedError(f"{type(self).__name__} has no blends at its ends")
 
 
-class ToolLine(ToolCurve):
+class ToolLine(ToolWay):
     """Straight line, on which the tool turns evenly by the shortest way.
 
     Args:
@@ -74,7 +78,7 @@ class ToolLine(ToolCurve):
         return ToolState(pose, self._first, np.zeros(6))
 
 
-class ToolArc(ToolCurve):
+class ToolArc(ToolWay):
     """Arc of the circle through three points.
 
     Args:

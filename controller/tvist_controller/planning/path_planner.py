@@ -10,7 +10,7 @@ from tvist_controller.paths.legs import JointWay, Leg, Pacing
 from tvist_controller.paths.pacing import JointLimits, fastest, joined, law_of, timed
 from tvist_controller.paths.poses import Placement, placement
 from tvist_controller.paths.route import Piece, Run, runs_of
-from tvist_controller.paths.tool_curves import PER_RADIAN, SHORTEST, ToolArc, ToolCurve, ToolLine
+from tvist_controller.paths.tool_curves import PER_RADIAN, SHORTEST, ToolArc, ToolLine, ToolWay
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.planning.basis import MotionBasis
 from tvist_controller.planning.filter_planner import FilterPlanner
@@ -20,7 +20,7 @@ from tvist_controller.refusal import RefusalError
 from tvist_controller.safety import arm_limits, rate_of
 from tvist_controller.setup import Setup
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, at_least, quickest_motion
-from tvist_controller.trajectory.spline import SplineCurve
+from tvist_controller.trajectory.spline import Knots, SplineCurve
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import (
     ArcSegment,
@@ -113,7 +113,7 @@ class PathPlanner:
         frame, q = placement(command.frame), basis.q
         for segment, where in _segments(command):
             start = tracker.pose(q)
-            way: ToolCurve | JointWay
+            way: ToolWay | JointWay
             match segment:
                 case JointSegment():
                     way = JointWay(q, np.array(segment.q, dtype=float))
@@ -125,10 +125,10 @@ class PathPlanner:
                     way = ToolLine(start, frame @ placement(segment.pose))
             if way.length < SHORTEST:
                 continue
-            end_q = self._end(way, q, tracker, where, basis)
+            knots = self._along(way, q, tracker, where, basis)
+            q = way.end if isinstance(way, JointWay) else knots.q[-1]
             pacing = timed(_pacing(segment), way.length)
-            yield Leg(way, q, end_q, tracker.pose(end_q), pacing, segment.blend, where)
-            q = end_q
+            yield Leg(way, knots, tracker.pose(q), pacing, segment.blend, where)
 
     @staticmethod
     def _arc(start: Placement, via: Floats, end: Placement, segment: ArcSegment, where: str) -> ToolArc:
@@ -139,12 +139,12 @@ class PathPlanner:
             why = f"{field}: no arc leads from the present position through it to pose: {error}"
             raise RefusalError("out_of_range", field, why) from error
 
-    def _end(
-        self, way: ToolCurve | JointWay, q: Floats, tracker: Tracker, where: str, basis: MotionBasis
-    ) -> Floats:
-        """Joint positions at the end of a leg, whose whole way is within the joints' range."""
+    def _along(
+        self, way: ToolWay | JointWay, q: Floats, tracker: Tracker, where: str, basis: MotionBasis
+    ) -> Knots:
+        """The joints' way along a leg, which is within their range."""
         if isinstance(way, JointWay):
-            return way.end
+            return way.part(0.0, way.length)
         field = f"{where}.pose".removeprefix(".")
         try:
             knots = tracker.follow(way, q)
@@ -152,8 +152,7 @@ class PathPlanner:
             goal, share = way.at(way.length).pose, error.s / way.length
             raise self._reachable.refusal(error, field, share, goal, basis.tcp) from error
         self._check_range(knots.s / way.length, knots.q, field)
-        end: Floats = knots.q[-1]
-        return end
+        return knots
 
     def _check_range(self, shares: Floats, q: Floats, field: str) -> None:
         most = np.array(self._description.limits.position)

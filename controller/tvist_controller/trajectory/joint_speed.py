@@ -2,35 +2,24 @@
 
 import numpy as np
 
-from tvist_controller.trajectory.guided import Guided
 from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.speed import (
     HALVINGS,
-    STANDING,
     STEADY,
+    Speed,
     fitting_rates,
     part_of,
     rise_within,
 )
 
 
-class JointSpeed(Guided):
+class JointSpeed(Speed):
     """Accelerates all joints in phase to velocities, and keeps these.
 
-    The trajectory has a time of its own. In that time, the velocities u approach their goal with constant
-    acceleration; the joints have q̇ = r u, where r is the rate of that time. So at a constant rate, velocities are
-    multiplied by r and accelerations by r². The rate changes as quickly as the acceleration permits. In each tick the
-    position advances by the mean of the velocities at its beginning and at its end.
-
-    There is no jerk limit. If the torque does not suffice, the joints accelerate less, still in phase.
-
-    Args:
-        state: Position [rad], velocity [rad/s] and acceleration [rad/s^2] to continue from, each of shape (n,).
-        limits: Limits of every joint; the jerk is that of stops.
-        torque: Motion that the torque permits.
-        period: Tick [s].
-        rate: Rate of its time, 0 to 1 [-]; more if the velocities at the start would exceed the limits otherwise.
+    In each tick the position advances by the mean of the velocities at its beginning and at its end.
+    There is no jerk limit. If the torque does not suffice, the joints accelerate less, still in phase. The arguments
+    are those of `Speed`.
     """
 
     def __init__(
@@ -42,18 +31,9 @@ class JointSpeed(Guided):
         *,
         rate: float = 1.0,
     ) -> None:
-        q, qd, qdd = (np.array(values, dtype=float) for values in state)
-        self._q, self._qd, self._qdd = q, qd, qdd
-        self._arm, self._torque, self._period = limits, torque, period
-        self.limits = MotionLimits(limits.velocity, limits.acceleration, 2.0 * limits.acceleration / period)
-        """Limits of the reference; the jerk is that of the acceleration changing its sign within a tick."""
-        fastest = float(np.abs(qd).max())
-        if fastest <= STANDING:
-            self._qd = qd = np.zeros_like(q)
-        self.rate = max(rate, min(fastest / limits.velocity, 1.0))
-        self._u = qd / self.rate if fastest > STANDING else qd
+        super().__init__(state, limits, torque, period, rate=rate)
+        self._u = self._qd if self._stands else self._qd / self.rate
         self._goal, self._most = self._u, limits.acceleration
-        self._speed, self._slowest = rate, limits.velocity
 
     def aim(self, qd: Floats, acceleration: float) -> None:
         """Approach other velocities.
@@ -79,11 +59,6 @@ class JointSpeed(Guided):
     def duration(self) -> float:
         """Time until the velocities are reached at full speed [s]."""
         return float(np.abs(self._goal - self._u).max()) / self._most
-
-    @property
-    def state(self) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration of the reference, each of shape (n,)."""
-        return self._q, self._qd, self._qdd
 
     def next(self) -> Floats:
         """Advance by one tick and return the position."""

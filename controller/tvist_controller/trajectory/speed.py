@@ -1,9 +1,11 @@
-"""Changes of velocity in one tick: how far they go, and at which rates of time they keep to limits."""
+"""What approaches of a velocity have in common: how far a change goes in a tick, and at which rates it keeps limits."""
 
 import math
 
 import numpy as np
 
+from tvist_controller.trajectory.guided import Guided
+from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 
 HALVINGS = 8
@@ -16,6 +18,47 @@ FLAT = 1e-12
 """Factor of a rate that counts as zero."""
 ROUNDING = 1e-9
 """Share of a tick by which rounding may delay the end of a change [-]."""
+
+
+class Speed(Guided):
+    """Base of the trajectories that approach a velocity.
+
+    Each has a time of its own, in which the velocity approaches its goal with constant acceleration; the reference has
+    that velocity times the rate of this time. So at a constant rate r, velocities are multiplied by r and accelerations
+    by r². The rate changes as quickly as the acceleration permits.
+
+    Args:
+        state: Position [rad], velocity [rad/s] and acceleration [rad/s^2] to continue from, each of shape (n,).
+        limits: Limits of every joint; the jerk is that of stops.
+        torque: Motion that the torque permits.
+        period: Tick [s].
+        rate: Rate of its time, 0 to 1 [-]; more if the joints are too fast for it at the start.
+    """
+
+    def __init__(
+        self,
+        state: tuple[Floats, Floats, Floats],
+        limits: MotionLimits,
+        torque: TorqueRoom,
+        period: float,
+        *,
+        rate: float = 1.0,
+    ) -> None:
+        self._q, self._qd, self._qdd = (np.array(values, dtype=float) for values in state)
+        self._arm, self._torque, self._period = limits, torque, period
+        self.limits = MotionLimits(limits.velocity, limits.acceleration, 2.0 * limits.acceleration / period)
+        """Limits of the reference; the jerk is that of the acceleration changing its sign within a tick."""
+        fastest = float(np.abs(self._qd).max())
+        self._stands = fastest <= STANDING
+        if self._stands:
+            self._qd = np.zeros_like(self._q)
+        self.rate = max(rate, min(fastest / limits.velocity, 1.0))
+        self._speed, self._slowest = rate, limits.velocity
+
+    @property
+    def state(self) -> tuple[Floats, Floats, Floats]:
+        """Position, velocity and acceleration of the reference, each of shape (n,)."""
+        return self._q, self._qd, self._qdd
 
 
 def part_of(duration: float, time: float) -> float:

@@ -4,13 +4,13 @@ from typing import Protocol
 
 import numpy as np
 
-from tvist_controller.trajectory.guided import Guided, StuckError
+from tvist_controller.trajectory.guided import StuckError
 from tvist_controller.trajectory.limiter import TorqueRoom
 from tvist_controller.trajectory.limits import Floats, MotionLimits
 from tvist_controller.trajectory.speed import (
     HALVINGS,
-    STANDING,
     STEADY,
+    Speed,
     fitting_rates,
     part_of,
     rise_within,
@@ -54,7 +54,7 @@ class ToolKinematics(Protocol):
         """Return the rotation vector that turns one rotation matrix into another, shape (3,) [rad]."""
 
 
-class ToolSpeed(Guided):
+class ToolSpeed(Speed):
     """Accelerates the tool to a velocity and an angular velocity, and keeps these.
 
     As in `JointSpeed`, the trajectory has a time of its own, in which the twist u of the tool approaches its goal with
@@ -85,25 +85,16 @@ class ToolSpeed(Guided):
         *,
         rate: float = 1.0,
     ) -> None:
-        q, qd, qdd = (np.array(values, dtype=float) for values in state)
-        self._q, self._qd, self._qdd = q, qd, qdd
-        self._step = period * (qd - 0.5 * period * qdd)
+        super().__init__(state, limits, torque, period, rate=rate)
+        # The present step is the one that was made, even if the joints count as standing.
+        self._step = period * (np.array(state[1], dtype=float) - 0.5 * period * self._qdd)
         self.kinematics = kinematics
         """Kinematics of the tool centre point."""
-        self._torque = torque
-        self._arm, self._period = limits, period
-        self.limits = MotionLimits(limits.velocity, limits.acceleration, 2.0 * limits.acceleration / period)
-        """Limits of the reference; the jerk is that of the acceleration changing its sign within a tick."""
-        self._rotation, self._position = kinematics.pose(q)
-        fastest = float(np.abs(qd).max())
-        if fastest <= STANDING:
-            self._qd = qd = np.zeros_like(q)
-        self.rate = max(rate, min(fastest / limits.velocity, 1.0))
-        self._u = kinematics.jacobian(q) @ qd
-        if fastest > STANDING:
+        self._rotation, self._position = kinematics.pose(self._q)
+        self._u = kinematics.jacobian(self._q) @ self._qd
+        if not self._stands:
             self._u = self._u / self.rate
         self._goal, self._most = self._u, np.full(6, np.inf)
-        self._speed, self._slowest = rate, limits.velocity
 
     def aim(self, twist: Floats, acceleration: float, angular_acceleration: float) -> None:
         """Approach another velocity.
@@ -126,11 +117,6 @@ class ToolSpeed(Guided):
     def duration(self) -> float:
         """Time until the velocities are reached at full speed [s]."""
         return float(_sizes((self._goal - self._u) / self._most).max())
-
-    @property
-    def state(self) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration of the reference, each of shape (n,)."""
-        return self._q, self._qd, self._qdd
 
     def next(self) -> Floats:
         """Advance by one tick and return the position of the joints.

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -323,8 +322,8 @@ class Sequence:
         return reply
 
 
-def _sent_in_space(send: Callable[[Subject, np.random.Generator], object], it: Sequence) -> object:
-    return send(it.robot, it._random)  # noqa: SLF001  the sequence's own commands
+def _in_space(send: Callable[[Subject, np.random.Generator], object]) -> Callable[[Sequence], object]:
+    return lambda it: send(it.robot, it._random)  # noqa: SLF001  the sequence's own commands
 
 
 _SENT: dict[str, tuple[float, Callable[[Sequence], object]]] = {
@@ -347,6 +346,6 @@ _SENT: dict[str, tuple[float, Callable[[Sequence], object]]] = {
     "release": (1.0, Sequence.release),
     "reset": (1.0, Sequence.reset),
     "wait": (3.0, lambda it: it.robot.send(c.KeepAlive)),
-    **{name: (weight, partial(_sent_in_space, send)) for name, (weight, send) in space.SENT.items()},
+    **{name: (weight, _in_space(send)) for name, (weight, send) in space.SENT.items()},
 }
 """Commands and their relative frequencies."""
