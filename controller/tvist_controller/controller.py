@@ -3,7 +3,6 @@
 It owns a `Session`, which grants control, and a `ControlCycle`, which moves the arm; neither knows of the other.
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Unpack
 
@@ -12,11 +11,14 @@ import numpy as np
 from tvist_controller.authority import Authority
 from tvist_controller.collision import CollisionModel
 from tvist_controller.command_row import Call, Row
+from tvist_controller.command_table import CommandTable, Order
+from tvist_controller.counters import Counters
 from tvist_controller.cycle import ControlCycle, Sample
 from tvist_controller.declared_payload import DeclaredPayload
 from tvist_controller.events import Fields
 from tvist_controller.faults import Faults
 from tvist_controller.filters import Filters
+from tvist_controller.guided import Guidance
 from tvist_controller.guided_commands import GuidedCommands
 from tvist_controller.instruments.wrench import ToolWrench
 from tvist_controller.motion import MotionControl
@@ -25,6 +27,7 @@ from tvist_controller.peripherals import Peripherals
 from tvist_controller.planning.basis import PlanBasis, ToolBasis
 from tvist_controller.planning.filter_planner import PlannedFilter
 from tvist_controller.planning.planner import QUESTIONS, Plan, Planner
+from tvist_controller.programs.access import Access
 from tvist_controller.programs.player import ProgramPlayer
 from tvist_controller.refusal import RefusalError, check_content, check_joints
 from tvist_controller.reporting import Reporter, truth_of
@@ -43,29 +46,19 @@ from tvist_protocol.stream import Event, EventKind, State, Truth
 from tvist_protocol.values import Payload
 
 
-@dataclass
-class Counters:
-    """Counts since the start."""
-
-    commands: int = 0
-    refused: int = 0
-    setpoints_received: int = 0
-    setpoints_refused: int = 0
-    missed_ticks: int = 0
-
-
 class Controller:
     """One robot.
 
     Args:
         setup: Initial setup.
         plant: Plant to control; None for the flexible arm that the setup describes.
+        order: Has commands of programs planned beside the ticks; None to plan them in the ticks.
 
     Raises:
         ValueError: The setup is invalid, or the plant does not fit it.
     """
 
-    def __init__(self, setup: Setup, plant: Plant | None = None) -> None:
+    def __init__(self, setup: Setup, plant: Plant | None = None, order: Order | None = None) -> None:
         setup.check()
         self.setup = setup
         self.tick_number = 0
@@ -73,8 +66,9 @@ class Controller:
         self._events: list[Event] = []
         self._stop_reasons = StopReasons()
         self._io_changed = True
-        self._planner = Planner(setup)
-        source, tvist = self._planner.filters.first()
+        planner = Planner(setup)
+        self._commands = CommandTable(planner, lambda: self.basis)
+        source, tvist = planner.filters.first()
         self.cycle = ControlCycle(
             setup.description, tvist, q=np.array(setup.q, dtype=float), declared=body(setup.payload),
             carried=body(setup.carried or setup.payload), seed=setup.seed, plant=plant,
@@ -93,19 +87,19 @@ class Controller:
         self.stepping = self._authority.stepping
         safety = SafetyControl(self.motion, self._emit)
         self._faults = Faults(self.motion, safety)
-        self.programs = ProgramPlayer(
-            setup.description, self.motion, safety, self._move_by_program, self._emit
-        )
-        self._told_program = self.programs.progress
         self.filters = Filters(self.motion, source, setup.payload, self._emit)
         self._payload = DeclaredPayload(setup.payload, self.motion, self.filters, self._emit)
         self.peripherals = Peripherals(self._reporter.set_tcp, self.motion.set_tcp)
+        guidance = Guidance(self.motion)
+        self.programs = ProgramPlayer(self._access(guidance, order or self._commands.plan_later), safety)
+        self._told_program = self.programs.progress
         parts = (
             self._authority, MotionCommands(self.motion, safety, self.programs),
-            GuidedCommands(self.motion, self.programs), self.filters, self._payload, self.peripherals,
+            GuidedCommands(guidance, setup.description, self.programs), self.filters, self._payload, self.peripherals,
             self._faults, self.programs, self,
         )  # fmt: skip
-        self._rows = {row.message: row for part in parts for row in part.rows}
+        for part in parts:
+            self._commands.add(part.rows)
         self.latest = self._state(self.cycle.standing)
         """State of the last tick, or the state at rest if the arm has not ticked yet or has been placed somewhere
         since.
@@ -157,16 +151,12 @@ class Controller:
             session: Session of the client that gets control, if `client_gone` will report its end.
         """
         self.counters.commands += 1
-        row = self._rows[type(command)]
-
-        def planned() -> Any:
-            return self._found(plan or self._planner.plan(command, self.basis))
-
+        row = self._commands.row(command)
         try:
             token: Any = getattr(command, "token", None)
             if row.lease == "needed" or (row.lease == "if named" and token is not None):
                 self.session.renew(token, self.now)
-            reply = row.handle(Call(command, self.tick_number + 1, self.now, session, planned))
+            reply = self._commands.carry_out(command, self.tick_number + 1, self.now, plan, session)
         except (RefusalError, NoControlError) as refusal:
             self.counters.refused += 1
             return refusal.reply
@@ -212,8 +202,16 @@ class Controller:
 
     def tick(self) -> tuple[State, list[Event]]:
         """Compute one control period."""
+        self.begin_tick()
+        return self.complete_tick()
+
+    def begin_tick(self) -> None:
+        """Begin a control period: what has timed out ends, and programs have their turn."""
         self._watch_time()
-        self.programs.advance()
+        self.programs.advance(self.tick_number + 1)
+
+    def complete_tick(self) -> tuple[State, list[Event]]:
+        """Compute the rest of a control period that has begun."""
         try:
             sample = self.motion.step()
         except PlantError as error:
@@ -226,6 +224,7 @@ class Controller:
         self.tick_number += 1
         events, self._events = self._events, []
         self.latest = self._state(sample)
+        self.programs.steadiness.note(self.latest.actual_q, at_rest=self.cycle.at_rest)
         return self.latest, events
 
     def _state(self, sample: Sample) -> State:
@@ -260,14 +259,17 @@ class Controller:
 
         It is computed on request.
         """
-        return self._wrench.of(self.latest, self.peripherals.tcp_offset)
+        felt = self._wrench.of(self.latest, self.peripherals.tcp_offset)
+        zero = self.peripherals.wrench_zero
+        return felt if zero is None else [one - other for one, other in zip(felt, zero, strict=True)]
 
     def changed_io(self) -> Io | None:
         """Return inputs, outputs and registers before a tick, if they changed since the last call; else None."""
-        program = self.programs.progress  # changes in ticks, by events and with other commands
-        if not self._io_changed and program == self._told_program:
+        program, peripherals = self.programs.progress, self.peripherals  # change in ticks, by events and commands
+        if not (self._io_changed or peripherals.changed) and program == self._told_program:
             return None
-        self._io_changed, self._told_program = False, program
+        self._io_changed = peripherals.changed = False
+        self._told_program = program
         return self.io(wrench=False)
 
     def truth(self) -> Truth:
@@ -298,15 +300,38 @@ class Controller:
         self.programs.end()
         self.motion.interrupt(why)
 
-    def _move_by_program(self, command: c.MoveJ) -> int:
-        """Plan and start a motion of the program; return its number."""
-        self.motion.check("move_j")
-        return self.motion.move(self._found(self._planner.plan(command, self.basis)))
+    # ------------------------------------------------------------------ programs
 
-    def _found(self, plan: Plan) -> Any:
-        if isinstance(plan.found, RefusalError):
-            raise plan.found
-        return plan.found
+    def _access(self, guidance: Guidance, order: Order) -> Access:
+        """What programs may use of the robot."""
+        return Access(
+            description=self.setup.description,
+            motion=self.motion,
+            guidance=guidance,
+            peripherals=self.peripherals,
+            emit=self._emit,
+            send=self._send,
+            plan=self._commands.plan,
+            order=lambda command: order(command, self.basis),
+            basis=lambda: self.basis,
+            latest=lambda: self.latest,
+            target_speeds=lambda: self.latest.target_qd,
+            target_accelerations=lambda: self.latest.target_qdd,
+            declared=lambda: self.declared,
+            torques=lambda: self._wrench.felt(self.latest).tolist(),
+            wrench=self.wrench,
+            zero_wrench=self._zero_wrench,
+        )
+
+    def _send(self, command: c.Command, plan: Plan | None) -> Reply | None:
+        """Carry out a command of a program."""
+        reply = self._commands.carry_out(command, self.tick_number + 1, self.now, plan)
+        self._io_changed |= self._commands.row(command).changes_io
+        return reply
+
+    def _zero_wrench(self) -> None:
+        """Take the present force and torque at the tool as zero."""
+        self.peripherals.zero_wrench(self._wrench.of(self.latest, self.peripherals.tcp_offset))
 
     # ------------------------------------------------------------------ commands that concern the whole robot
 
@@ -331,6 +356,7 @@ class Controller:
         self.latest = self._state(self.cycle.standing)
         self._payload.begin_anew()
         self._reporter.forget_modes()
+        self.programs.steadiness.forget()
         return Done(tick=self.tick_number)
 
     def _check_step(self, call: Call[SimulationStep]) -> Reply:

@@ -6,7 +6,7 @@ import numpy as np
 from msgspec import Struct
 
 from tvist_controller.control.differentiator import Differentiator, Floats, Target
-from tvist_controller.control.inverse_dynamics import InverseDynamics
+from tvist_controller.control.inverse_dynamics import SLEW, InverseDynamics
 from tvist_controller.control.joint_controllers import JointControllers
 from tvist_controller.control.shaped_reference import ShapedReference
 from tvist_controller.line_filter import LineFilter
@@ -280,9 +280,9 @@ class ControlCycle:
         self.standing = Sample(q, Target(q, still, still), torque, command.torque, measured)
         """Signals to report before the first tick from there."""
 
-    def declare(self, payload: Payload) -> None:
-        """Change the payload that inverse dynamics uses; the torque has no step."""
-        self.inverse_dynamics.declare(payload)
+    def declare(self, payload: Payload, ticks: int = SLEW) -> None:
+        """Change the payload that inverse dynamics uses, over some ticks; the torque has no step."""
+        self.inverse_dynamics.declare(payload, ticks)
 
 
 def rests(reference: Floats, target: Target) -> bool:

@@ -1,6 +1,6 @@
 """Types for events on their way to the clients."""
 
-from typing import Protocol, TypedDict, Unpack
+from typing import Literal, Protocol, TypedDict, Unpack
 
 from tvist_protocol.replies import Code
 from tvist_protocol.stream import EventKind
@@ -21,6 +21,10 @@ class Fields(Told, total=False):
     code: Code | None
     why: str | None
     line: int | None
+    column: int | None
+    program: str | None
+    title: str | None
+    level: Literal["message", "warning", "error"] | None
 
 
 class Emit(Protocol):

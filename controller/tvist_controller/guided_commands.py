@@ -4,9 +4,9 @@ import numpy as np
 
 from tvist_controller.command_row import Call, Row
 from tvist_controller.guided import Guidance
-from tvist_controller.motion import MotionControl
 from tvist_controller.programs.player import ProgramPlayer
 from tvist_controller.refusal import check_content
+from tvist_plant.description import RobotDescription
 from tvist_protocol import motions as m
 from tvist_protocol.replies import Accepted, Reply
 
@@ -15,13 +15,13 @@ class GuidedCommands:
     """Handlers of the commands for guided motions.
 
     Args:
-        motion: The robot's motion.
+        guidance: Starts and stops guided motions.
+        description: The robot.
         programs: The program, which ends with every stop.
     """
 
-    def __init__(self, motion: MotionControl, programs: ProgramPlayer) -> None:
-        self._guidance, self._programs = Guidance(motion), programs
-        self._description = motion.cycle.description
+    def __init__(self, guidance: Guidance, description: RobotDescription, programs: ProgramPlayer) -> None:
+        self._guidance, self._description, self._programs = guidance, description, programs
         self.rows = (
             Row(m.ServoJ, self._servo_j),
             Row(m.SpeedJ, self._speed_j),

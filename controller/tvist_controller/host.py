@@ -111,11 +111,12 @@ class Host:
 
     def tick(self) -> None:
         """Compute one control period."""
+        self.controller.begin_tick()
         io = self.controller.changed_io()
         if io is not None:
             for sink in self._sinks:
                 sink.io(io)
-        state, events = self.controller.tick()
+        state, events = self.controller.complete_tick()
         truth = self.controller.truth() if self.controller.setup.truth else None
         for sink in self._sinks:
             for event in events:

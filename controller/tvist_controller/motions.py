@@ -80,6 +80,11 @@ class Motions:
         """Parts of the running motion that have not begun."""
         return self._running.coming if isinstance(self._running, RunningMove) else ()
 
+    @property
+    def progress(self) -> tuple[int, float] | None:
+        """Number of the running motion's present part, and the length covered on it [m]; None if it has no length."""
+        return self._running.progress if isinstance(self._running, RunningMove) else None
+
     def set_speed(self, fraction: float) -> None:
         """Scale the time of the running motion and of later ones."""
         self.wanted_speed = fraction

@@ -43,6 +43,7 @@ class RunningMove:
         self._velocity, self._cycle = planned.velocity, cycle
         self._window, self._peak = planned.window, planned.peak
         self._held = False
+        self._parts = len(planned.parts)
         self._trajectory, *coming = planned.parts
         self.coming: tuple[PlannedMotion, ...] = tuple(coming)
         """Parts that have not begun."""
@@ -64,6 +65,13 @@ class RunningMove:
         tvist = self._cycle.tvist
         room = min(_fitting(self._window, tvist.delay), _fitting(self._peak, tvist.peak))
         return min(rate_of(speed, self._velocity, slowest), room)
+
+    @property
+    def progress(self) -> tuple[int, float] | None:
+        """Number of its present part, from 0, and the length covered on it [m]; None on a part without length."""
+        if self._trajectory.path.posture_of is None:
+            return None
+        return self._parts - 1 - len(self.coming), float(self._cycle.along.newest.q[0])
 
     @property
     def rate(self) -> float:

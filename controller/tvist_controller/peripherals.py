@@ -76,11 +76,18 @@ class Peripherals:
         self._doubles: dict[Bank, list[float]] = {
             bank: [0.0] * NUMBERS for bank in ("input_double", "output_double")
         }
+        self._written: dict[tuple[Bank, int], int] = {}
+        self._tool_voltage = 0
+        self.changed = False
+        """Whether something has changed since `io` was published last; whoever publishes it resets this."""
+        self.wrench_zero: list[float] | None = None
+        """Force and torque at the tool that count as zero, base frame [N, N m]."""
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6
         """Tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
 
     def set_outputs(self, command: SetIo) -> None:
         """Set the outputs that the masks select."""
+        self.changed = True
         mask = command.digital_output_mask
         self._digital_outputs = self._digital_outputs & ~mask | command.digital_outputs & mask
         for number, ratio in enumerate((command.standard_analog_output_0, command.standard_analog_output_1)):
@@ -103,9 +110,90 @@ class Peripherals:
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:
         """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
-        self.tcp_offset = offset
+        self.tcp_offset, self.changed = offset, True
         for tell in self._on_tcp:
             tell(offset)
+
+    # ------------------------------------------------------------------ for programs
+
+    @property
+    def digital_inputs(self) -> int:
+        """Bits of the digital inputs: 0–7 standard, 8–15 configurable, 16–17 tool."""
+        return self._digital_inputs
+
+    @property
+    def digital_outputs(self) -> int:
+        """Bits of the digital outputs, as those of the inputs."""
+        return self._digital_outputs
+
+    @property
+    def analog_inputs(self) -> Sequence[float]:
+        """Analogue inputs of the control box [A or V]."""
+        return self._analog_inputs
+
+    @property
+    def tool_analog_inputs(self) -> Sequence[float]:
+        """Analogue inputs of the tool [V]."""
+        return self._tool_analog_inputs
+
+    def analog_ratio(self, number: int) -> float:
+        """Share of its range that an analogue output has [-]."""
+        return self._analog_ratios[number]
+
+    def output_is_voltage(self, number: int) -> bool:
+        """Return whether an analogue output is a voltage rather than a current."""
+        return bool(self._analog_types >> (2 + number) & 1)
+
+    def choose_output(self, number: int, *, voltage: bool) -> None:
+        """Make an analogue output a voltage or a current; it keeps its share of the range."""
+        self._choose(2 + number, voltage=voltage)
+
+    def choose_input(self, number: int, *, voltage: bool) -> None:
+        """Make an analogue input a voltage or a current; the signal at it keeps its number."""
+        self._choose(number, voltage=voltage)
+
+    def _choose(self, bit: int, *, voltage: bool) -> None:
+        self._analog_types = self._analog_types & ~(1 << bit) | voltage << bit
+        self.changed = True
+
+    def set_tool_voltage(self, voltage: int) -> None:
+        """Set the supply of the tool [V]."""
+        self._tool_voltage, self.changed = voltage, True
+
+    def zero_wrench(self, wrench: list[float]) -> None:
+        """Take a force and torque at the tool as zero, base frame [N, N m]."""
+        self.wrench_zero, self.changed = wrench, True
+
+    def bit(self, bank: Bank, place: int) -> bool:
+        """Return a bit register."""
+        return bool(self._bits[bank][place // 32] >> place % 32 & 1)
+
+    def integers(self, bank: Bank) -> Sequence[int]:
+        """Return the integer registers of a bank."""
+        return self._ints[bank]
+
+    def doubles(self, bank: Bank) -> Sequence[float]:
+        """Return the double registers of a bank."""
+        return self._doubles[bank]
+
+    def write(self, bank: Bank, place: int, value: Register) -> None:
+        """Write a register whose place and value are known to be valid."""
+        if bank in self._bits:
+            word, mask = place // 32, 1 << place % 32
+            before = self._bits[bank][word]
+            self._bits[bank][word] = after = before | mask if value else before & ~mask
+            self.changed |= after != before
+            return
+        numbers: list[int] | list[float] = self._ints[bank] if bank in self._ints else self._doubles[bank]
+        if numbers[place] != value:
+            numbers[place] = value  # type: ignore[call-overload]  the bank has numbers of this type
+            self.changed = True
+
+    def written(self, bank: Bank, place: int) -> int:
+        """Return the first control period after a client last wrote a register; 0 if none ever did."""
+        return self._written.get((bank, place), 0)
+
+    # ------------------------------------------------------------------ for clients
 
     def _set_registers(self, call: Call[SetRegisters]) -> None:
         """Write registers; input registers may be written without control."""
@@ -114,6 +202,8 @@ class Peripherals:
             why = f"token is missing: {command.bank} registers belong to the robot, and writing them needs control"
             raise RefusalError("missing_field", "token", why)
         self.set_registers(command)
+        for place in range(command.first, command.first + len(command.values)):
+            self._written[command.bank, place] = call.tick
 
     def set_registers(self, command: SetRegisters) -> None:
         """Write registers.
@@ -166,6 +256,8 @@ class Peripherals:
             program=program.name,
             program_state=program.state,
             program_line=program.line,
+            tool_output_voltage=self._tool_voltage,
+            tcp_force_zero=self.wrench_zero,
             actual_TCP_force=wrench,
         )
 

@@ -60,7 +60,15 @@ from tvist_protocol.motions import (
     StopJ,
     StopL,
 )
-from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramState, ProgramStop
+from tvist_protocol.programs import (
+    ProgramClosePopup,
+    ProgramLoad,
+    ProgramPause,
+    ProgramPlay,
+    ProgramRun,
+    ProgramState,
+    ProgramStop,
+)
 from tvist_protocol.replies import CODE_MEANINGS, Accepted, Code, Done, Posture, Refused, Reply, ToolPose
 from tvist_protocol.simulation import SimulationInject, SimulationReset, SimulationStep, StepSetpoint
 from tvist_protocol.stream import EVENT_MEANINGS, Event, EventKind, State, Telemetry, Truth
@@ -101,9 +109,11 @@ __all__ = [
     "PowerOff",
     "PowerOn",
     "ProcessSegment",
+    "ProgramClosePopup",
     "ProgramLoad",
     "ProgramPause",
     "ProgramPlay",
+    "ProgramRun",
     "ProgramState",
     "ProgramStop",
     "ProtocolError",

@@ -11,7 +11,14 @@ from tvist_protocol.errors import ProtocolError, short
 from tvist_protocol.io import SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
 from tvist_protocol.motions import MoveC, MoveL, MovePath, ServoJ, SpeedJ, SpeedL, StopJ, StopL
-from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramStop
+from tvist_protocol.programs import (
+    ProgramClosePopup,
+    ProgramLoad,
+    ProgramPause,
+    ProgramPlay,
+    ProgramRun,
+    ProgramStop,
+)
 from tvist_protocol.simulation import SimulationInject, SimulationReset, SimulationStep
 from tvist_protocol.values import (
     PROTOCOL_VERSION,
@@ -31,6 +38,7 @@ from tvist_protocol.values import (
     Period,
     Sequence,
     Token,
+    Transition,
     Vec3,
     Velocity,
     Version,
@@ -189,7 +197,7 @@ class SetEstimator(ClientMessage, frozen=True, kw_only=True, tag="set_estimator"
             _check_plain(self.calibration, "calibration", CALIBRATION_DEPTH)
 
 
-class SetPayload(ClientMessage, frozen=True, kw_only=True, tag="set_payload"):
+class SetPayload(ClientMessage, frozen=True, kw_only=True, tag="set_payload", omit_defaults=True):
     """Declare the payload to the controller; this does not change what the simulated arm carries."""
 
     token: Token
@@ -200,6 +208,8 @@ class SetPayload(ClientMessage, frozen=True, kw_only=True, tag="set_payload"):
     """Centre of mass in the flange frame [m]."""
     inertia: Inertia6
     """Inertia xx xy xz yy yz zz about the centre of mass, flange axes [kg m²]."""
+    transition_time: Transition = 0.5
+    """Time in which the torques change over to it; a shorter one than 0.5 s takes 0.5 s [s]."""
 
 
 class SetSpeed(ClientMessage, frozen=True, kw_only=True, tag="set_speed"):
@@ -272,9 +282,11 @@ Command = (
     | InverseKinematics
     | ForwardKinematics
     | ProgramLoad
+    | ProgramRun
     | ProgramPlay
     | ProgramPause
     | ProgramStop
+    | ProgramClosePopup
     | PowerOn
     | PowerOff
     | UnlockProtectiveStop

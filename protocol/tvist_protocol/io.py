@@ -59,6 +59,10 @@ class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
     """State of the loaded program."""
     program_line: int = 0
     """Line that is being carried out, or will be when the program continues, counted from 1; 0 if there is none."""
+    tool_output_voltage: int = 0
+    """Supply voltage of the tool [V]."""
+    tcp_force_zero: list[float] | None = None
+    """Force and torque that count as zero since a program zeroed them, in the base frame [N, N m]; null: none."""
     actual_TCP_force: list[float] | None = None
     """Force and torque at the tool centre point that explain the torques measured in the previous tick, in the base
     frame [N, N m]; zero while the arm is braked. Sent once a second; null in messages sent because of a change."""

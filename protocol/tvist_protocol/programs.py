@@ -12,13 +12,37 @@ ProgramState = Literal["STOPPED", "PLAYING", "PAUSED"]
 ProgramName = Annotated[str, Meta(min_length=1, max_length=256)]
 
 
-class ProgramLoad(ClientMessage, frozen=True, kw_only=True, tag="program.load"):
+MAX_SCRIPT = 1 << 20
+"""Longest text of a program [characters]."""
+Script = Annotated[str, Meta(min_length=1, max_length=MAX_SCRIPT)]
+"""Text of a program in URScript"""
+
+
+class ProgramLoad(ClientMessage, frozen=True, kw_only=True, tag="program.load", omit_defaults=True):
     """Load a program; a running program and the arm are stopped first. Any client may send this."""
 
     name: ProgramName
-    """Name of the program, one of `programs` in `info`."""
+    """Name of the program: one of `programs` in `info`, or any other if `text` is given."""
+    text: Script | None = None
+    """Text of the program in URScript, which the robot keeps under this name; null: the one it has."""
     token: Token | None = None
     """Token of the lease, if the client has one."""
+
+
+class ProgramRun(ClientMessage, frozen=True, kw_only=True, tag="program.run"):
+    """Start a program in URScript at once.
+
+    It replaces a running program, unless it is secondary (`sec`): then it runs beside that. It ends with the lease.
+    """
+
+    token: Token
+    """Token of the lease."""
+    text: Script
+    """Text of the program, which names it."""
+
+
+class ProgramClosePopup(ClientMessage, frozen=True, kw_only=True, tag="program.close_popup"):
+    """Close the message that a program shows, for which it may be waiting. Any client may send this."""
 
 
 class ProgramPlay(ClientMessage, frozen=True, kw_only=True, tag="program.play"):

@@ -31,6 +31,7 @@ Code = Literal[
     "plant_failure",
     "payload_mismatch",
     "unsupported_version",
+    "script_error",
 ]
 """Reason of a refusal or of an event."""
 
@@ -60,6 +61,7 @@ CODE_MEANINGS: dict[Code, str] = {
     "plant_failure": "the state of the simulated arm was no longer finite",
     "payload_mismatch": "the calibration was made with a payload other than the declared one",
     "unsupported_version": "the server does not speak this version of the protocol",
+    "script_error": "the text of a program is not valid; `where` is `text:LINE:COLUMN`",
 }
 
 

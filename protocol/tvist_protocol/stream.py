@@ -20,6 +20,10 @@ EventKind = Literal[
     "safety_stop",
     "shaper_changed",
     "warning",
+    "program_started",
+    "program_stopped",
+    "text",
+    "popup",
 ]
 
 EVENT_MEANINGS: dict[EventKind, str] = {
@@ -32,6 +36,10 @@ EVENT_MEANINGS: dict[EventKind, str] = {
     "safety_stop": "the safety system stops the robot; `category` is the category of the stop, `why` the reason",
     "shaper_changed": "the shaper or the estimator has changed",
     "warning": "a condition that the user should know about; the robot did not stop",
+    "program_started": "the program `program` begins",
+    "program_stopped": "the program `program` has ended; a `warning` with a `line` came before if an error ended it",
+    "text": "a program has written `why` to the log",
+    "popup": "a program shows the message `why` with the title `title`, and may wait until it is closed",
 }
 
 
@@ -107,6 +115,14 @@ class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc
     """Largest angle that a joint still turns in a stop; null if its end is too far ahead to tell [rad]."""
     line: int | None = None
     """Line of the program that ended with an error, counted from 1."""
+    column: int | None = None
+    """Column in that line, counted from 1."""
+    program: str | None = None
+    """Name of the program that it concerns."""
+    title: str | None = None
+    """Title of a popup."""
+    level: Literal["message", "warning", "error"] | None = None
+    """How serious a popup is."""
 
 
 class Truth(Struct, frozen=True, kw_only=True, tag_field="type", tag="truth", gc=False):

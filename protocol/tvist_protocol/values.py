@@ -47,6 +47,8 @@ JointSpeeds = Annotated[tuple[JointSpeed, ...], Meta(min_length=1, max_length=7)
 """One velocity per joint [rad/s]"""
 Duration = Annotated[float, Meta(gt=0, le=3600)]
 """[s]"""
+Transition = Annotated[float, Meta(ge=0, le=3600)]
+"""[s]"""
 Fraction = Annotated[float, Meta(ge=0, le=1)]
 """[-]"""
 Lease = Annotated[float, Meta(ge=0.1, le=3600)]

@@ -30,25 +30,30 @@ class InverseDynamics:
         self._last, self._flange = flange.parentJoint, flange.placement
         self._bare = self._model.inertias[self._last].toDynamicParameters()
         self._before = self._present = self._after = self._bare
-        self._ticks_left = 0
+        self._ticks_left, self._slew = 0, SLEW
         self.declare(payload)
         self.settle()
 
-    def declare(self, payload: Payload) -> None:
-        """Declare another payload, which `advance` phases in."""
+    def declare(self, payload: Payload, ticks: int = SLEW) -> None:
+        """Declare another payload, which `advance` phases in.
+
+        Args:
+            payload: Declared payload.
+            ticks: Ticks over which it is phased in.
+        """
         self.payload = payload
         self._before, self._after = self._present, self._bare
         if payload.mass > 0.0:
             placed = self._flange.act(payload_inertia(payload))
             self._after = self._bare + placed.toDynamicParameters()
-        self._ticks_left = SLEW
+        self._ticks_left = self._slew = ticks
 
     def advance(self) -> None:
         """Advance the change to the latest declared payload by one tick."""
         if self._ticks_left == 0:
             return
         self._ticks_left -= 1
-        left = self._ticks_left / SLEW
+        left = self._ticks_left / self._slew
         share = (1.0 - left) ** 2 * (1.0 + 2.0 * left)
         self._load(self._before + share * (self._after - self._before) if left > 0.0 else self._after)
 
@@ -68,7 +73,7 @@ class InverseDynamics:
     def believe(self, bodies: tuple[Floats, ...]) -> None:
         """Use other inertial parameters at once, as `bodies` returns them."""
         self._before, self._after = bodies[0], bodies[-1]
-        self._ticks_left = len(bodies) - 1
+        self._ticks_left, self._slew = len(bodies) - 1, SLEW
         self._load(self._after)
 
     def settle(self) -> None:

@@ -70,11 +70,12 @@ class ToolValues(Reading):
         """Computed: force at the TCP that explains the measured torques, through the Jacobian [N, N m].
 
         The torque that the target motion needs (rigid arm with the declared payload, rotors, friction) is subtracted
-        first. Near a singularity part of the force cannot be measured and is left out. It is zero while the arm is
+        first, and what a program has zeroed last. Near a singularity part of the force cannot be measured and is left out. It is zero while the arm is
         braked.
         """
         force: list[float] = self._force.tolist()
-        return force
+        zero = self.io.tcp_force_zero
+        return force if zero is None else [felt - none for felt, none in zip(force, zero, strict=True)]
 
     @cached_property
     def tcp_force_scalar(self) -> float:

@@ -65,6 +65,10 @@ class ToolBasis(NamedTuple):
     """The present reference, shape (n,) [rad]: an answer may be about one that has passed meanwhile."""
 
 
+class ScriptBasis(NamedTuple):
+    """The state that the text of a program depends on: none."""
+
+
 class PlanBasis(NamedTuple):
     """The state that any plan depends on."""
 

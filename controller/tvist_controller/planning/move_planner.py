@@ -49,6 +49,9 @@ class PlannedMove:
     """A sentence for each blend that is left out."""
     window: float = math.inf
     """Longest delay of a shaper with which the limits hold at full rate [s]."""
+    marks: tuple[tuple[int, float], ...] = ()
+    """For each segment of a path, the part of the motion and the length on it where the blend at the segment's end
+    begins, or where the segment ends without one [m]."""
     peak: float = math.inf
     """Largest `Filter.peak` with which they do [-]."""
 

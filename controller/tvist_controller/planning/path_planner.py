@@ -104,6 +104,7 @@ class PathPlanner:
             next((one for one in excess if one is not None), None),
             tuple(skipped),
             window,
+            marks_of(runs, len(command.segments) if isinstance(command, MovePath) else 1),
             tvist.peak,
         )
 
@@ -248,6 +249,22 @@ def _segments(command: MoveL | MoveC | MovePath) -> Iterator[tuple[Segment, str]
                 yield segment, f"segments[{number}]"
 
 
+def marks_of(runs: list[Run], segments: int) -> tuple[tuple[int, float], ...]:
+    """Where the blend at the end of each segment begins, see `PlannedMove.marks`."""
+    marks = dict[int, tuple[int, float]]()
+    for part, run in enumerate(runs):
+        ends = np.cumsum([piece.knots.s[-1] for piece in run]).tolist()
+        for number, piece in enumerate(run):
+            # On the way to another segment, the last piece of one is its blend.
+            last = run[-1].where == piece.where
+            marks[_number(piece.where)] = part, ends[number] if last else ends[number] - float(piece.knots.s[-1])
+    found, here = [], (0, 0.0)
+    for segment in range(segments):
+        here = marks.get(segment, here)
+        found.append(here)
+    return tuple(found)
+
+
 def _pacing(segment: Segment) -> Pacing:
     match segment:
         case JointSegment():
@@ -260,6 +277,11 @@ def _pacing(segment: Segment) -> Pacing:
 
 def _length(run: Run) -> float:
     return sum(float(piece.knots.s[-1]) for piece in run)
+
+
+def _number(where: str) -> int:
+    """Number of the segment that a part of the path comes from."""
+    return int(where[len("segments[") : -1]) if where else 0
 
 
 def _field(where: str) -> str:

@@ -1,6 +1,6 @@
-"""Programs that can be loaded without any files, built from the robot's named poses."""
+"""Programs that can be loaded without any files, made from the robot's named poses."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Final
 
 from tvist_plant.description import RobotDescription
@@ -11,20 +11,16 @@ PAPER: Final = "paper.urp"
 """Visits the poses in order, and returns the same way."""
 
 
-@dataclass(frozen=True)
-class ProgramLine:
-    """One line of a program."""
+def built_in(description: RobotDescription) -> dict[str, str]:
+    """Return the texts of the programs by file name; one without moves waits until it is stopped."""
+    names = list(description.poses)
+    programs = {WAIT: "def wait_program():\n  while True:\n    sync()\n  end\nend\n"}
+    if names:
+        programs[PAPER] = _moves("paper", [*names, *names[-2::-1]], description)
+    return programs | {f"{name}.urp": _moves(name, [name], description) for name in names}
 
-    pose: str
-    """Name of the pose."""
-    q: tuple[float, ...]
-    """Joint angles [rad]."""
 
-
-def built_in(description: RobotDescription) -> dict[str, tuple[ProgramLine, ...]]:
-    """Return the programs by file name; one without moves waits until it is stopped."""
-    moves = [ProgramLine(name, tuple(q)) for name, q in description.poses.items()]
-    programs: dict[str, tuple[ProgramLine, ...]] = {WAIT: ()}
-    if moves:
-        programs[PAPER] = (*moves, *moves[-2::-1])
-    return programs | {f"{move.pose}.urp": (move,) for move in moves}
+def _moves(title: str, names: Sequence[str], description: RobotDescription) -> str:
+    """A program that moves to poses."""
+    moves = [f"  movej({[float(angle) for angle in description.poses[name]]}, a=2.0, v=1.5)" for name in names]
+    return "\n".join((f"def {title}():", *moves, "end", ""))

@@ -1,138 +1,242 @@
-"""The loaded program and its progress."""
+"""The loaded program and its progress, and the programs that run beside it."""
 
-from collections.abc import Callable
+from typing import NamedTuple
 
 from tvist_controller.command_row import Call, Row
-from tvist_controller.events import Emit
-from tvist_controller.motion import MotionControl
-from tvist_controller.programs.built_in import ProgramLine, built_in
-from tvist_controller.refusal import RefusalError
+from tvist_controller.programs.access import Access
+from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.built_in import built_in
+from tvist_controller.programs.functions import motions
+from tvist_controller.programs.library import functions
+from tvist_controller.programs.popups import Popups
+from tvist_controller.programs.steadiness import Steadiness
+from tvist_controller.programs.watchdogs import Watchdogs
+from tvist_controller.refusal import RefusalError, out_of_turn
 from tvist_controller.safety_control import SafetyControl
-from tvist_plant.description import RobotDescription
-from tvist_protocol.commands import MoveJ
-from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramState, ProgramStop
+from tvist_protocol.modes import RobotMode
+from tvist_protocol.programs import (
+    ProgramLoad,
+    ProgramPause,
+    ProgramPlay,
+    ProgramRun,
+    ProgramState,
+    ProgramStop,
+)
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
+from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
 
-_OWN_TOKEN = "program"  # noqa: S105  the lease was checked when the program was played
-"""Token in the commands that a program generates, which are not sent to clients."""
+TOLD_EVERY = 50
+"""Ticks between two changes of the line in `io`, which changes with almost every tick."""
+MAX_BESIDE = 8
+"""Number of secondary programs that may run at once."""
+
+
+MAX_KEPT = 100
+"""Number of programs that are kept under their names."""
+MOVING = frozenset(motions.SIGNATURES)
+"""Functions that move the arm."""
+
+
+class _Running(NamedTuple):
+    name: str
+    script: Script
+    machine: Machine
 
 
 class ProgramPlayer:
-    """Carries out one program at a time, line by line, with the rights of the client that played it.
+    """Carries out programs with the rights of the client that played them: one, and secondary ones beside it.
 
-    Its motions are ordinary motions: they have numbers and events, and a client may pause them; stopping one ends the
-    program. A protective stop pauses the program: after the stop is unlocked, playing resumes with the line that was
+    Their motions are ordinary motions: they have numbers and events, and a client may pause them; stopping one ends the
+    program. A protective stop pauses the program: after the stop is unlocked, playing resumes with the move that was
     stopped.
 
     Args:
-        description: The robot.
-        motion: The robot's motion.
+        access: The robot.
         safety: The safety system's stops.
-        move: Plans and starts a motion, and returns its number; raises `RefusalError`.
-        emit: Emits events.
     """
 
-    def __init__(
-        self,
-        description: RobotDescription,
-        motion: MotionControl,
-        safety: SafetyControl,
-        move: Callable[[MoveJ], int],
-        emit: Emit,
-    ) -> None:
-        self._motion, self._safety, self._move, self._emit = motion, safety, move, emit
-        self.known = built_in(description)
-        """Programs that can be loaded, by name."""
+    def __init__(self, access: Access, safety: SafetyControl) -> None:
+        self._access, self._motion, self._safety, self._emit = access, access.motion, safety, access.emit
+        self.arm = ProgramArm(access, self._thread)
+        self._popups, self._watchdogs = Popups(access.emit), Watchdogs(access.peripherals)
+        self._functions = functions(access, self.arm, self._popups, self._watchdogs)
+        self._built_in = frozenset(built_in(access.description))
+        self._kept: dict[str, Script] = {}
+        """Programs that were loaded with their text, by name."""
         self.name: str | None = None
         """Name of the loaded program; None if there is none."""
         self.state: ProgramState = "STOPPED"
-        self._next = 0
-        """Index of the present line, or of the next one between two lines."""
-        self._moving: int | None = None
-        """Number of the present line's motion."""
+        self._loaded: Script | None = None
+        self._main: _Running | None = None
+        self._all: list[_Running] = []
+        """Programs in order of age."""
+        self._now: _Running | None = None
+        """The one whose turn it is."""
+        self.line = 0
+        """Present line, or the one with which playing would resume, counted from 1; 0 if there is none."""
         self.rows = (
             Row(ProgramLoad, self._load, lease="if named", changes_io=True),
+            Row(ProgramRun, self._run, changes_io=True),
             Row(ProgramPlay, self._play, changes_io=True),
             Row(ProgramPause, self._pause, changes_io=True),
             Row(ProgramStop, self._stop, lease="if named", changes_io=True),
+            *self._popups.rows,
         )
 
     @property
-    def line(self) -> int:
-        """Present line, or the one with which playing would resume, counted from 1; 0 if there is none."""
-        return 0 if self.state == "STOPPED" or self._next >= len(self._lines) else self._next + 1
+    def known(self) -> list[str]:
+        """Names of the programs that can be loaded."""
+        return sorted(self._built_in | set(self._kept))
 
     @property
     def progress(self) -> tuple[str | None, ProgramState, int]:
         """Fields of the program in `io`: its name, its state and its line."""
         return self.name, self.state, self.line
 
-    def advance(self) -> None:
-        """Begin the next line if it is due; called first in every tick."""
-        # If a safeguard stop comes between two lines, there is no motion to pause, so the next line waits.
-        if self.state != "PLAYING" or self._motion.safety.safeguard:
+    # ------------------------------------------------------------------ ticks and events
+
+    @property
+    def steadiness(self) -> Steadiness:
+        """The past postures of the arm."""
+        return self._access.steadiness
+
+    def advance(self, tick: int) -> None:
+        """Give every thread its turn; called first in every tick.
+
+        Args:
+            tick: Number of the tick.
+        """
+        if not self._all:
             return
-        lines = self._lines
-        if self._moving is not None or not lines:
-            return
-        if self._next == len(lines):
-            self.end()
-            return
-        line = lines[self._next]
-        try:
-            self._moving = self._move(MoveJ(token=_OWN_TOKEN, q=line.q))
-        except RefusalError as refusal:
-            why = f"move to {line.pose} was refused: {refusal.reply.why}"
-            self._emit("warning", code=refusal.reply.code, why=why, line=self._next + 1)
-            self.end()
+        self._watch(tick)
+        left = EVALUATIONS
+        # In a safeguard stop nothing may move, so the program waits as its motion does.
+        held = self.state != "PLAYING" or self._motion.safety.safeguard
+        for running in tuple(self._all):
+            if (running is self._main and held) or running not in self._all:
+                continue
+            self._now = running
+            try:
+                left = running.machine.resume(left)
+            except ScriptError as error:
+                self._fail(running, error)
+            self._now = None
+            if not running.machine.running:
+                self._finish(running)
+        self.arm.settle(self._lives)
+        if self._main is not None and (self.line == 0 or tick % TOLD_EVERY == 0):
+            self.line = self._main.machine.line
 
     def hear(self, event: Event) -> None:
         """Handle an event of the robot."""
-        if event.kind == "protective_stop" and self.state != "STOPPED":
-            self.state, self._moving = "PAUSED", None
+        if not self._all:
+            return
+        against = self.arm.hear(event)
+        if event.kind == "protective_stop" and self._main is not None:
+            self.state = "PAUSED"
         elif event.kind == "safety_stop" and event.category != 2:
             self.end()
-        elif event.id is None or event.id != self._moving:
-            return
-        elif event.kind == "motion_done":
-            self._moving = None
-            self._next += 1
-        # A failure of the plant is followed by a protective stop, which pauses the program.
-        elif event.kind == "motion_stopped" and event.code != "plant_failure":
+        elif against and self._main is not None:
             self.end()
 
     def end(self) -> None:
-        """End the program without stopping its motion."""
-        self.state, self._next, self._moving = "STOPPED", 0, None
+        """End all programs without stopping what moves."""
+        for running in tuple(self._all):
+            self._close(running)
 
     def stop_moving(self) -> None:
-        """End a program that moves the arm, even between two motions, so that none begins after a stop."""
-        if self.state == "PLAYING" and self._lines:
+        """End a program that may move the arm, so that no motion begins after a stop."""
+        if self.state == "PLAYING" and self._loaded is not None and self._loaded.calls & MOVING:
             self.end()
 
-    @property
-    def _lines(self) -> tuple[ProgramLine, ...]:
-        return self.known.get(self.name or "", ())
+    def _watch(self, tick: int) -> None:
+        """Pause or stop the program if a client has fallen silent."""
+        expired = self._watchdogs.expired(tick)
+        if expired is None or self._main is None:
+            return
+        action, name = expired
+        self._emit("warning", why=f"nobody wrote {name} as often as the program's watchdog asks: {action}")
+        if action == "stop":
+            self.end()
+            self._motion.stop(None, "a watchdog of the program stopped it")
+        elif self.state == "PLAYING":
+            self._hold()
+
+    def _fail(self, running: _Running, error: ScriptError) -> None:
+        self._emit("warning", why=error.text, line=error.line, column=error.column, program=running.name)
+
+    def _finish(self, running: _Running) -> None:
+        """Handle the end of a program; the arm comes to rest with it."""
+        if running not in self._all:
+            return
+        self._close(running)
+        if running.script.calls & MOVING and self._motion.activity in {Activity.GUIDED, Activity.MOVING}:
+            self._motion.stop(None, "the program has ended")
+
+    def _close(self, running: _Running) -> None:
+        self._all.remove(running)
+        running.machine.end()
+        self._emit("program_stopped", program=running.name)
+        if running is self._main:
+            self._main, self.state, self.line = None, "STOPPED", 0
+            self._watchdogs.clear()
+            self._popups.close()
+            self.arm.forget()
+
+    def _thread(self) -> object:
+        """What identifies the thread that runs now."""
+        assert self._now is not None, "only programs call their functions"
+        return id(self._now.machine), self._now.machine.thread
+
+    def _lives(self, thread: object) -> bool:
+        return any(
+            (id(running.machine), number) == thread
+            for running in self._all
+            for number in running.machine.threads
+        )
+
+    # ------------------------------------------------------------------ commands
 
     def _load(self, call: Call[ProgramLoad]) -> None:
-        name = call.command.name
-        if name not in self.known:
-            why = f"name is {name!r}: must be one of {', '.join(sorted(self.known))}"
+        name, script = call.command.name, call.planned()
+        if call.command.text is not None:
+            if name not in self._kept and len(self._kept) >= MAX_KEPT:
+                why = f"{MAX_KEPT} programs are kept already: send this one with program.run"
+                raise RefusalError("busy", "name", why, MAX_KEPT)
+            self._kept[name] = script
+        elif script is None:
+            script = self._kept.get(name)
+        if script is None:
+            why = f"name is {name!r}: must be one of {', '.join(self.known)}"
             raise RefusalError("out_of_range", "name", why)
-        if self.state != "STOPPED":
-            self.end()
-            self._motion.stop(None, "another program was loaded")
-        self.name = name
+        self._replace("another program was loaded")
+        self.name, self._loaded = name, script
+
+    def _run(self, call: Call[ProgramRun]) -> None:
+        script: Script = call.planned()
+        self._check_running("program.run")
+        if script.secondary:
+            if len(self._all) > MAX_BESIDE:
+                why = f"{MAX_BESIDE} secondary programs are running: wait until one of them has ended"
+                raise RefusalError("busy", "", why, MAX_BESIDE)
+            self._begin(script, script.name)
+            return
+        self._replace("another program was started")
+        self.name, self._loaded = script.name, script
+        self._start(script)
 
     def _play(self, _: Call[ProgramPlay]) -> None:
-        if self.name is None:
+        if self._loaded is None:
             raise RefusalError("wrong_mode", "", "no program is loaded: send program.load first")
         if self.state == "PLAYING":
             raise RefusalError("busy", "", f"program {self.name} is playing")
-        if self.state == "PAUSED" and self._moving is not None:
-            if self._motion.activity is Activity.PAUSED:
-                self._motion.resume()
+        if self._main is None:
+            self._motion.check("move_j")
+            self._start(self._loaded)
+            return
+        if self._motion.activity is Activity.PAUSED:
+            self._motion.resume()
         else:
             self._motion.check("move_j")
         self.state = "PLAYING"
@@ -140,12 +244,40 @@ class ProgramPlayer:
     def _pause(self, _: Call[ProgramPause]) -> None:
         if self.state != "PLAYING":
             raise RefusalError("wrong_mode", "", "no program is playing: there is nothing to pause")
-        # Between two lines there is no motion to pause, so the next line waits.
-        if self._moving is not None:
-            self._motion.pause()
-            self._safety.stay_paused()
-        self.state = "PAUSED"
+        self._hold()
 
     def _stop(self, _: Call[ProgramStop]) -> None:
         self.end()
         self._motion.stop(None, "the program was stopped")
+
+    def _hold(self) -> None:
+        """Pause the program. A planned motion pauses on its path, a guided one is stopped."""
+        if self._motion.activity is Activity.MOVING:
+            self._motion.pause()
+            self._safety.stay_paused()
+        elif self._motion.activity is Activity.GUIDED:
+            self.arm.brake(lambda: self._motion.stop(None, "the program was paused"))
+        self.state = "PAUSED"
+
+    def _check_running(self, command: str) -> None:
+        """Refuse to start a program where the arm has no power or is in a protective stop."""
+        activity = self._motion.activity
+        if activity.robot_mode is not RobotMode.RUNNING or activity.protective:
+            raise out_of_turn(command, activity)
+        self._motion.safety.check("move_j", activity)
+
+    def _replace(self, why: str) -> None:
+        """End the program that is running, and stop the arm."""
+        if self._main is not None:
+            self._close(self._main)
+            self._motion.stop(None, why)
+
+    def _start(self, script: Script) -> None:
+        self._main, self.state, self.line = self._begin(script, self.name or script.name), "PLAYING", 1
+
+    def _begin(self, script: Script, name: str) -> _Running:
+        machine = Machine(script, self._functions, finish=self.arm.finish)
+        running = _Running(name, script, machine)
+        self._all.append(running)
+        self._emit("program_started", program=name)
+        return running

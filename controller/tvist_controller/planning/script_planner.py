@@ -1,0 +1,41 @@
+"""Programs of one robot, compiled from their text."""
+
+from tvist_controller.programs.built_in import built_in
+from tvist_controller.programs.library import SIGNATURES
+from tvist_controller.refusal import RefusalError
+from tvist_plant.description import RobotDescription
+from tvist_protocol.programs import ProgramLoad, ProgramRun
+from tvist_urscript import Script, ScriptError, compile_script
+
+
+class ScriptPlanner:
+    """Compiles programs, which takes many ticks for long ones.
+
+    Args:
+        description: The robot.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self._built_in = built_in(description)
+
+    def rehearse(self) -> None:
+        """Build what compiling uses, before any program comes."""
+        compile_script("sync()", SIGNATURES)
+
+    def compile(self, command: ProgramLoad | ProgramRun) -> Script | None:
+        """Return the program of a command; None if it names a program without giving its text that is not built in.
+
+        Raises:
+            RefusalError: The text is not valid.
+        """
+        text = command.text
+        if text is None:
+            assert isinstance(command, ProgramLoad)
+            text = self._built_in.get(command.name)
+            if text is None:
+                return None
+        try:
+            return compile_script(text, SIGNATURES)
+        except ScriptError as error:
+            where = f"text:{error.line}:{error.column}"
+            raise RefusalError("script_error", where, error.text) from error

@@ -1,0 +1,53 @@
+"""What the functions of programs may use of the robot."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from tvist_controller.events import Emit
+from tvist_controller.guided import Guidance
+from tvist_controller.motion import MotionControl
+from tvist_controller.peripherals import Peripherals
+from tvist_controller.planning.basis import PlanBasis
+from tvist_controller.planning.planner import Plan
+from tvist_controller.programs.steadiness import Steadiness
+from tvist_plant.description import RobotDescription
+from tvist_protocol.commands import Command
+from tvist_protocol.replies import Reply
+from tvist_protocol.stream import State
+from tvist_protocol.values import Payload
+
+
+@dataclass(frozen=True)
+class Access:
+    """One robot, as its programs reach it."""
+
+    description: RobotDescription
+    motion: MotionControl
+    guidance: Guidance
+    peripherals: Peripherals
+    emit: Emit
+    send: Callable[[Command, Plan | None], Reply | None]
+    """Carries out a command with a plan that holds, or without one; raises `RefusalError`."""
+    plan: Callable[[Command], Plan]
+    """Plans a command on the present state."""
+    order: Callable[[Command], Callable[[], Plan]]
+    """Has a command planned on the present state, beside the ticks if the host can; returns what waits for the plan."""
+    basis: Callable[[], PlanBasis]
+    """The present state that plans depend on."""
+    latest: Callable[[], State]
+    """State of the last tick."""
+    target_speeds: Callable[[], list[float]]
+    """Velocities of the reference before shaping in the last tick [rad/s]."""
+    target_accelerations: Callable[[], list[float]]
+    """Accelerations of the reference before shaping in the last tick [rad/s^2]."""
+    declared: Callable[[], Payload]
+    """Declared payload."""
+    torques: Callable[[], list[float]]
+    """External torques on the joints in the last tick [N m]."""
+    wrench: Callable[[], list[float]]
+    """External force and torque at the tool centre point in the last tick, base frame [N, N m]."""
+    zero_wrench: Callable[[], None]
+    """Takes the present force and torque at the tool as zero."""
+    shape_guided: bool = False
+    """Whether guided motions of programs that begin at rest are shaped."""
+    steadiness: Steadiness = field(default_factory=Steadiness)

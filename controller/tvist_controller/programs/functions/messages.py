@@ -1,0 +1,60 @@
+"""Functions for messages to people, and for time."""
+
+from tvist_controller.programs.access import Access
+from tvist_controller.programs.arguments import flag, number
+from tvist_controller.programs.arm import ProgramArm, Turns
+from tvist_controller.programs.popups import Popups
+from tvist_plant.plant import PERIOD
+from tvist_urscript import signature, to_text
+
+LONGEST_SLEEP = 1e6
+"""[s]"""
+
+SIGNATURES = {
+    "textmsg": signature('s1, s2=""', cost=5),
+    "popup": signature(
+        's, title="Popup", warning=False, error=False, blocking=False', blocks=True, cost=10
+    ),
+    "sync": signature("", blocks=True),
+    "sleep": signature("t", blocks=True),
+}
+
+
+class MessageFunctions:
+    """Tells people something, and waits.
+
+    Args:
+        access: The robot.
+        arm: Its arm.
+        popups: Its popups.
+    """
+
+    def __init__(self, access: Access, arm: ProgramArm, popups: Popups) -> None:
+        self._access, self._arm, self._popups = access, arm, popups
+
+    def textmsg(self, s1: object, s2: object) -> None:
+        """Write a line to the log, which clients of the primary interface get."""
+        text = f"{to_text(s1)}{to_text(s2)}"
+        self._arm.then(lambda: self._access.emit("text", why=text))
+
+    def popup(self, s: object, title: object, warning: object, error: object, blocking: object) -> Turns:
+        """Show a message; with `blocking`, wait until somebody closes it."""
+        text, head = to_text(s), to_text(title)
+        kind = "error" if flag("error", error) else "warning" if flag("warning", warning) else "message"
+        yield from self._arm.finish()
+        self._popups.show(text, head, kind)
+        if flag("blocking", blocking):
+            while self._popups.shown:
+                yield
+
+    def sync(self) -> Turns:
+        """Wait for the next tick."""
+        yield from self._arm.finish()
+        yield
+
+    def sleep(self, t: object) -> Turns:
+        """Wait for a time [s]; a time of at least half a tick waits for at least one."""
+        ticks = round(number("t", t, 0.0, LONGEST_SLEEP) / PERIOD)
+        yield from self._arm.finish()
+        for _ in range(ticks):
+            yield

@@ -1,0 +1,273 @@
+"""Functions that move the arm."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Final
+
+import numpy as np
+
+from tvist_controller.control.differentiator import Floats
+from tvist_controller.programs.access import Access
+from tvist_controller.programs.arguments import integer, is_pose, number, numbers, pose, positive, shown
+from tvist_controller.programs.arm import ProgramArm, Turns
+from tvist_controller.programs.kinematics import ProgramKinematics
+from tvist_controller.refusal import SLOWEST, RefusalError, check_joints
+from tvist_controller.trajectory import Guided, JointSpeed, ToolSpeed
+from tvist_plant.plant import PERIOD
+from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment
+from tvist_urscript import Array, Fault, signature
+
+MAX_BLEND: Final = 10.0
+LONGEST: Final = 3600.0
+"""Longest duration of a move [s]."""
+CLOSE: Final = 1e-3
+"""Distance at which `servoc` has arrived [m, and rad times `TURN`]."""
+TURN: Final = 0.25
+"""Length that a turn of 1 rad counts as [m]."""
+
+SIGNATURES = {
+    "movej": signature("q, a=1.4, v=1.05, t=0, r=0", blocks=True, cost=20),
+    "movel": signature("pose, a=1.2, v=0.25, t=0, r=0", blocks=True, cost=20),
+    "movep": signature("pose, a=1.2, v=0.25, r=0", blocks=True, cost=20),
+    "movec": signature("pose_via, pose_to, a=1.2, v=0.25, r=0, mode=0", blocks=True, cost=20),
+    "optimovej": signature("goal, a=0.3, v=0.3, r=0", blocks=True, cost=20),
+    "optimovel": signature("goal, a=0.3, v=0.3, r=0", blocks=True, cost=20),
+    "servoj": signature("q, a=0, v=0, t=0.002, lookahead_time=0.1, gain=300", blocks=True, cost=20),
+    "servoc": signature("pose, a=1.2, v=0.25, r=0", blocks=True, cost=20),
+    "speedj": signature("qd, a=1.4, t=None", blocks=True, cost=20),
+    "speedl": signature("xd, a=1.2, t=None, aRot=None", blocks=True, cost=20),
+    "stopj": signature("a=2", blocks=True, cost=20),
+    "stopl": signature("a=1.2, aRot=None", blocks=True, cost=20),
+}
+
+
+class MotionFunctions:
+    """Moves the arm of one robot.
+
+    Args:
+        access: The robot.
+        arm: Its arm.
+        kinematics: Its kinematics.
+    """
+
+    def __init__(self, access: Access, arm: ProgramArm, kinematics: ProgramKinematics) -> None:
+        self._access, self._arm, self._kinematics = access, arm, kinematics
+        limits = access.description.limits
+        self._velocity, self._acceleration = min(limits.velocity), min(limits.acceleration)
+
+    # ------------------------------------------------------------------ planned moves
+
+    def movej(self, q: object, a: object, v: object, t: object, r: object) -> Turns:
+        """Move all joints in phase to joint positions, or to those nearest that reach a pose."""
+        posture = self._posture("q", q)
+        segment = JointSegment(
+            q=posture,
+            velocity=self._within(positive("v", v), "velocity", self._velocity),
+            acceleration=self._within(positive("a", a), "acceleration", self._acceleration),
+            duration=_duration(t),
+            blend=number("r", r, 0.0, MAX_BLEND),
+        )
+        yield from self._arm.follow(segment)
+
+    def movel(self, pose: object, a: object, v: object, t: object, r: object) -> Turns:
+        """Move the tool on a straight line to a pose, or to the one at joint positions."""
+        segment = LineSegment(
+            pose=self._pose("pose", pose),
+            velocity=_tool("v", v, "velocity"),
+            acceleration=_tool("a", a, "acceleration"),
+            duration=_duration(t),
+            blend=number("r", r, 0.0, MAX_BLEND),
+        )
+        yield from self._arm.follow(segment)
+
+    def movep(self, pose: object, a: object, v: object, r: object) -> Turns:
+        """Move the tool on a straight line at a constant speed, also in the blend at its end."""
+        segment = ProcessSegment(
+            pose=self._pose("pose", pose),
+            velocity=_tool("v", v, "velocity"),
+            acceleration=_tool("a", a, "acceleration"),
+            blend=number("r", r, 0.0, MAX_BLEND),
+        )
+        yield from self._arm.follow(segment)
+
+    def movec(self, pose_via: object, pose_to: object, a: object, v: object, r: object, mode: object) -> Turns:
+        """Move the tool on an arc through the position of one pose to another."""
+        segment = ArcSegment(
+            via=self._pose("pose_via", pose_via),
+            pose=self._pose("pose_to", pose_to),
+            orientation="tangent" if integer("mode", mode, 0, 1) else "interpolated",
+            velocity=_tool("v", v, "velocity"),
+            acceleration=_tool("a", a, "acceleration"),
+            blend=number("r", r, 0.0, MAX_BLEND),
+        )
+        yield from self._arm.follow(segment)
+
+    def optimovej(self, goal: object, a: object, v: object, r: object) -> Turns:
+        """Move the joints with shares of the arm's largest acceleration and velocity."""
+        acceleration, velocity = _share("a", a), _share("v", v)
+        yield from self.movej(goal, acceleration * self._acceleration, velocity * self._velocity, 0, r)
+
+    def optimovel(self, goal: object, a: object, v: object, r: object) -> Turns:
+        """Move the tool on a line with shares of the largest acceleration and speed, which the joints limit further."""
+        acceleration, velocity = _share("a", a), _share("v", v)
+        yield from self.movel(goal, acceleration * MAX_TOOL[1], velocity * MAX_TOOL[0], 0, r)
+
+    # ------------------------------------------------------------------ guided motions
+
+    def servoj(
+        self, q: object, a: object, v: object, t: object, lookahead_time: object, gain: object
+    ) -> Turns:
+        """Follow joint positions for a time; `a` and `v` have no effect, as on UR's robots."""
+        posture = np.array(self._posture("q", q))
+        del a, v
+        ticks = _ticks("t", t)
+        lookahead, abruptness = positive("lookahead_time", lookahead_time), positive("gain", gain)
+
+        def start(shaped: bool) -> int:  # noqa: FBT001  called by position only
+            return self._access.guidance.servo(posture, lookahead, abruptness, shaped=shaped)
+
+        yield from self._arm.guide(start, lambda: iter([None] * max(ticks, 1)))
+
+    def servoc(self, pose: object, a: object, v: object, r: object) -> Turns:
+        """Move the tool towards a pose at a speed; the next call may replace the pose in motion."""
+        goal = self._pose("pose", pose)
+        acceleration, velocity = _tool("a", a, "acceleration"), _tool("v", v, "velocity")
+        radius = max(number("r", r, 0.0, MAX_BLEND), CLOSE)
+        guidance = self._access.guidance
+        angular = acceleration / TURN
+
+        def course() -> tuple[Floats, float]:
+            away = self._kinematics.difference(self._kinematics.tool_pose(self._reference), goal)
+            far = max(float(np.linalg.norm(away[:3])), TURN * float(np.linalg.norm(away[3:])))
+            speed = min(velocity, max(2.0 * acceleration * far, 0.0) ** 0.5, far / (4.0 * PERIOD))
+            return away * (speed / far if far > 0.0 else 0.0), far
+
+        def start(shaped: bool) -> int:  # noqa: FBT001
+            return guidance.move_tool(course()[0], acceleration, angular, shaped=shaped)
+
+        def wait() -> Iterator[None]:
+            yield
+            while course()[1] > radius:
+                guidance.move_tool(course()[0], acceleration, angular, shaped=self._shaped)
+                yield
+
+        yield from self._arm.guide(start, wait)
+
+    def speedj(self, qd: object, a: object, t: object) -> Turns:
+        """Approach velocities of the joints, and keep them; return after a time, or when they are reached."""
+        joints, most = self._access.description.joints, self._access.description.limits.velocity
+        wanted = np.array(numbers("qd", qd, joints))
+        wanted *= min(1.0, *(limit / max(abs(one), 1e-12) for one, limit in zip(wanted, most, strict=True)))
+        acceleration = self._within(positive("a", a), "acceleration", self._acceleration)
+
+        def start(shaped: bool) -> int:  # noqa: FBT001
+            return self._access.guidance.move_joints(wanted, acceleration, shaped=shaped)
+
+        yield from self._arm.guide(start, self._wait(t))
+
+    def speedl(self, xd: object, a: object, t: object, a_rot: object) -> Turns:
+        """Approach a velocity of the tool in the base frame, and keep it; see `speedj`."""
+        twist = np.array(numbers("xd", xd, 6))
+        acceleration = _tool("a", a, "acceleration")
+        angular = acceleration if a_rot is None else positive("aRot", a_rot, 1e5)
+
+        def start(shaped: bool) -> int:  # noqa: FBT001
+            return self._access.guidance.move_tool(twist, acceleration, angular, shaped=shaped)
+
+        yield from self._arm.guide(start, self._wait(t))
+
+    def stopj(self, a: object) -> Turns:
+        """Stop with a deceleration of the joints."""
+        deceleration = self._within(positive("a", a), "acceleration", self._acceleration)
+        yield from self._arm.halt(lambda: self._access.guidance.stop_joints(deceleration))
+
+    def stopl(self, a: object, a_rot: object) -> Turns:
+        """Stop with a deceleration of the tool."""
+        deceleration = _tool("a", a, "acceleration")
+        angular = deceleration if a_rot is None else positive("aRot", a_rot, 1e5)
+        yield from self._arm.halt(lambda: self._access.guidance.stop_tool(deceleration, angular))
+
+    # ------------------------------------------------------------------ arguments
+
+    @property
+    def _reference(self) -> Floats:
+        return self._access.motion.cycle.reference
+
+    @property
+    def _shaped(self) -> bool:
+        return not self._access.motion.cycle.unshaped
+
+    def _wait(self, t: object) -> Callable[[], Iterator[None]]:
+        """How a call waits for a time, or if none is given until the velocity is reached."""
+        if t is not None and (seconds := number("t", t, 0.0, LONGEST)) > 0.0:
+            return lambda: self._arm.in_motion(seconds)
+
+        def until_reached() -> Iterator[None]:
+            yield
+            while isinstance(speed := self._guided, JointSpeed | ToolSpeed) and speed.duration > 0.0:
+                yield
+
+        return until_reached
+
+    @property
+    def _guided(self) -> Guided | None:
+        trajectory = self._access.motion.cycle.trajectory
+        return trajectory if isinstance(trajectory, Guided) else None
+
+    def _posture(self, name: str, value: object) -> tuple[float, ...]:
+        """Joint positions within their range, from these or from a pose."""
+        if is_pose(value):
+            return self._kinematics.posture(pose(name, value), self._near)
+        q = numbers(name, value, self._access.description.joints)
+        try:
+            check_joints(q, self._access.description, name)
+        except RefusalError as refusal:
+            raise Fault(refusal.reply.why) from refusal
+        return q
+
+    def _pose(self, name: str, value: object) -> tuple[float, float, float, float, float, float]:
+        """A pose of the tool, from this or from joint positions."""
+        if is_pose(value):
+            return pose(name, value)
+        if not isinstance(value, Array):
+            raise Fault(f"{name} is {shown(value)}: it must be a pose or a list of joint positions")
+        return self._kinematics.tool_pose(np.array(numbers(name, value, self._access.description.joints)))
+
+    @property
+    def _near(self) -> Sequence[float]:
+        """Posture from which the next move begins."""
+        end = self._arm.end
+        if end is None:
+            return self._reference.tolist()
+        if isinstance(end, JointSegment):
+            return end.q
+        return self._kinematics.posture(end.pose, self._reference.tolist())
+
+    def _within(self, value: float, name: str, most: float) -> float:
+        """A velocity or acceleration of the joints that the arm is capable of and that moves it."""
+        return min(max(value, SLOWEST[name]), most)
+
+
+MAX_TOOL: Final = 3.0, 15.0
+"""Speed [m/s] and acceleration [m/s^2] of the tool that `optimovel` takes shares of."""
+
+
+def _tool(name: str, value: object, kind: str) -> float:
+    """A speed or acceleration of the tool, which the joints may limit further."""
+    return max(positive(name, value, 1e3), SLOWEST[kind])
+
+
+def _share(name: str, value: object) -> float:
+    found = positive(name, value)
+    if found > 1.0:
+        raise Fault(f"{name} is {found:g}: it must be above 0 and at most 1")
+    return found
+
+
+def _duration(value: object) -> float | None:
+    """Duration of a move, or None if its velocity and acceleration count [s]."""
+    found = number("t", value, 0.0, LONGEST)
+    return found if found > 0.0 else None
+
+
+def _ticks(name: str, value: object) -> int:
+    return round(number(name, value, 0.0, LONGEST) / PERIOD)

@@ -1,0 +1,108 @@
+"""Functions for the arm's kinematics and dynamics."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tvist_controller.control.inverse_dynamics import InverseDynamics
+from tvist_controller.programs.access import Access
+from tvist_controller.programs.arguments import a_list, a_pose, is_pose, numbers, pose
+from tvist_controller.programs.kinematics import ProgramKinematics
+from tvist_controller.refusal import RefusalError, check_joints
+from tvist_controller.setup import body
+from tvist_urscript import Array, Fault, Pose, signature
+
+_INVERSE = "x, qnear=None, maxPositionError=1e-10, maxOrientationError=1e-10, tcp=None"
+SIGNATURES = {
+    "get_inverse_kin": signature(_INVERSE, cost=25),
+    "get_inverse_kin_has_solution": signature(_INVERSE, cost=25),
+    "get_forward_kin": signature("q=None, tcp=None", cost=10),
+    "is_within_safety_limits": signature("pose, qNear=None", cost=25),
+    "get_jacobian": signature("q=None, tcp=None", cost=10),
+    "get_mass_matrix": signature("q=None, include_rotors_inertia=True", cost=10),
+}
+
+
+class PoseFunctions:
+    """Answers questions about one robot's kinematics.
+
+    Args:
+        access: The robot.
+        kinematics: Its kinematics.
+    """
+
+    def __init__(self, access: Access, kinematics: ProgramKinematics) -> None:
+        self._access, self._kinematics = access, kinematics
+        self._joints = access.description.joints
+        self._dynamics = InverseDynamics(access.description, body(access.declared()))
+
+    def get_inverse_kin(
+        self, x: object, qnear: object, position_error: object, orientation_error: object, tcp: object
+    ) -> Array:
+        """Return the joint positions nearest to others, or to the present ones, at which the tool has a pose.
+
+        The solution is exact to rounding, so both errors are met whatever they are.
+        """
+        del position_error, orientation_error
+        return a_list(self._kinematics.posture(pose("x", x), self._near(qnear), _tool(tcp)))
+
+    def get_inverse_kin_has_solution(
+        self, x: object, qnear: object, position_error: object, orientation_error: object, tcp: object
+    ) -> bool:
+        """Return whether `get_inverse_kin` has an answer."""
+        del position_error, orientation_error
+        goal, near, tool = pose("x", x), self._near(qnear), _tool(tcp)
+        return self._reaches(goal, near, tool)
+
+    def get_forward_kin(self, q: object, tcp: object) -> Pose:
+        """Return the pose of the tool at joint positions, or at the measured ones."""
+        return a_pose(self._kinematics.tool_pose(self._posture(q), _tool(tcp)))
+
+    def is_within_safety_limits(self, target: object, near: object) -> bool:
+        """Return whether the arm can be at joint positions or at a pose: inside the joints' range, without a collision."""
+        if is_pose(target):
+            goal, start = pose("pose", target), self._near(near)
+            if not self._reaches(goal, start, None):
+                return False
+            q: Sequence[float] = self._kinematics.posture(goal, start)
+        else:
+            q = numbers("pose", target, self._joints)
+        try:
+            check_joints(q, self._access.description)
+        except RefusalError:
+            return False
+        return self._access.motion.collisions.meeting(np.array(q)) is None
+
+    def get_jacobian(self, q: object, tcp: object) -> Array:
+        """Return the Jacobian of the tool in the base frame, rows for velocity and angular velocity."""
+        matrix = self._kinematics.jacobian(self._posture(q), _tool(tcp))
+        return Array(tuple(a_list(row) for row in matrix.tolist()))
+
+    def get_mass_matrix(self, q: object, include_rotors_inertia: object) -> Array:
+        """Return the inertia matrix of the joints with the declared payload [kg m^2]."""
+        self._dynamics.believe(self._access.motion.cycle.inverse_dynamics.bodies)
+        matrix = self._dynamics.inertia(self._posture(q))
+        matrix = np.triu(matrix) + np.triu(matrix, 1).T
+        if include_rotors_inertia:
+            matrix = matrix + np.diag(self._access.description.drives.rotor_inertia)
+        return Array(tuple(a_list(row) for row in matrix.tolist()))
+
+    def _reaches(self, goal: Sequence[float], near: Sequence[float], tcp: Sequence[float] | None) -> bool:
+        try:
+            self._kinematics.posture(goal, near, tcp)
+        except Fault:
+            return False
+        return True
+
+    def _near(self, near: object) -> Sequence[float]:
+        if near is None:
+            return self._access.latest().actual_q
+        return numbers("qnear", near, self._joints)
+
+    def _posture(self, q: object) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        wanted = self._access.latest().actual_q if q is None else numbers("q", q, self._joints)
+        return np.array(wanted, dtype=float)
+
+
+def _tool(tcp: object) -> Sequence[float] | None:
+    return None if tcp is None else pose("tcp", tcp)

@@ -1,0 +1,87 @@
+"""Functions for registers and flags."""
+
+from tvist_controller.peripherals import LEAST, MOST
+from tvist_controller.programs.access import Access
+from tvist_controller.programs.arguments import flag, integer, number
+from tvist_controller.programs.arm import ProgramArm
+from tvist_protocol.io import BITS, NUMBERS
+from tvist_urscript import signature
+
+FLAGS = 32
+"""Number of flags, which only programs have."""
+
+SIGNATURES = {
+    **{
+        f"read_{side}_{kind}_register": signature("address")
+        for side in ("input", "output")
+        for kind in ("boolean", "integer", "float")
+    },
+    **{f"write_output_{kind}_register": signature("address, value") for kind in ("boolean", "integer", "float")},
+    "get_flag": signature("n"),
+    "set_flag": signature("n, value"),
+}
+
+
+class RegisterFunctions:
+    """Reads and writes the registers of one robot.
+
+    Args:
+        access: The robot.
+        arm: Its arm: what is written after a move that is blended is written where the blend begins.
+    """
+
+    def __init__(self, access: Access, arm: ProgramArm) -> None:
+        self._registers, self._arm = access.peripherals, arm
+        self._flags = [False] * FLAGS
+
+    def read_input_boolean_register(self, address: object) -> bool:
+        """Read a bit that a client writes."""
+        return self._registers.bit("input_bit", integer("address", address, 0, BITS - 1))
+
+    def read_input_integer_register(self, address: object) -> int:
+        """Read an integer that a client writes."""
+        return self._registers.integers("input_int")[integer("address", address, 0, NUMBERS - 1)]
+
+    def read_input_float_register(self, address: object) -> float:
+        """Read a number that a client writes."""
+        return self._registers.doubles("input_double")[integer("address", address, 0, NUMBERS - 1)]
+
+    def read_output_boolean_register(self, address: object) -> bool:
+        """Read a bit that programs write."""
+        return self._registers.bit("output_bit", integer("address", address, 0, BITS - 1))
+
+    def read_output_integer_register(self, address: object) -> int:
+        """Read an integer that programs write."""
+        return self._registers.integers("output_int")[integer("address", address, 0, NUMBERS - 1)]
+
+    def read_output_float_register(self, address: object) -> float:
+        """Read a number that programs write."""
+        return self._registers.doubles("output_double")[integer("address", address, 0, NUMBERS - 1)]
+
+    def write_output_boolean_register(self, address: object, value: object) -> None:
+        """Write a bit for clients."""
+        place, bit = integer("address", address, 0, BITS - 1), flag("value", value)
+        self._arm.then(lambda: self._registers.write("output_bit", place, bit))
+
+    def write_output_integer_register(self, address: object, value: object) -> None:
+        """Write an integer for clients."""
+        place, wanted = integer("address", address, 0, NUMBERS - 1), integer("value", value, LEAST, MOST)
+        self._arm.then(lambda: self._registers.write("output_int", place, wanted))
+
+    def write_output_float_register(self, address: object, value: object) -> None:
+        """Write a number for clients."""
+        place, wanted = integer("address", address, 0, NUMBERS - 1), number("value", value)
+        self._arm.then(lambda: self._registers.write("output_double", place, wanted))
+
+    def get_flag(self, n: object) -> bool:
+        """Return a flag."""
+        return self._flags[integer("n", n, 0, FLAGS - 1)]
+
+    def set_flag(self, n: object, value: object) -> None:
+        """Set a flag."""
+        place, wanted = integer("n", n, 0, FLAGS - 1), flag("value", value)
+
+        def write() -> None:
+            self._flags[place] = wanted
+
+        self._arm.then(write)

@@ -1,0 +1,102 @@
+"""Functions that set the tool, the payload and gravity, and the force at the tool to zero."""
+
+from tvist_controller.planning.planner import Plan
+from tvist_controller.programs.access import Access
+from tvist_controller.programs.arguments import number, numbers, pose
+from tvist_controller.programs.arm import DELAY, OWN_TOKEN, ProgramArm, Turns
+from tvist_controller.refusal import RefusalError
+from tvist_protocol.commands import SetPayload
+from tvist_protocol.io import SetTcp
+from tvist_urscript import Fault, signature
+
+GRAVITY = 9.82
+"""Gravity that programs declare, within `TOLERANCE`; the simulated arm stands upright and knows no other [m/s^2]."""
+TOLERANCE = 0.05
+
+SIGNATURES = {
+    "set_tcp": signature('tcp, tcp_name=""', blocks=True, cost=5),
+    "set_payload": signature("m, cog=None", blocks=True, cost=20),
+    "set_payload_mass": signature("m", blocks=True, cost=20),
+    "set_payload_cog": signature("cog", blocks=True, cost=20),
+    "set_target_payload": signature("m, cog, inertia=None, transition_time=0", blocks=True, cost=20),
+    "set_gravity": signature("d"),
+    "zero_ftsensor": signature("", cost=10),
+}
+
+
+class SettingFunctions:
+    """Changes the settings of one robot.
+
+    Args:
+        access: The robot.
+        arm: Its arm, whose moves are carried out before.
+    """
+
+    def __init__(self, access: Access, arm: ProgramArm) -> None:
+        self._access, self._arm = access, arm
+
+    def set_tcp(self, tcp: object, tcp_name: object) -> Turns:
+        """Set the tool centre point in the flange frame."""
+        del tcp_name  # names are for people
+        yield from self._arm.finish()
+        self._send(SetTcp(token=OWN_TOKEN, offset=pose("tcp", tcp)))
+
+    def set_payload(self, m: object, cog: object) -> Turns:
+        """Declare a payload without inertia; without a centre of mass, it is at the tool centre point."""
+        com = self._access.motion.tcp[:3] if cog is None else numbers("cog", cog, 3)
+        yield from self._declare(number("m", m, 0.0), com, (0.0,) * 6)
+
+    def set_payload_mass(self, m: object) -> Turns:
+        """Change the mass of the declared payload."""
+        declared = self._access.declared()
+        yield from self._declare(number("m", m, 0.0), declared.com, declared.inertia)
+
+    def set_payload_cog(self, cog: object) -> Turns:
+        """Change the centre of mass of the declared payload."""
+        declared = self._access.declared()
+        yield from self._declare(declared.mass, numbers("cog", cog, 3), declared.inertia)
+
+    def set_target_payload(self, m: object, cog: object, inertia: object, transition_time: object) -> Turns:
+        """Declare a payload with its inertia, Ixx Iyy Izz Ixy Ixz Iyz, in a time."""
+        seconds = number("transition_time", transition_time, 0.0, 3600.0)
+        xx, yy, zz, xy, xz, yz = (0.0,) * 6 if inertia is None else numbers("inertia", inertia, 6)
+        for name, value in (("inertia[0]", xx), ("inertia[1]", yy), ("inertia[2]", zz)):
+            number(name, value, 0.0, 133.0)
+        for name, value in (("inertia[3]", xy), ("inertia[4]", xz), ("inertia[5]", yz)):
+            number(name, value, -133.0, 133.0)
+        full = (xx, xy, xz, yy, yz, zz)
+        yield from self._declare(number("m", m, 0.0), numbers("cog", cog, 3), full, seconds)
+
+    def set_gravity(self, d: object) -> None:
+        """Accept the gravity that the arm has, which is installed upright.
+
+        Raises:
+            Fault: It is another.
+        """
+        x, y, z = numbers("d", d, 3)
+        if max(abs(x), abs(y), abs(z - GRAVITY)) > TOLERANCE:
+            raise Fault(f"set_gravity: d is [{x:g}, {y:g}, {z:g}]; the simulated arm stands upright, so it must be "
+                        f"[0, 0, {GRAVITY}]")  # fmt: skip
+
+    def zero_ftsensor(self) -> None:
+        """Take the present force and torque at the tool as zero."""
+        self._access.zero_wrench()
+
+    def _declare(
+        self, mass: float, com: tuple[float, ...], inertia: tuple[float, ...], seconds: float = 0.0
+    ) -> Turns:
+        xyz = (com[0], com[1], com[2])
+        six = (inertia[0], inertia[1], inertia[2], inertia[3], inertia[4], inertia[5])
+        yield from self._arm.finish()
+        command = SetPayload(token=OWN_TOKEN, mass=mass, com=xyz, inertia=six, transition_time=seconds)
+        ordered = self._access.order(command)
+        for _ in range(DELAY):
+            yield
+        plan = ordered()
+        self._send(command, plan if plan.holds(self._access.basis()) else self._access.plan(command))
+
+    def _send(self, command: SetTcp | SetPayload, plan: Plan | None = None) -> None:
+        try:
+            self._access.send(command, plan)
+        except RefusalError as refusal:
+            raise Fault(refusal.reply.why) from refusal

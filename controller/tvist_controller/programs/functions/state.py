@@ -1,0 +1,160 @@
+"""Functions that read the robot's state, as it was in the last tick."""
+
+import math
+
+import numpy as np
+
+from tvist_controller.programs.access import Access
+from tvist_controller.programs.arguments import a_list, a_pose, integer
+from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.kinematics import ProgramKinematics
+from tvist_plant.plant import PERIOD
+from tvist_protocol.motions import JointSegment
+from tvist_urscript import Array, Pose, signature
+
+_PLAIN = (
+    "get_steptime",
+    "get_actual_joint_positions",
+    "get_joint_positions",
+    "get_actual_joint_speeds",
+    "get_target_joint_positions",
+    "get_target_joint_speeds",
+    "get_target_joint_accelerations",
+    "get_actual_tcp_pose",
+    "get_actual_tcp_speed",
+    "get_target_tcp_pose",
+    "get_target_tcp_speed",
+    "get_actual_tool_flange_pose",
+    "get_target_waypoint",
+    "get_tcp_offset",
+    "get_target_payload",
+    "get_target_payload_cog",
+    "get_target_payload_inertia",
+    "get_joint_torques",
+    "get_tcp_force",
+    "force",
+    "is_steady",
+    "get_tool_accelerometer_reading",
+)
+SIGNATURES = {
+    **{name: signature("") for name in _PLAIN},
+    "get_tcp_force": signature("", cost=10),
+    "force": signature("", cost=10),
+    "get_actual_joint_positions_history": signature("steps=0"),
+}
+
+
+class StateFunctions:
+    """Reads the state of one robot.
+
+    Args:
+        access: The robot.
+        arm: Its arm.
+        kinematics: Its kinematics.
+    """
+
+    def __init__(self, access: Access, arm: ProgramArm, kinematics: ProgramKinematics) -> None:
+        self._access, self._arm, self._kinematics = access, arm, kinematics
+
+    def get_steptime(self) -> float:
+        """Return the control period [s]."""
+        return PERIOD
+
+    def get_actual_joint_positions(self) -> Array:
+        """Return the measured joint positions [rad]."""
+        return a_list(self._access.latest().actual_q)
+
+    def get_joint_positions(self) -> Array:
+        """Return the measured joint positions: an older name [rad]."""
+        return self.get_actual_joint_positions()
+
+    def get_actual_joint_positions_history(self, steps: object) -> Array:
+        """Return the measured joint positions a number of ticks ago [rad]."""
+        past = self._access.steadiness
+        return a_list(past.past(integer("steps", steps, 0, past.known - 1)))
+
+    def get_actual_joint_speeds(self) -> Array:
+        """Return the measured joint velocities [rad/s]."""
+        return a_list(self._access.latest().actual_qd)
+
+    def get_target_joint_positions(self) -> Array:
+        """Return the joint positions that the program asks for at present, before shaping [rad]."""
+        return a_list(self._access.latest().reference_q)
+
+    def get_target_joint_speeds(self) -> Array:
+        """Return the joint velocities that the program asks for at present [rad/s]."""
+        return a_list(self._access.target_speeds())
+
+    def get_target_joint_accelerations(self) -> Array:
+        """Return the joint accelerations that the program asks for at present [rad/s^2]."""
+        return a_list(self._access.target_accelerations())
+
+    def get_actual_tcp_pose(self) -> Pose:
+        """Return the pose of the tool by the measured joint positions."""
+        return a_pose(self._kinematics.tool_pose(np.array(self._access.latest().actual_q)))
+
+    def get_actual_tcp_speed(self) -> Array:
+        """Return the velocity of the tool by the measured joint velocities [m/s, rad/s]."""
+        state = self._access.latest()
+        return self._speed(state.actual_q, state.actual_qd)
+
+    def get_target_tcp_pose(self) -> Pose:
+        """Return the pose of the tool that the program asks for at present."""
+        return a_pose(self._kinematics.tool_pose(np.array(self._access.latest().reference_q)))
+
+    def get_target_tcp_speed(self) -> Array:
+        """Return the velocity of the tool that the program asks for at present [m/s, rad/s]."""
+        return self._speed(self._access.latest().reference_q, self._access.target_speeds())
+
+    def get_actual_tool_flange_pose(self) -> Pose:
+        """Return the pose of the flange by the measured joint positions."""
+        return a_pose(self._kinematics.tool_pose(np.array(self._access.latest().actual_q), (0.0,) * 6))
+
+    def get_target_waypoint(self) -> Pose:
+        """Return the pose at the end of the present move; without one, the present target."""
+        segment = self._arm.waypoint
+        if segment is None or not self._access.motion.motions.running:
+            return self.get_target_tcp_pose()
+        if isinstance(segment, JointSegment):
+            return a_pose(self._kinematics.tool_pose(np.array(segment.q)))
+        return a_pose(segment.pose)
+
+    def get_tcp_offset(self) -> Pose:
+        """Return the tool centre point in the flange frame."""
+        return a_pose(self._access.motion.tcp)
+
+    def get_target_payload(self) -> float:
+        """Return the mass of the declared payload [kg]."""
+        return self._access.declared().mass
+
+    def get_target_payload_cog(self) -> Array:
+        """Return the centre of mass of the declared payload [m]."""
+        return a_list(self._access.declared().com)
+
+    def get_target_payload_inertia(self) -> Array:
+        """Return the inertia of the declared payload, Ixx Iyy Izz Ixy Ixz Iyz [kg m^2]."""
+        xx, xy, xz, yy, yz, zz = self._access.declared().inertia
+        return a_list((xx, yy, zz, xy, xz, yz))
+
+    def get_joint_torques(self) -> Array:
+        """Return the external torques on the joints: without what the arm itself needs [N m]."""
+        return a_list(self._access.torques())
+
+    def get_tcp_force(self) -> Array:
+        """Return the external force and torque at the tool in the base frame [N, N m]."""
+        return a_list(self._access.wrench())
+
+    def force(self) -> float:
+        """Return the size of the external force at the tool [N]."""
+        return math.hypot(*self._access.wrench()[:3])
+
+    def is_steady(self) -> bool:
+        """Return whether the target has been at rest for 500 ms."""
+        return self._access.steadiness.steady
+
+    def get_tool_accelerometer_reading(self) -> Array:
+        """Return what the accelerometer in the flange measures, gravity included [m/s^2]."""
+        return a_list(self._access.latest().actual_tool_accelerometer)
+
+    def _speed(self, q: list[float], qd: list[float]) -> Array:
+        return a_list((self._kinematics.jacobian(np.array(q)) @ np.array(qd)).tolist())

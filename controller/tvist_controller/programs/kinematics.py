@@ -1,0 +1,83 @@
+"""Kinematics of the arm for programs: with the present tool, and with others."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tvist_controller.control.differentiator import Floats
+from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
+from tvist_controller.kinematics.tool import ToolKinematics, turn
+from tvist_controller.motion import MotionControl
+from tvist_controller.paths.poses import placement, placement_vector
+from tvist_plant.description import RobotDescription
+from tvist_urscript import Fault
+
+PoseNumbers = tuple[float, float, float, float, float, float]
+
+
+class ProgramKinematics:
+    """Kinematics of one robot's tool centre point in the base frame.
+
+    Args:
+        description: The robot.
+        motion: Its motion, which has the present tool centre point.
+    """
+
+    def __init__(self, description: RobotDescription, motion: MotionControl) -> None:
+        self._motion = motion
+        self._inverse = InverseKinematics(description)
+        self._flange = ToolKinematics(description)
+        self._tcp, self._tool = (0.0,) * 6, self._flange
+
+    def _with(self, tcp: Sequence[float] | None) -> ToolKinematics:
+        """The kinematics of a tool; of the present one if there is none given."""
+        wanted = self._motion.tcp if tcp is None else tuple(tcp)
+        if wanted != self._tcp:
+            self._tcp, self._tool = wanted, self._flange.with_tool(wanted)
+        return self._tool
+
+    def prepare(self) -> None:
+        """Compile what the functions use, before any is needed."""
+        self._inverse.prepare()
+
+    def tool_pose(self, q: Floats, tcp: Sequence[float] | None = None) -> PoseNumbers:
+        """Return the pose of the tool at joint positions, x y z [m] and rotation vector [rad].
+
+        Args:
+            q: Joint positions, shape (n,) [rad].
+            tcp: Tool centre point in the flange frame; None for the present one.
+        """
+        return placement_vector(*self._with(tcp).pose(q))
+
+    def jacobian(self, q: Floats, tcp: Sequence[float] | None = None) -> Floats:
+        """Return the Jacobian of the tool's velocity [m/s] and angular velocity [rad/s], shape (6, n)."""
+        return self._with(tcp).jacobian(q)
+
+    def posture(
+        self, pose: Sequence[float], near: Sequence[float], tcp: Sequence[float] | None = None
+    ) -> tuple[float, ...]:
+        """Return the joint positions nearest to others at which the tool has a pose [rad].
+
+        Args:
+            pose: Pose: x y z [m] and rotation vector [rad].
+            near: Joint positions [rad].
+            tcp: Tool centre point in the flange frame; None for the present one.
+
+        Raises:
+            Fault: There are none.
+        """
+        tool = placement(self._motion.tcp if tcp is None else tcp)
+        flange = placement(pose) @ tool.inverse
+        try:
+            q = self._inverse.solve(flange.rotation, flange.position, np.array(near, dtype=float))
+        except InverseKinematicsError as error:
+            shown = ", ".join(f"{value:.4g}" for value in pose)
+            raise Fault(f"no joint positions reach the pose p[{shown}]: {error}") from error
+        found: tuple[float, ...] = tuple(q.tolist())
+        return found
+
+    @staticmethod
+    def difference(start: Sequence[float], end: Sequence[float]) -> Floats:
+        """Return the way and the turn from one pose to another in the base frame, shape (6,) [m, rad]."""
+        one, other = placement(start), placement(end)
+        return np.concatenate([other.position - one.position, turn(one.rotation, other.rotation)])

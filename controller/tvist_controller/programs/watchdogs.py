@@ -1,0 +1,81 @@
+"""Watchdogs of programs: what happens when a client writes an input register too rarely."""
+
+import re
+from dataclasses import dataclass
+
+from tvist_controller.peripherals import Peripherals
+from tvist_plant.plant import PERIOD
+from tvist_protocol.io import BITS, NUMBERS, Bank
+from tvist_urscript import Fault
+
+_NAME = re.compile(r"input_(int|double|bit)_register_(\d+)|input_bit_registers(\d+)_to_(\d+)")
+
+
+@dataclass
+class _Watchdog:
+    name: str
+    bank: Bank
+    place: int
+    ticks: int
+    """Ticks that may pass between two writes."""
+    action: str
+    since: int
+
+
+class Watchdogs:
+    """The watchdogs of one robot's program.
+
+    Args:
+        peripherals: Its registers.
+    """
+
+    def __init__(self, peripherals: Peripherals) -> None:
+        self._peripherals = peripherals
+        self._all: dict[str, _Watchdog] = {}
+        self._tick = 0
+
+    def watch(self, name: str, frequency: float, action: str) -> None:
+        """Watch an input of RTDE from now on.
+
+        Args:
+            name: Its name.
+            frequency: Lowest frequency with which it has to be written [Hz].
+            action: `pause`, `stop`, or `ignore` to watch it no more.
+
+        Raises:
+            Fault: There is no such register.
+        """
+        bank, place = _register(name)
+        if action == "ignore":
+            self._all.pop(name, None)
+            return
+        ticks = max(round(1.0 / (frequency * PERIOD)), 1)
+        self._all[name] = _Watchdog(name, bank, place, ticks, action, self._tick)
+
+    def clear(self) -> None:
+        """Watch nothing any more, since the program has ended."""
+        self._all.clear()
+
+    def expired(self, tick: int) -> tuple[str, str] | None:
+        """Return the action of a watchdog whose register was not written in time, and the register's name."""
+        self._tick = tick
+        for watchdog in self._all.values():
+            written = max(self._peripherals.written(watchdog.bank, watchdog.place), watchdog.since)
+            if tick - written > watchdog.ticks:
+                del self._all[watchdog.name]
+                return watchdog.action, watchdog.name
+        return None
+
+
+def _register(name: str) -> tuple[Bank, int]:
+    """Bank and number of a register by RTDE's name."""
+    match = _NAME.fullmatch(name)
+    if match is None:
+        raise Fault(f'"{name}" is no input register: it must be like "input_int_register_0"')
+    kind, place, first, _ = match.groups()
+    if first is not None:
+        return "input_bit", int(first)
+    bank: Bank = "input_int" if kind == "int" else "input_double" if kind == "double" else "input_bit"
+    if int(place) >= (BITS if kind == "bit" else NUMBERS):
+        raise Fault(f'"{name}" does not exist: the bank has {BITS if kind == "bit" else NUMBERS} registers')
+    return bank, int(place)
