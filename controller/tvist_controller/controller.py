@@ -24,9 +24,10 @@ from tvist_controller.instruments.wrench import ToolWrench
 from tvist_controller.motion import MotionControl
 from tvist_controller.motion_commands import MotionCommands
 from tvist_controller.peripherals import Peripherals
+from tvist_controller.planner import Planner
 from tvist_controller.planning.basis import PlanBasis, ToolBasis
 from tvist_controller.planning.filter_planner import PlannedFilter
-from tvist_controller.planning.planner import QUESTIONS, Plan, Planner
+from tvist_controller.planning.plan import QUESTIONS, Plan
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.player import ProgramPlayer
 from tvist_controller.refusal import RefusalError, check_content, check_joints
@@ -265,7 +266,10 @@ class Controller:
 
     def changed_io(self) -> Io | None:
         """Return inputs, outputs and registers before a tick, if they changed since the last call; else None."""
-        program, peripherals = self.programs.progress, self.peripherals  # change in ticks, by events and commands
+        program, peripherals = (
+            self.programs.progress,
+            self.peripherals,
+        )  # change in ticks, by events and commands
         if not (self._io_changed or peripherals.changed) and program == self._told_program:
             return None
         self._io_changed = peripherals.changed = False

@@ -8,7 +8,7 @@ from tvist_controller.guided import Guidance
 from tvist_controller.motion import MotionControl
 from tvist_controller.peripherals import Peripherals
 from tvist_controller.planning.basis import PlanBasis
-from tvist_controller.planning.planner import Plan
+from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.steadiness import Steadiness
 from tvist_plant.description import RobotDescription
 from tvist_protocol.commands import Command

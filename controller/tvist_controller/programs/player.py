@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
+
 from tvist_controller.command_row import Call, Row
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arm import ProgramArm
@@ -24,7 +26,6 @@ from tvist_protocol.programs import (
 )
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
-from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
 
 TOLD_EVERY = 50
 """Ticks between two changes of the line in `io`, which changes with almost every tick."""
@@ -135,9 +136,7 @@ class ProgramPlayer:
         against = self.arm.hear(event)
         if event.kind == "protective_stop" and self._main is not None:
             self.state = "PAUSED"
-        elif event.kind == "safety_stop" and event.category != 2:
-            self.end()
-        elif against and self._main is not None:
+        elif (event.kind == "safety_stop" and event.category != 2) or (against and self._main is not None):
             self.end()
 
     def end(self) -> None:

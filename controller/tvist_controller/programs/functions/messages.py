@@ -1,20 +1,19 @@
 """Functions for messages to people, and for time."""
 
+from tvist_urscript import signature, to_text
+
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, number
 from tvist_controller.programs.arm import ProgramArm, Turns
 from tvist_controller.programs.popups import Popups
 from tvist_plant.plant import PERIOD
-from tvist_urscript import signature, to_text
 
 LONGEST_SLEEP = 1e6
 """[s]"""
 
 SIGNATURES = {
     "textmsg": signature('s1, s2=""', cost=5),
-    "popup": signature(
-        's, title="Popup", warning=False, error=False, blocking=False', blocks=True, cost=10
-    ),
+    "popup": signature('s, title="Popup", warning=False, error=False, blocking=False', blocks=True, cost=10),
     "sync": signature("", blocks=True),
     "sleep": signature("t", blocks=True),
 }

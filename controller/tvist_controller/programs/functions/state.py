@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from tvist_urscript import Array, Pose, signature
 
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import a_list, a_pose, integer
@@ -10,7 +11,6 @@ from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import JointSegment
-from tvist_urscript import Array, Pose, signature
 
 _PLAIN = (
     "get_steptime",
