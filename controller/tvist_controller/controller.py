@@ -319,12 +319,11 @@ class Controller:
             order=lambda command: order(command, self.basis),
             basis=lambda: self.basis,
             latest=lambda: self.latest,
-            target_speeds=lambda: self.latest.target_qd,
-            target_accelerations=lambda: self.latest.target_qdd,
             declared=lambda: self.declared,
             torques=lambda: self._wrench.felt(self.latest).tolist(),
             wrench=self.wrench,
             zero_wrench=self._zero_wrench,
+            shape_guided=self.setup.shape_servo,
         )
 
     def _send(self, command: c.Command, plan: Plan | None) -> Reply | None:

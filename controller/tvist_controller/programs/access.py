@@ -36,10 +36,6 @@ class Access:
     """The present state that plans depend on."""
     latest: Callable[[], State]
     """State of the last tick."""
-    target_speeds: Callable[[], list[float]]
-    """Velocities of the reference before shaping in the last tick [rad/s]."""
-    target_accelerations: Callable[[], list[float]]
-    """Accelerations of the reference before shaping in the last tick [rad/s^2]."""
     declared: Callable[[], Payload]
     """Declared payload."""
     torques: Callable[[], list[float]]
