@@ -242,6 +242,16 @@ class ProgramArm:
 
     # ------------------------------------------------------------------ threads and events
 
+    @property
+    def moves(self) -> bool:
+        """Whether a planned motion of the program is running."""
+        return self._number is not None
+
+    @property
+    def guides(self) -> bool:
+        """Whether a guided motion of the program is running."""
+        return self._guided is not None
+
     def settle(self, lives: Callable[[object], bool]) -> None:
         """Stop a motion whose thread has ended without another that took it over; called at the end of each turn.
 

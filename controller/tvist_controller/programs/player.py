@@ -135,7 +135,7 @@ class ProgramPlayer:
             return
         against = self.arm.hear(event)
         if event.kind == "protective_stop" and self._main is not None:
-            self.state = "PAUSED"
+            self._wait()
         elif (event.kind == "safety_stop" and event.category != 2) or (against and self._main is not None):
             self.end()
 
@@ -251,12 +251,18 @@ class ProgramPlayer:
 
     def _hold(self) -> None:
         """Pause the program. A planned motion pauses on its path, a guided one is stopped."""
-        if self._motion.activity is Activity.MOVING:
+        if self._motion.activity is Activity.MOVING and self.arm.moves:
             self._motion.pause()
             self._safety.stay_paused()
-        elif self._motion.activity is Activity.GUIDED:
+        elif self._motion.activity is Activity.GUIDED and self.arm.guides:
             self.arm.brake(lambda: self._motion.stop(None, "the program was paused"))
+        self._wait()
+
+    def _wait(self) -> None:
+        """Be paused."""
         self.state = "PAUSED"
+        if self._main is not None:
+            self.line = self._main.machine.line
 
     def _check_running(self, command: str) -> None:
         """Refuse to start a program where the arm has no power or is in a protective stop."""
