@@ -25,6 +25,11 @@ def pose(dx=0.0, dy=0.0, dz=0.0):
     return f"p{[x + dx, y + dy, z + dz, *turn]}"
 
 
+def place(dx, dy, dz):
+    """A place beside the one at the start [m]."""
+    return np.array([HERE[0] + dx, HERE[1] + dy, HERE[2] + dz])
+
+
 def places(robot):
     """Positions of the tool before shaping, one a tick [m]."""
     return np.array([KINEMATICS.pose(np.array(state.reference_q))[1] for state in robot.states])
@@ -66,7 +71,7 @@ def test_statements_after_a_move_run_when_the_shaped_reference_is_at_rest():
 def test_a_movej_to_a_pose_ends_there_near_the_present_joints():
     robot = a_robot()
     run(robot, f"movej({pose(dz=0.05)})")
-    np.testing.assert_allclose(places(robot)[-1], np.array(HERE[:3]) + [0, 0, 0.05], atol=1e-6)
+    np.testing.assert_allclose(places(robot)[-1], place(0, 0, 0.05), atol=1e-6)
     assert np.abs(np.array(robot.states[-1].reference_q) - URSIM).max() < 0.5
 
 
@@ -120,7 +125,7 @@ def test_a_line_that_the_arm_cannot_follow_ends_in_a_protective_stop_that_can_be
 
 def test_moves_with_a_radius_are_one_motion_and_what_comes_between_happens_in_the_blend():
     robot, radius = a_robot(), 0.03
-    corner = np.array(HERE[:3]) + [0, 0.12, 0]
+    corner = place(0, 0.12, 0)
     run(
         robot,
         f"movel({pose(dy=0.12)}, a=0.8, v=0.2, r={radius})",
@@ -140,7 +145,7 @@ def test_moves_with_a_radius_are_one_motion_and_what_comes_between_happens_in_th
 def test_a_blend_without_a_move_after_it_stops_at_its_point():
     robot = a_robot()
     run(robot, f"movel({pose(dy=0.1)}, r=0.05)", "sleep(0.1)", "textmsg(1)")
-    np.testing.assert_allclose(places(robot)[-1], np.array(HERE[:3]) + [0, 0.1, 0], atol=1e-6)
+    np.testing.assert_allclose(places(robot)[-1], place(0, 0.1, 0), atol=1e-6)
     ended = [event.kind for event in robot.events if event.kind in {"motion_done", "text"}]
     assert ended == ["motion_done", "text"]
 
@@ -236,7 +241,7 @@ def test_servoc_goes_to_its_pose_and_no_faster_than_it_is_told():
     finish(robot)
     ways = np.linalg.norm(np.diff(places(robot), axis=0), axis=1) / 0.002
     assert ways.max() <= 0.1 * (1 + 1e-6)
-    np.testing.assert_allclose(places(robot)[-1], np.array(HERE[:3]) + [0, 0.1, 0], atol=2e-3)
+    np.testing.assert_allclose(places(robot)[-1], place(0, 0.1, 0), atol=2e-3)
 
 
 def test_time_passes_by_sync_and_sleep_and_by_nothing_else():

@@ -3,7 +3,7 @@
 from tvist_urscript import Script, ScriptError, compile_script
 
 from tvist_controller.programs.built_in import built_in
-from tvist_controller.programs.library import SIGNATURES
+from tvist_controller.programs.library import MOVING, SIGNATURES
 from tvist_controller.refusal import RefusalError
 from tvist_plant.description import RobotDescription
 from tvist_protocol.programs import ProgramLoad, ProgramRun
@@ -36,7 +36,11 @@ class ScriptCompiler:
             if text is None:
                 return None
         try:
-            return compile_script(text, SIGNATURES)
+            script = compile_script(text, SIGNATURES)
+            if script.secondary and script.calls & MOVING:
+                moves = ", ".join(sorted(script.calls & MOVING))
+                raise ScriptError(1, 1, f"a secondary program cannot move the arm: it calls {moves}")
+            return script
         except ScriptError as error:
             where = f"text:{error.line}:{error.column}"
             raise RefusalError("script_error", where, error.text) from error

@@ -8,8 +8,7 @@ from tvist_controller.command_row import Call, Row
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.built_in import built_in
-from tvist_controller.programs.functions import motions
-from tvist_controller.programs.library import functions
+from tvist_controller.programs.library import MOVING, functions
 from tvist_controller.programs.popups import Popups
 from tvist_controller.programs.steadiness import Steadiness
 from tvist_controller.programs.watchdogs import Watchdogs
@@ -35,8 +34,6 @@ MAX_BESIDE = 8
 
 MAX_KEPT = 100
 """Number of programs that are kept under their names."""
-MOVING = frozenset(motions.SIGNATURES)
-"""Functions that move the arm."""
 
 
 class _Running(NamedTuple):
