@@ -37,10 +37,13 @@ class ScriptCompiler:
                 return None
         try:
             script = compile_script(text, SIGNATURES)
-            if script.secondary and script.calls & MOVING:
-                moves = ", ".join(sorted(script.calls & MOVING))
-                raise ScriptError(1, 1, f"a secondary program cannot move the arm: it calls {moves}")
-            return script
         except ScriptError as error:
-            where = f"text:{error.line}:{error.column}"
-            raise RefusalError("script_error", where, error.text) from error
+            raise _refusal(error.line, error.column, error.text) from error
+        moves = script.calls & MOVING
+        if script.secondary and moves:
+            raise _refusal(1, 1, f"a secondary program cannot move the arm: it calls {', '.join(sorted(moves))}")
+        return script
+
+
+def _refusal(line: int, column: int, text: str) -> RefusalError:
+    return RefusalError("script_error", f"text:{line}:{column}", text)
