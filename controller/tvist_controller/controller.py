@@ -30,10 +30,11 @@ from tvist_controller.planning.filter_planner import PlannedFilter
 from tvist_controller.planning.plan import QUESTIONS, Plan
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.player import ProgramPlayer
-from tvist_controller.refusal import RefusalError, check_content, check_joints
+from tvist_controller.refusal import RefusalError, check_content
 from tvist_controller.reporting import Reporter, truth_of
 from tvist_controller.safety_control import SafetyControl
 from tvist_controller.session import NoControlError, Session
+from tvist_controller.setpoints import Setpoints
 from tvist_controller.setup import Setup, body
 from tvist_controller.stop_reasons import StopReasons
 from tvist_plant.fingerprint import fingerprint
@@ -86,6 +87,7 @@ class Controller:
             self.session, self._interrupt, self._emit, steppable=setup.clock != "realtime"
         )
         self.stepping = self._authority.stepping
+        self._setpoints = Setpoints(self.session, self.motion, self.counters)
         safety = SafetyControl(self.motion, self._emit)
         self._faults = Faults(self.motion, safety)
         self.filters = Filters(self.motion, source, setup.payload, self._emit)
@@ -166,30 +168,11 @@ class Controller:
 
     def receive_setpoint(self, setpoint: c.Setpoint) -> None:
         """Take a set-point. If it is not accepted, it is counted and dropped, since its sender expects no answer."""
-        lease = self.session.lease
-        if lease is None or setpoint.token != lease.token:
-            self._count_refused()  # another client's: neither the stream nor the journal is concerned
-            return
-        try:
-            check_joints(setpoint.q, self.setup.description)
-        except RefusalError as refusal:
-            self.refuse_setpoint(refusal.reply.why)
-            return
-        if not self.motion.streaming:
-            self.refuse_setpoint("no stream is running")
-            return
-        self.counters.setpoints_received += 1
-        self.session.renew(setpoint.token, self.now)
-        self.motion.streams.offer(setpoint.sequence, np.array(setpoint.q, dtype=float), self.now)
+        self._setpoints.receive(setpoint, self.now)
 
     def refuse_setpoint(self, why: str) -> None:
         """Count and drop a set-point of the client in control; if the stream falls silent, its end gives the reason."""
-        self._count_refused()
-        self.motion.streams.refuse(why)
-
-    def _count_refused(self) -> None:
-        self.counters.setpoints_received += 1
-        self.counters.setpoints_refused += 1
+        self._setpoints.refuse(why)
 
     def client_gone(self, client: str, session: str) -> None:
         """Handle the end of a client's session, which ends the rights it held."""

@@ -41,7 +41,9 @@ class ScriptCompiler:
             raise _refusal(error.line, error.column, error.text) from error
         moves = script.calls & MOVING
         if script.secondary and moves:
-            raise _refusal(1, 1, f"a secondary program cannot move the arm: it calls {', '.join(sorted(moves))}")
+            raise _refusal(
+                1, 1, f"a secondary program cannot move the arm: it calls {', '.join(sorted(moves))}"
+            )
         return script
 
 

@@ -49,7 +49,8 @@ def page() -> str:
         ]
         parts.append(f"## {title}\n\n{_table(('function', '', 'what'), rows)}\n")
     rows = [
-        (f"`{name}`", what) for name, (_, what) in sorted(unsimulated.SUBJECTS.items(), key=lambda row: row[::-1])
+        (f"`{name}`", what)
+        for name, (_, what) in sorted(unsimulated.SUBJECTS.items(), key=lambda row: row[::-1])
     ]
     idle = ", ".join(f"`{name}`" for name in unsimulated.IDLE)
     parts.append(
