@@ -349,12 +349,5 @@ class Controller:
         """Check that a client may advance time; the host then does so."""
         command = call.command
         self._authority.check_step(command, call.now)
-        if command.setpoints is not None and not self.motion.streaming:
-            raise RefusalError("wrong_mode", "setpoints", "no stream is running: send servo_start first")
-        setpoints = command.setpoints or ()
-        if len(setpoints) > command.ticks:
-            why = f"setpoints has {len(setpoints)} entries; it must have one per tick, and ticks is {command.ticks}"
-            raise RefusalError("out_of_range", "setpoints", why, command.ticks)
-        for number, setpoint in enumerate(setpoints):
-            check_joints(setpoint.q, self.setup.description, f"setpoints[{number}].q")
+        self._setpoints.check(command)
         return Done(tick=self.tick_number + command.ticks)

@@ -7,6 +7,7 @@ from tvist_controller.motion import MotionControl
 from tvist_controller.refusal import RefusalError, check_joints
 from tvist_controller.session import Session
 from tvist_protocol.commands import Setpoint
+from tvist_protocol.simulation import SimulationStep
 
 
 class Setpoints:
@@ -44,6 +45,21 @@ class Setpoints:
         self._counters.setpoints_received += 1
         self._session.renew(setpoint.token, now)
         self._motion.streams.offer(setpoint.sequence, np.array(setpoint.q, dtype=float), now)
+
+    def check(self, command: SimulationStep) -> None:
+        """Check the set-points in a step.
+
+        Raises:
+            RefusalError: No stream is running, or they are not valid.
+        """
+        if command.setpoints is not None and not self._motion.streaming:
+            raise RefusalError("wrong_mode", "setpoints", "no stream is running: send servo_start first")
+        setpoints = command.setpoints or ()
+        if len(setpoints) > command.ticks:
+            why = f"setpoints has {len(setpoints)} entries; it must have one per tick, and ticks is {command.ticks}"
+            raise RefusalError("out_of_range", "setpoints", why, command.ticks)
+        for number, setpoint in enumerate(setpoints):
+            check_joints(setpoint.q, self._description, f"setpoints[{number}].q")
 
     def refuse(self, why: str) -> None:
         """Count and drop a set-point of the client in control; if the stream falls silent, its end gives the reason."""

@@ -19,13 +19,14 @@ HEAD = """# Functions of programs
 
 Made by `python -m tvist_controller.programs.table > docs/reference/urscript-functions.md`.
 
-What programs in URScript can call, besides [the functions of the language](urscript.md). Lengths are metres, angles radians, times seconds;
-poses are of the tool centre point in the base frame. Parameters with a default may be left out, and any may be given by name. A function that
-*waits* lets time pass; all others return in the same tick. Bad arguments end the program with an error at the place of the call.
+What programs in URScript can call, besides [the functions of the language](urscript.md). Lengths are metres, angles
+radians, times seconds; poses are of the tool centre point in the base frame. Parameters with a default may be left out,
+and any may be given by name. A function that *waits* lets time pass; all others return in the same tick. Bad arguments
+end the program with an error at the place of the call.
 
-A move with a radius (`r`) is blended into the next one. The call then returns at once, and the program runs on to that next move; what it
-writes to outputs, registers and the log on the way is done when the arm begins the blend. What it reads is of the present. A function that
-waits ends the path: the arm then stops at the point of the last move.
+A move with a radius (`r`) is blended into the next one. The call then returns at once, and the program runs on to that
+next move; what it writes to outputs, registers and the log on the way is done when the arm begins the blend. What it
+reads is of the present. A function that waits ends the path: the arm then stops at the point of the last move.
 """
 SUBJECTS: tuple[tuple[str, ModuleType, type], ...] = (
     ("Motions", motions, motions.MotionFunctions),
