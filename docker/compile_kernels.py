@@ -1,7 +1,7 @@
 """Have every kernel compiled that a served robot calls, by driving one in process. Run while an image is built."""  # noqa: INP001  a script
 
 from tvist_controller.loopback import LoopbackHost
-from tvist_controller.planning.planner import Planner
+from tvist_controller.planner import Planner
 from tvist_protocol.codec import decode_reply, encode
 from tvist_protocol.commands import MoveJ, TakeControl
 from tvist_protocol.replies import Accepted, Done, Reply

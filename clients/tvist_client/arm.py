@@ -42,7 +42,14 @@ from tvist_protocol.commands import (
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.io import SetTcp
 from tvist_protocol.keys import check_client_name
-from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramStop
+from tvist_protocol.programs import (
+    ProgramClosePopup,
+    ProgramLoad,
+    ProgramPause,
+    ProgramPlay,
+    ProgramRun,
+    ProgramStop,
+)
 from tvist_protocol.stream import Event
 
 if TYPE_CHECKING:
@@ -177,9 +184,22 @@ class Arm(Moves, Guiding, Terminals, Simulation):
 
     # ------------------------------------------------------------------ programs
 
-    async def load_program(self, name: str) -> None:
-        """Load a program, one of `programs` in `info`; a running program and the arm are stopped first."""
-        await self.robot.request(ProgramLoad(token=self.token, name=name))
+    async def load_program(self, name: str, text: str | None = None) -> None:
+        """Load a program; a running program and the arm are stopped first.
+
+        Args:
+            name: Its name: one of `programs` in `info`, or any other if `text` is given.
+            text: Its text in URScript, which the robot keeps under this name; None for the one it has.
+        """
+        await self.robot.request(ProgramLoad(token=self.token, name=name, text=text))
+
+    async def run_program(self, text: str) -> None:
+        """Start a program in URScript at once; it replaces a running one, unless it is secondary (`sec`)."""
+        await self.robot.request(ProgramRun(token=self.token, text=text))
+
+    async def close_popup(self) -> None:
+        """Close the message that a program shows, for which it may be waiting."""
+        await self.robot.request(ProgramClosePopup())
 
     async def play_program(self) -> None:
         """Start the loaded program, or resume a paused one. `io` reports its progress; it ends with control."""

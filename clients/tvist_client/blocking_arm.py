@@ -113,9 +113,17 @@ class Arm(Moves, Guiding):
         """Switch a digital input, as a device connected to it would."""
         self._portal.call(lambda: self._arm.set_digital_input(number, on))
 
-    def load_program(self, name: str) -> None:
-        """Load a program; a running program is stopped first."""
-        self._portal.call(lambda: self._arm.load_program(name))
+    def load_program(self, name: str, text: str | None = None) -> None:
+        """Load a program, which the robot knows or whose text is given; a running program is stopped first."""
+        self._portal.call(lambda: self._arm.load_program(name, text))
+
+    def run_program(self, text: str) -> None:
+        """Start a program in URScript at once."""
+        self._portal.call(lambda: self._arm.run_program(text))
+
+    def close_popup(self) -> None:
+        """Close the message that a program shows."""
+        self._portal.call(self._arm.close_popup)
 
     def play_program(self) -> None:
         """Start the loaded program, or resume a paused one."""

@@ -14,12 +14,12 @@ from tvist_controller.control.differentiator import Target, central_differences
 from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.controller import Controller
 from tvist_controller.cycle import STILL, ControlCycle
+from tvist_controller.from_rest import plan_from_rest
 from tvist_controller.kinematics.tool import ToolKinematics, turned
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.mode_source import ModeSource
 from tvist_controller.own_shapers import OwnShaper, RecordedShaper
 from tvist_controller.paths.poses import placement_vector
-from tvist_controller.planning.from_rest import plan_from_rest
 from tvist_controller.presence import Presence
 from tvist_controller.refusal import RefusalError
 from tvist_controller.reporting import truth_of

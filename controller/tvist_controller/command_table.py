@@ -4,8 +4,9 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from tvist_controller.command_row import Call, Row
+from tvist_controller.planner import Planner
 from tvist_controller.planning.basis import PlanBasis
-from tvist_controller.planning.planner import Plan, Planner
+from tvist_controller.planning.plan import Plan
 from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import Command
 from tvist_protocol.replies import Reply

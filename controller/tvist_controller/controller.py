@@ -24,15 +24,17 @@ from tvist_controller.instruments.wrench import ToolWrench
 from tvist_controller.motion import MotionControl
 from tvist_controller.motion_commands import MotionCommands
 from tvist_controller.peripherals import Peripherals
+from tvist_controller.planner import Planner
 from tvist_controller.planning.basis import PlanBasis, ToolBasis
 from tvist_controller.planning.filter_planner import PlannedFilter
-from tvist_controller.planning.planner import QUESTIONS, Plan, Planner
+from tvist_controller.planning.plan import QUESTIONS, Plan
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.player import ProgramPlayer
-from tvist_controller.refusal import RefusalError, check_content, check_joints
+from tvist_controller.refusal import RefusalError, check_content
 from tvist_controller.reporting import Reporter, truth_of
 from tvist_controller.safety_control import SafetyControl
 from tvist_controller.session import NoControlError, Session
+from tvist_controller.setpoints import Setpoints
 from tvist_controller.setup import Setup, body
 from tvist_controller.stop_reasons import StopReasons
 from tvist_plant.fingerprint import fingerprint
@@ -85,6 +87,7 @@ class Controller:
             self.session, self._interrupt, self._emit, steppable=setup.clock != "realtime"
         )
         self.stepping = self._authority.stepping
+        self._setpoints = Setpoints(self.session, self.motion, self.counters)
         safety = SafetyControl(self.motion, self._emit)
         self._faults = Faults(self.motion, safety)
         self.filters = Filters(self.motion, source, setup.payload, self._emit)
@@ -165,30 +168,11 @@ class Controller:
 
     def receive_setpoint(self, setpoint: c.Setpoint) -> None:
         """Take a set-point. If it is not accepted, it is counted and dropped, since its sender expects no answer."""
-        lease = self.session.lease
-        if lease is None or setpoint.token != lease.token:
-            self._count_refused()  # another client's: neither the stream nor the journal is concerned
-            return
-        try:
-            check_joints(setpoint.q, self.setup.description)
-        except RefusalError as refusal:
-            self.refuse_setpoint(refusal.reply.why)
-            return
-        if not self.motion.streaming:
-            self.refuse_setpoint("no stream is running")
-            return
-        self.counters.setpoints_received += 1
-        self.session.renew(setpoint.token, self.now)
-        self.motion.streams.offer(setpoint.sequence, np.array(setpoint.q, dtype=float), self.now)
+        self._setpoints.receive(setpoint, self.now)
 
     def refuse_setpoint(self, why: str) -> None:
         """Count and drop a set-point of the client in control; if the stream falls silent, its end gives the reason."""
-        self._count_refused()
-        self.motion.streams.refuse(why)
-
-    def _count_refused(self) -> None:
-        self.counters.setpoints_received += 1
-        self.counters.setpoints_refused += 1
+        self._setpoints.refuse(why)
 
     def client_gone(self, client: str, session: str) -> None:
         """Handle the end of a client's session, which ends the rights it held."""
@@ -265,7 +249,10 @@ class Controller:
 
     def changed_io(self) -> Io | None:
         """Return inputs, outputs and registers before a tick, if they changed since the last call; else None."""
-        program, peripherals = self.programs.progress, self.peripherals  # change in ticks, by events and commands
+        program, peripherals = (
+            self.programs.progress,
+            self.peripherals,
+        )  # change in ticks, by events and commands
         if not (self._io_changed or peripherals.changed) and program == self._told_program:
             return None
         self._io_changed = peripherals.changed = False
@@ -315,12 +302,11 @@ class Controller:
             order=lambda command: order(command, self.basis),
             basis=lambda: self.basis,
             latest=lambda: self.latest,
-            target_speeds=lambda: self.latest.target_qd,
-            target_accelerations=lambda: self.latest.target_qdd,
             declared=lambda: self.declared,
             torques=lambda: self._wrench.felt(self.latest).tolist(),
             wrench=self.wrench,
             zero_wrench=self._zero_wrench,
+            shape_guided=self.setup.shape_servo,
         )
 
     def _send(self, command: c.Command, plan: Plan | None) -> Reply | None:
@@ -363,12 +349,5 @@ class Controller:
         """Check that a client may advance time; the host then does so."""
         command = call.command
         self._authority.check_step(command, call.now)
-        if command.setpoints is not None and not self.motion.streaming:
-            raise RefusalError("wrong_mode", "setpoints", "no stream is running: send servo_start first")
-        setpoints = command.setpoints or ()
-        if len(setpoints) > command.ticks:
-            why = f"setpoints has {len(setpoints)} entries; it must have one per tick, and ticks is {command.ticks}"
-            raise RefusalError("out_of_range", "setpoints", why, command.ticks)
-        for number, setpoint in enumerate(setpoints):
-            check_joints(setpoint.q, self.setup.description, f"setpoints[{number}].q")
+        self._setpoints.check(command)
         return Done(tick=self.tick_number + command.ticks)

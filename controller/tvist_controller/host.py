@@ -9,7 +9,7 @@ from collections.abc import Callable
 from tvist_controller.about import info_of
 from tvist_controller.admission import Admitted, Unreadable, admit, admit_setpoint
 from tvist_controller.controller import Controller
-from tvist_controller.planning.planner import Plan
+from tvist_controller.planning.plan import Plan
 from tvist_controller.sink import Sink
 from tvist_controller.standing import Standing
 from tvist_controller.stepping import may_step

@@ -4,7 +4,7 @@ from typing import Any
 
 from tvist_controller.command_row import Call, Row
 from tvist_controller.motion import MotionControl
-from tvist_controller.planning.planner import MOTIONS
+from tvist_controller.planning.plan import MOTIONS
 from tvist_controller.programs.player import ProgramPlayer
 from tvist_controller.refusal import check_content, check_motion
 from tvist_controller.safety_control import SafetyControl

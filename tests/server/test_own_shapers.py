@@ -9,7 +9,7 @@ from tests.controller.robots import PAPER, Q1, Q2, Q3, H, Robot, calibration, se
 
 from tvist_controller.about import info_of
 from tvist_controller.own_shapers import OwnShaper, OwnShaperError, is_file, load_own
-from tvist_controller.planning.planner import Planner
+from tvist_controller.planner import Planner
 from tvist_controller.setup import Setup
 from tvist_lab.mcap_file import RecordingFile
 from tvist_lab.replay import ReplayError, replay_file

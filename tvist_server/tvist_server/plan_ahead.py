@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 from tvist_controller.admission import Admitted
 from tvist_controller.host import Host
+from tvist_controller.planner import Planner
 from tvist_controller.planning.basis import PlanBasis
-from tvist_controller.planning.planner import PLANNED, QUESTIONS, Plan, Planner
+from tvist_controller.planning.plan import PLANNED, QUESTIONS, Plan
 from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import Command, KeepAlive, PowerOff, Stop
 from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics

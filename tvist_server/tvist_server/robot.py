@@ -7,13 +7,14 @@ from tvist_controller.about import info_of
 from tvist_controller.admission import Admitted
 from tvist_controller.controller import Controller
 from tvist_controller.host import Host
-from tvist_controller.planning.planner import Planner
+from tvist_controller.planner import Planner
 from tvist_controller.setup import Setup
 from tvist_protocol.stream import Telemetry
 from tvist_server.clock import Clock, Mailbox
 from tvist_server.gateways.base import Answer, Gateway
 from tvist_server.lateness import Punctuality
 from tvist_server.plan_ahead import PlanAhead
+from tvist_server.plans_of_programs import PlansOfPrograms
 from tvist_server.publisher import Publisher
 from tvist_server.reception import Reception
 from tvist_server.recording.black_box import BlackBox
@@ -35,9 +36,11 @@ class ServedRobot:
 
     def __init__(self, setup: Setup, record: Path | None, dump: Path) -> None:
         self.setup = setup
-        self.controller = Controller(setup)
-        info_of(self.controller)  # computes the slowest part of the description once, before the first tick
         lockstep = setup.clock != "realtime"
+        # When a client advances time, nothing is late, and plans are made when they are needed.
+        self._plans = None if lockstep else PlansOfPrograms(_planner(setup))
+        self.controller = Controller(setup, order=None if self._plans is None else self._plans.order)
+        info_of(self.controller)  # computes the slowest part of the description once, before the first tick
         self.recorder = None
         if record is not None:
             self.recorder = Recorder(
@@ -54,7 +57,6 @@ class ServedRobot:
         self._host = Host(self.controller, *recorded, black_box, self._publisher)
         self.driven = Mailbox(self._host)
         """The robot as seen by the clock."""
-        # When a client advances time, nothing is late, and plans are made when they are needed.
         self._plan_ahead = None if lockstep else PlanAhead(self._host, _planner(setup), self.driven.post)
         carry_out = self._carry_out if self._plan_ahead is None else self._plan_ahead.submit
         self.reception = Reception(self._host, self.driven.post, carry_out, self._publisher.answer)
@@ -116,7 +118,9 @@ class ServedRobot:
             self._plan_ahead.close()
 
     def close(self) -> None:
-        """Close its gateways."""
+        """Close its gateways; the controller's thread has ended."""
+        if self._plans is not None:
+            self._plans.close()
         for gateway in self._gateways:
             gateway.close()
 

@@ -70,8 +70,8 @@ class ToolValues(Reading):
         """Computed: force at the TCP that explains the measured torques, through the Jacobian [N, N m].
 
         The torque that the target motion needs (rigid arm with the declared payload, rotors, friction) is subtracted
-        first, and what a program has zeroed last. Near a singularity part of the force cannot be measured and is left out. It is zero while the arm is
-        braked.
+        first, and last the force that a program has taken as zero. Near a singularity part of the force cannot be
+        measured and is left out. It is zero while the arm is braked.
         """
         force: list[float] = self._force.tolist()
         zero = self.io.tcp_force_zero

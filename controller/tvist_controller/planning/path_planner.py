@@ -257,7 +257,10 @@ def marks_of(runs: list[Run], segments: int) -> tuple[tuple[int, float], ...]:
         for number, piece in enumerate(run):
             # On the way to another segment, the last piece of one is its blend.
             last = run[-1].where == piece.where
-            marks[_number(piece.where)] = part, ends[number] if last else ends[number] - float(piece.knots.s[-1])
+            marks[_number(piece.where)] = (
+                part,
+                ends[number] if last else ends[number] - float(piece.knots.s[-1]),
+            )
     found, here = [], (0, 0.0)
     for segment in range(segments):
         here = marks.get(segment, here)

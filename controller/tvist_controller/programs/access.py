@@ -8,7 +8,7 @@ from tvist_controller.guided import Guidance
 from tvist_controller.motion import MotionControl
 from tvist_controller.peripherals import Peripherals
 from tvist_controller.planning.basis import PlanBasis
-from tvist_controller.planning.planner import Plan
+from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.steadiness import Steadiness
 from tvist_plant.description import RobotDescription
 from tvist_protocol.commands import Command
@@ -36,10 +36,6 @@ class Access:
     """The present state that plans depend on."""
     latest: Callable[[], State]
     """State of the last tick."""
-    target_speeds: Callable[[], list[float]]
-    """Velocities of the reference before shaping in the last tick [rad/s]."""
-    target_accelerations: Callable[[], list[float]]
-    """Accelerations of the reference before shaping in the last tick [rad/s^2]."""
     declared: Callable[[], Payload]
     """Declared payload."""
     torques: Callable[[], list[float]]

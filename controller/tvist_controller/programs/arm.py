@@ -4,8 +4,10 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+from tvist_urscript import Fault
+
 from tvist_controller.planning.move_planner import PlannedMove
-from tvist_controller.planning.planner import Plan
+from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.access import Access
 from tvist_controller.refusal import RefusalError
 from tvist_plant.plant import PERIOD
@@ -14,7 +16,6 @@ from tvist_protocol.motions import JointSegment, LineSegment, MoveL, MovePath, S
 from tvist_protocol.replies import Accepted
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
-from tvist_urscript import Fault
 
 Turns = Generator[None, None, None]
 """Course of a function that lets time pass: it yields once a tick."""
@@ -241,6 +242,16 @@ class ProgramArm:
 
     # ------------------------------------------------------------------ threads and events
 
+    @property
+    def moves(self) -> bool:
+        """Whether a planned motion of the program is running."""
+        return self._number is not None
+
+    @property
+    def guides(self) -> bool:
+        """Whether a guided motion of the program is running."""
+        return self._guided is not None
+
     def settle(self, lives: Callable[[object], bool]) -> None:
         """Stop a motion whose thread has ended without another that took it over; called at the end of each turn.
 
@@ -301,7 +312,11 @@ def _command(legs: list[Segment]) -> MoveJ | MoveL | MovePath:
     match legs:
         case [JointSegment() as leg]:
             return MoveJ(
-                token=token, q=leg.q, velocity=leg.velocity, acceleration=leg.acceleration, duration=leg.duration
+                token=token,
+                q=leg.q,
+                velocity=leg.velocity,
+                acceleration=leg.acceleration,
+                duration=leg.duration,
             )
         case [LineSegment() as leg]:
             return MoveL(

@@ -22,5 +22,7 @@ def built_in(description: RobotDescription) -> dict[str, str]:
 
 def _moves(title: str, names: Sequence[str], description: RobotDescription) -> str:
     """A program that moves to poses."""
-    moves = [f"  movej({[float(angle) for angle in description.poses[name]]}, a=2.0, v=1.5)" for name in names]
+    moves = [
+        f"  movej({[float(angle) for angle in description.poses[name]]}, a=2.0, v=1.5)" for name in names
+    ]
     return "\n".join((f"def {title}():", *moves, "end", ""))

@@ -24,6 +24,9 @@ _MODULES = (motions, poses, state, settings, registers, terminals, messages, saf
 SIGNATURES = {name: one for module in _MODULES for name, one in module.SIGNATURES.items()}
 """Signature of each function; those of the language itself are in `tvist_urscript`."""
 
+MOVING = frozenset(motions.SIGNATURES)
+"""Functions that move the arm."""
+
 
 def functions(
     access: Access, arm: ProgramArm, popups: Popups, watchdogs: Watchdogs

@@ -2,12 +2,13 @@
 
 from typing import NamedTuple
 
+from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
+
 from tvist_controller.command_row import Call, Row
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.built_in import built_in
-from tvist_controller.programs.functions import motions
-from tvist_controller.programs.library import functions
+from tvist_controller.programs.library import MOVING, functions
 from tvist_controller.programs.popups import Popups
 from tvist_controller.programs.steadiness import Steadiness
 from tvist_controller.programs.watchdogs import Watchdogs
@@ -24,7 +25,6 @@ from tvist_protocol.programs import (
 )
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
-from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
 
 TOLD_EVERY = 50
 """Ticks between two changes of the line in `io`, which changes with almost every tick."""
@@ -34,8 +34,6 @@ MAX_BESIDE = 8
 
 MAX_KEPT = 100
 """Number of programs that are kept under their names."""
-MOVING = frozenset(motions.SIGNATURES)
-"""Functions that move the arm."""
 
 
 class _Running(NamedTuple):
@@ -134,10 +132,8 @@ class ProgramPlayer:
             return
         against = self.arm.hear(event)
         if event.kind == "protective_stop" and self._main is not None:
-            self.state = "PAUSED"
-        elif event.kind == "safety_stop" and event.category != 2:
-            self.end()
-        elif against and self._main is not None:
+            self._wait()
+        elif (event.kind == "safety_stop" and event.category != 2) or (against and self._main is not None):
             self.end()
 
     def end(self) -> None:
@@ -252,12 +248,18 @@ class ProgramPlayer:
 
     def _hold(self) -> None:
         """Pause the program. A planned motion pauses on its path, a guided one is stopped."""
-        if self._motion.activity is Activity.MOVING:
+        if self._motion.activity is Activity.MOVING and self.arm.moves:
             self._motion.pause()
             self._safety.stay_paused()
-        elif self._motion.activity is Activity.GUIDED:
+        elif self._motion.activity is Activity.GUIDED and self.arm.guides:
             self.arm.brake(lambda: self._motion.stop(None, "the program was paused"))
+        self._wait()
+
+    def _wait(self) -> None:
+        """Be paused."""
         self.state = "PAUSED"
+        if self._main is not None:
+            self.line = self._main.machine.line
 
     def _check_running(self, command: str) -> None:
         """Refuse to start a program where the arm has no power or is in a protective stop."""

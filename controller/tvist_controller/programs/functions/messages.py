@@ -1,20 +1,19 @@
 """Functions for messages to people, and for time."""
 
+from tvist_urscript import signature, to_str
+
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, number
 from tvist_controller.programs.arm import ProgramArm, Turns
 from tvist_controller.programs.popups import Popups
 from tvist_plant.plant import PERIOD
-from tvist_urscript import signature, to_text
 
 LONGEST_SLEEP = 1e6
 """[s]"""
 
 SIGNATURES = {
     "textmsg": signature('s1, s2=""', cost=5),
-    "popup": signature(
-        's, title="Popup", warning=False, error=False, blocking=False', blocks=True, cost=10
-    ),
+    "popup": signature('s, title="Popup", warning=False, error=False, blocking=False', blocks=True, cost=10),
     "sync": signature("", blocks=True),
     "sleep": signature("t", blocks=True),
 }
@@ -34,12 +33,12 @@ class MessageFunctions:
 
     def textmsg(self, s1: object, s2: object) -> None:
         """Write a line to the log, which clients of the primary interface get."""
-        text = f"{to_text(s1)}{to_text(s2)}"
+        text = f"{to_str(s1)}{to_str(s2)}"
         self._arm.then(lambda: self._access.emit("text", why=text))
 
     def popup(self, s: object, title: object, warning: object, error: object, blocking: object) -> Turns:
         """Show a message; with `blocking`, wait until somebody closes it."""
-        text, head = to_text(s), to_text(title)
+        text, head = to_str(s), to_str(title)
         kind = "error" if flag("error", error) else "warning" if flag("warning", warning) else "message"
         waits = flag("blocking", blocking)
         yield from self._arm.finish()

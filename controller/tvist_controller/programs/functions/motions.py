@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
 import numpy as np
+from tvist_urscript import Array, Fault, signature
 
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.programs.access import Access
@@ -14,7 +15,6 @@ from tvist_controller.refusal import SLOWEST, RefusalError, check_joints
 from tvist_controller.trajectory import Guided, JointSpeed, ToolSpeed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment
-from tvist_urscript import Array, Fault, signature
 
 MAX_BLEND: Final = 10.0
 LONGEST: Final = 3600.0
@@ -89,7 +89,9 @@ class MotionFunctions:
         )
         yield from self._arm.follow(segment)
 
-    def movec(self, pose_via: object, pose_to: object, a: object, v: object, r: object, mode: object) -> Turns:
+    def movec(
+        self, pose_via: object, pose_to: object, a: object, v: object, r: object, mode: object
+    ) -> Turns:
         """Move the tool on an arc through the position of one pose to another."""
         segment = ArcSegment(
             via=self._pose("pose_via", pose_via),
@@ -122,7 +124,7 @@ class MotionFunctions:
         ticks = _ticks("t", t)
         lookahead, abruptness = positive("lookahead_time", lookahead_time), positive("gain", gain)
 
-        def start(shaped: bool) -> int:  # noqa: FBT001  called by position only
+        def start(shaped: bool) -> int:
             return self._access.guidance.servo(posture, lookahead, abruptness, shaped=shaped)
 
         yield from self._arm.guide(start, lambda: iter([None] * max(ticks, 1)))
@@ -141,7 +143,7 @@ class MotionFunctions:
             speed = min(velocity, max(2.0 * acceleration * far, 0.0) ** 0.5, far / (4.0 * PERIOD))
             return away * (speed / far if far > 0.0 else 0.0), far
 
-        def start(shaped: bool) -> int:  # noqa: FBT001
+        def start(shaped: bool) -> int:
             return guidance.move_tool(course()[0], acceleration, angular, shaped=shaped)
 
         def wait() -> Iterator[None]:
@@ -159,7 +161,7 @@ class MotionFunctions:
         wanted *= min(1.0, *(limit / max(abs(one), 1e-12) for one, limit in zip(wanted, most, strict=True)))
         acceleration = self._within(positive("a", a), "acceleration", self._acceleration)
 
-        def start(shaped: bool) -> int:  # noqa: FBT001
+        def start(shaped: bool) -> int:
             return self._access.guidance.move_joints(wanted, acceleration, shaped=shaped)
 
         yield from self._arm.guide(start, self._wait(t))
@@ -170,7 +172,7 @@ class MotionFunctions:
         acceleration = _tool("a", a, "acceleration")
         angular = acceleration if a_rot is None else positive("aRot", a_rot, 1e5)
 
-        def start(shaped: bool) -> int:  # noqa: FBT001
+        def start(shaped: bool) -> int:
             return self._access.guidance.move_tool(twist, acceleration, angular, shaped=shaped)
 
         yield from self._arm.guide(start, self._wait(t))

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from tvist_urscript import Array, Fault, Pose, signature
 
 from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.programs.access import Access
@@ -10,7 +11,6 @@ from tvist_controller.programs.arguments import a_list, a_pose, is_pose, numbers
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.refusal import RefusalError, check_joints
 from tvist_controller.setup import body
-from tvist_urscript import Array, Fault, Pose, signature
 
 _INVERSE = "x, qnear=None, maxPositionError=1e-10, maxOrientationError=1e-10, tcp=None"
 SIGNATURES = {
@@ -59,7 +59,7 @@ class PoseFunctions:
         return a_pose(self._kinematics.tool_pose(self._posture(q), _tool(tcp)))
 
     def is_within_safety_limits(self, target: object, near: object) -> bool:
-        """Return whether the arm can be at joint positions or at a pose: inside the joints' range, without a collision."""
+        """Return whether the arm can be at a pose or at joint positions: within their range, without a collision."""
         if is_pose(target):
             goal, start = pose("pose", target), self._near(near)
             if not self._reaches(goal, start, None):

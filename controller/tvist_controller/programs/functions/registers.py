@@ -1,11 +1,12 @@
 """Functions for registers and flags."""
 
+from tvist_urscript import signature
+
 from tvist_controller.peripherals import LEAST, MOST
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, integer, number
 from tvist_controller.programs.arm import ProgramArm
 from tvist_protocol.io import BITS, NUMBERS
-from tvist_urscript import signature
 
 FLAGS = 32
 """Number of flags, which only programs have."""
@@ -16,7 +17,10 @@ SIGNATURES = {
         for side in ("input", "output")
         for kind in ("boolean", "integer", "float")
     },
-    **{f"write_output_{kind}_register": signature("address, value") for kind in ("boolean", "integer", "float")},
+    **{
+        f"write_output_{kind}_register": signature("address, value")
+        for kind in ("boolean", "integer", "float")
+    },
     "get_flag": signature("n"),
     "set_flag": signature("n, value"),
 }

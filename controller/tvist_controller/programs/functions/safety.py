@@ -1,10 +1,11 @@
 """Functions for protective stops and watchdogs."""
 
+from tvist_urscript import Fault, signature
+
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import positive, shown
 from tvist_controller.programs.arm import ProgramArm, Turns
 from tvist_controller.programs.watchdogs import Watchdogs
-from tvist_urscript import Fault, signature
 
 SIGNATURES = {
     "protective_stop": signature("", blocks=True, cost=10),

@@ -1,8 +1,10 @@
 """Functions that read the robot's state, as it was in the last tick."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from tvist_urscript import Array, Pose, signature
 
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import a_list, a_pose, integer
@@ -10,7 +12,7 @@ from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import JointSegment
-from tvist_urscript import Array, Pose, signature
+from tvist_protocol.stream import State
 
 _PLAIN = (
     "get_steptime",
@@ -42,6 +44,19 @@ SIGNATURES = {
     "force": signature("", cost=10),
     "get_actual_joint_positions_history": signature("steps=0"),
 }
+
+
+class _Target(NamedTuple):
+    q: list[float]
+    qd: list[float]
+    qdd: list[float]
+
+
+def _target(state: State) -> _Target:
+    """The reference before shaping at the tick of the shaped one, as UR's interfaces report it."""
+    if state.unshaped_q is None or state.unshaped_qd is None or state.unshaped_qdd is None:
+        return _Target(state.target_q, state.target_qd, state.target_qdd)
+    return _Target(state.unshaped_q, state.unshaped_qd, state.unshaped_qdd)
 
 
 class StateFunctions:
@@ -79,15 +94,15 @@ class StateFunctions:
 
     def get_target_joint_positions(self) -> Array:
         """Return the joint positions that the program asks for at present, before shaping [rad]."""
-        return a_list(self._access.latest().reference_q)
+        return a_list(_target(self._access.latest()).q)
 
     def get_target_joint_speeds(self) -> Array:
         """Return the joint velocities that the program asks for at present [rad/s]."""
-        return a_list(self._access.target_speeds())
+        return a_list(_target(self._access.latest()).qd)
 
     def get_target_joint_accelerations(self) -> Array:
         """Return the joint accelerations that the program asks for at present [rad/s^2]."""
-        return a_list(self._access.target_accelerations())
+        return a_list(_target(self._access.latest()).qdd)
 
     def get_actual_tcp_pose(self) -> Pose:
         """Return the pose of the tool by the measured joint positions."""
@@ -100,11 +115,12 @@ class StateFunctions:
 
     def get_target_tcp_pose(self) -> Pose:
         """Return the pose of the tool that the program asks for at present."""
-        return a_pose(self._kinematics.tool_pose(np.array(self._access.latest().reference_q)))
+        return a_pose(self._kinematics.tool_pose(np.array(_target(self._access.latest()).q)))
 
     def get_target_tcp_speed(self) -> Array:
         """Return the velocity of the tool that the program asks for at present [m/s, rad/s]."""
-        return self._speed(self._access.latest().reference_q, self._access.target_speeds())
+        target = _target(self._access.latest())
+        return self._speed(target.q, target.qd)
 
     def get_actual_tool_flange_pose(self) -> Pose:
         """Return the pose of the flange by the measured joint positions."""

@@ -1,19 +1,17 @@
 """Functions for digital and analogue inputs and outputs."""
 
+from tvist_urscript import Array, Fault, signature
+
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, integer, number, shown
 from tvist_controller.programs.arm import OWN_TOKEN, ProgramArm
 from tvist_protocol.io import SetIo
-from tvist_urscript import Array, Fault, signature
 
 STANDARD, CONFIGURABLE, TOOL = range(8), range(8, 16), range(16, 18)
 """Bits of the digital terminals."""
 
 SIGNATURES = {
-    **{
-        f"set_{kind}digital_out": signature("n, b")
-        for kind in ("", "standard_", "configurable_", "tool_")
-    },
+    **{f"set_{kind}digital_out": signature("n, b") for kind in ("", "standard_", "configurable_", "tool_")},
     **{
         f"get_{kind}digital_{side}": signature("n")
         for kind in ("", "standard_", "configurable_", "tool_")
@@ -173,7 +171,7 @@ class TerminalFunctions:
         if any(bool(item) for item in outputs.items):
             raise Fault("set_runstate_outputs: outputs that show whether a program runs are not simulated")
 
-    def _set(self, bit: int, on: bool) -> None:  # noqa: FBT001
+    def _set(self, bit: int, on: bool) -> None:
         command = SetIo(token=OWN_TOKEN, digital_output_mask=1 << bit, digital_outputs=int(on) << bit)
         self._arm.then(lambda: self._terminals.set_outputs(command))
 

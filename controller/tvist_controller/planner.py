@@ -1,63 +1,20 @@
-"""Plans for commands that take longer than a tick can wait."""
-
-from dataclasses import dataclass
+"""Planner of all commands that take longer than a tick can wait."""
 
 from tvist_controller.planning.basis import FilterBasis, MotionBasis, PlanBasis, ScriptBasis, ToolBasis
 from tvist_controller.planning.filter_planner import FilterPlanner, PlannedFilter
-from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
+from tvist_controller.planning.move_planner import MovePlanner
 from tvist_controller.planning.path_planner import PathPlanner
+from tvist_controller.planning.plan import MOTIONS, QUESTIONS, SCRIPTS, Basis, Found, Plan
 from tvist_controller.planning.reachable import Reachable
-from tvist_controller.planning.script_planner import ScriptPlanner
+from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.refusal import RefusalError, check_content, payload_of
 from tvist_controller.setup import Setup
 from tvist_protocol import commands as c
 from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
 from tvist_protocol.motions import MoveC, MoveL, MovePath
 from tvist_protocol.programs import ProgramLoad, ProgramRun
-from tvist_protocol.replies import Posture, ToolPose
 from tvist_protocol.simulation import SimulationReset
 from tvist_shaping.base import Filter
-from tvist_urscript import Script
-
-MOTIONS = (c.MoveJ, MoveL, MoveC, MovePath)
-"""Commands for motions, which are planned on the state at rest."""
-QUESTIONS = (InverseKinematics, ForwardKinematics)
-"""Questions about the tool's kinematics."""
-SCRIPTS = (ProgramLoad, ProgramRun)
-"""Commands with the text of a program, which is compiled."""
-PLANNED = (*MOTIONS, *QUESTIONS, *SCRIPTS, c.SetShaper, c.SetEstimator, c.SetPayload, SimulationReset)
-"""Commands that are planned."""
-
-Found = PlannedMove | PlannedFilter | Filter | Posture | ToolPose | Script | None
-"""What a plan may contain; None if nothing has to change."""
-
-
-Basis = FilterBasis | MotionBasis | ToolBasis | ScriptBasis
-"""State that a plan was made on."""
-
-
-@dataclass(frozen=True)
-class Plan:
-    """The outcome of a command, valid while the state that it was planned on holds."""
-
-    basis: Basis | None
-    """State that it was planned on; None if no point-to-point motion may begin."""
-    found: Found | RefusalError
-    """What was planned, or why the command is refused."""
-
-    def holds(self, now: PlanBasis) -> bool:
-        """Return whether the plan is valid for the present state."""
-        match self.basis:
-            case None:
-                return now.motion is None
-            case ScriptBasis():
-                return True
-            case FilterBasis() as planned:
-                return planned == now.filter
-            case ToolBasis() as planned:
-                return planned.tcp == now.tool.tcp
-            case planned:
-                return now.motion is not None and planned.agrees(now.motion)
 
 
 class Planner:
@@ -72,7 +29,7 @@ class Planner:
         self.filters = FilterPlanner(setup)
         self._moves = MovePlanner(setup, self.filters)
         self._reachable = Reachable(setup.description)
-        self._scripts = ScriptPlanner(setup.description)
+        self._scripts = ScriptCompiler(setup.description)
         self._paths = PathPlanner(setup, self.filters, self._moves, self._reachable)
 
     def rehearse(self) -> None:
@@ -97,20 +54,21 @@ class Planner:
             return Plan(on, refusal)
 
     def _find(self, command: c.Command, on: Basis | None) -> Found:
+        found: Found = None
         match on:
             case MotionBasis() if isinstance(command, c.MoveJ):
-                return self._moves.move(command, on)
+                found = self._moves.move(command, on)
             case MotionBasis() if isinstance(command, MoveL | MoveC | MovePath):
-                return self._paths.plan(command, on)
+                found = self._paths.plan(command, on)
             case ToolBasis() if isinstance(command, InverseKinematics):
-                return self._reachable.posture(command, on)
+                found = self._reachable.posture(command, on)
             case ToolBasis() if isinstance(command, ForwardKinematics):
-                return self._reachable.pose(command, on)
+                found = self._reachable.pose(command, on)
             case ScriptBasis() if isinstance(command, ProgramLoad | ProgramRun):
-                return self._scripts.compile(command)
+                found = self._scripts.compile(command)
             case FilterBasis():
-                return self._filter(command, on)
-        return None
+                found = self._filter(command, on)
+        return found
 
     def _filter(self, command: c.Command, on: FilterBasis) -> PlannedFilter | Filter | None:
         filters = self.filters

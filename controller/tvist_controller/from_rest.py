@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from tvist_controller.control.inverse_dynamics import InverseDynamics
+from tvist_controller.planner import Planner
 from tvist_controller.planning.basis import FilterBasis, MotionBasis, PlanBasis, ToolBasis
 from tvist_controller.planning.move_planner import PlannedMove
-from tvist_controller.planning.planner import Planner
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup, body
 from tvist_protocol.commands import MoveJ

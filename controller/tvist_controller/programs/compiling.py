@@ -1,14 +1,15 @@
 """Programs of one robot, compiled from their text."""
 
+from tvist_urscript import Script, ScriptError, compile_script
+
 from tvist_controller.programs.built_in import built_in
-from tvist_controller.programs.library import SIGNATURES
+from tvist_controller.programs.library import MOVING, SIGNATURES
 from tvist_controller.refusal import RefusalError
 from tvist_plant.description import RobotDescription
 from tvist_protocol.programs import ProgramLoad, ProgramRun
-from tvist_urscript import Script, ScriptError, compile_script
 
 
-class ScriptPlanner:
+class ScriptCompiler:
     """Compiles programs, which takes many ticks for long ones.
 
     Args:
@@ -35,7 +36,16 @@ class ScriptPlanner:
             if text is None:
                 return None
         try:
-            return compile_script(text, SIGNATURES)
+            script = compile_script(text, SIGNATURES)
         except ScriptError as error:
-            where = f"text:{error.line}:{error.column}"
-            raise RefusalError("script_error", where, error.text) from error
+            raise _refusal(error.line, error.column, error.text) from error
+        moves = script.calls & MOVING
+        if script.secondary and moves:
+            raise _refusal(
+                1, 1, f"a secondary program cannot move the arm: it calls {', '.join(sorted(moves))}"
+            )
+        return script
+
+
+def _refusal(line: int, column: int, text: str) -> RefusalError:
+    return RefusalError("script_error", f"text:{line}:{column}", text)

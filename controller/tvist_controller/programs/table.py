@@ -1,0 +1,76 @@
+"""`python -m tvist_controller.programs.table`: prints docs/reference/urscript-functions.md."""
+
+from inspect import getdoc
+from types import ModuleType
+
+from tvist_controller.programs.functions import (
+    messages,
+    motions,
+    poses,
+    registers,
+    safety,
+    settings,
+    state,
+    terminals,
+    unsimulated,
+)
+
+HEAD = """# Functions of programs
+
+Made by `python -m tvist_controller.programs.table > docs/reference/urscript-functions.md`.
+
+What programs in URScript can call, besides [the functions of the language](urscript.md). Lengths are metres, angles
+radians, times seconds; poses are of the tool centre point in the base frame. Parameters with a default may be left out,
+and any may be given by name. A function that *waits* lets time pass; all others return in the same tick. Bad arguments
+end the program with an error at the place of the call.
+
+A move with a radius (`r`) is blended into the next one. The call then returns at once, and the program runs on to that
+next move; what it writes to outputs, registers and the log on the way is done when the arm begins the blend. What it
+reads is of the present. A function that waits ends the path: the arm then stops at the point of the last move.
+"""
+SUBJECTS: tuple[tuple[str, ModuleType, type], ...] = (
+    ("Motions", motions, motions.MotionFunctions),
+    ("Kinematics and dynamics", poses, poses.PoseFunctions),
+    ("State", state, state.StateFunctions),
+    ("Settings", settings, settings.SettingFunctions),
+    ("Registers and flags", registers, registers.RegisterFunctions),
+    ("Inputs and outputs", terminals, terminals.TerminalFunctions),
+    ("Messages and time", messages, messages.MessageFunctions),
+    ("Safety", safety, safety.SafetyFunctions),
+)
+
+
+def page() -> str:
+    """The whole page."""
+    parts = [HEAD]
+    for title, module, functions in SUBJECTS:
+        rows = [
+            (f"`{name}({one})`", "waits" if one.blocks else "", _what(functions, name))
+            for name, one in module.SIGNATURES.items()
+        ]
+        parts.append(f"## {title}\n\n{_table(('function', '', 'what'), rows)}\n")
+    rows = [
+        (f"`{name}`", what)
+        for name, (_, what) in sorted(unsimulated.SUBJECTS.items(), key=lambda row: row[::-1])
+    ]
+    idle = ", ".join(f"`{name}`" for name in unsimulated.IDLE)
+    parts.append(
+        "## Not simulated\n\nThese end the program with an error that says so. "
+        f"{idle} succeed, since what they set or end is never going on.\n\n{_table(('function', 'subject'), rows)}\n"
+    )
+    return "\n".join(parts)
+
+
+def _what(functions: type, name: str) -> str:
+    """First paragraph of a function's description."""
+    text = getdoc(getattr(functions, name)) or ""
+    return " ".join(text.partition("\n\n")[0].split())
+
+
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    lines = [head, ("---",) * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+if __name__ == "__main__":
+    print(page(), end="")  # noqa: T201  its purpose

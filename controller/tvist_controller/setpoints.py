@@ -1,0 +1,71 @@
+"""Set-points of the client in control, which are not answered."""
+
+import numpy as np
+
+from tvist_controller.counters import Counters
+from tvist_controller.motion import MotionControl
+from tvist_controller.refusal import RefusalError, check_joints
+from tvist_controller.session import Session
+from tvist_protocol.commands import Setpoint
+from tvist_protocol.simulation import SimulationStep
+
+
+class Setpoints:
+    """Passes set-points to the stream; those that are not accepted are counted and dropped.
+
+    Args:
+        session: The lease.
+        motion: The robot's motion.
+        counters: Counts them.
+    """
+
+    def __init__(self, session: Session, motion: MotionControl, counters: Counters) -> None:
+        self._session, self._motion, self._counters = session, motion, counters
+        self._description = motion.cycle.description
+
+    def receive(self, setpoint: Setpoint, now: float) -> None:
+        """Take a set-point.
+
+        Args:
+            setpoint: The set-point.
+            now: Time [s].
+        """
+        lease = self._session.lease
+        if lease is None or setpoint.token != lease.token:
+            self._count_refused()  # another client's: neither the stream nor the journal is concerned
+            return
+        try:
+            check_joints(setpoint.q, self._description)
+        except RefusalError as refusal:
+            self.refuse(refusal.reply.why)
+            return
+        if not self._motion.streaming:
+            self.refuse("no stream is running")
+            return
+        self._counters.setpoints_received += 1
+        self._session.renew(setpoint.token, now)
+        self._motion.streams.offer(setpoint.sequence, np.array(setpoint.q, dtype=float), now)
+
+    def check(self, command: SimulationStep) -> None:
+        """Check the set-points in a step.
+
+        Raises:
+            RefusalError: No stream is running, or they are not valid.
+        """
+        if command.setpoints is not None and not self._motion.streaming:
+            raise RefusalError("wrong_mode", "setpoints", "no stream is running: send servo_start first")
+        setpoints = command.setpoints or ()
+        if len(setpoints) > command.ticks:
+            why = f"setpoints has {len(setpoints)} entries; it must have one per tick, and ticks is {command.ticks}"
+            raise RefusalError("out_of_range", "setpoints", why, command.ticks)
+        for number, setpoint in enumerate(setpoints):
+            check_joints(setpoint.q, self._description, f"setpoints[{number}].q")
+
+    def refuse(self, why: str) -> None:
+        """Count and drop a set-point of the client in control; if the stream falls silent, its end gives the reason."""
+        self._count_refused()
+        self._motion.streams.refuse(why)
+
+    def _count_refused(self) -> None:
+        self._counters.setpoints_received += 1
+        self._counters.setpoints_refused += 1

@@ -1,0 +1,54 @@
+"""Robots that run programs in URScript, for the tests."""
+
+from tvist_protocol.programs import ProgramRun
+
+from .robots import Robot
+
+URSIM = (-1.60, -1.727, -2.203, -0.808, 1.595, -0.031)
+"""A posture away from singular ones, with room around it."""
+
+
+def script(*lines: str, name: str = "prog") -> str:
+    """A program of these lines."""
+    return "\n".join((f"def {name}():", *(f"  {line}" for line in lines), "end", ""))
+
+
+def a_robot(**changes) -> Robot:
+    """A robot that programs move well."""
+    return Robot(**({"q": URSIM, "shaper": "none"} | changes))
+
+
+def start(robot: Robot, *lines: str, name: str = "prog"):
+    """Send a program; return the reply."""
+    return robot.send(ProgramRun, text=script(*lines, name=name))
+
+
+def playing(robot: Robot) -> bool:
+    """Whether the program is under way."""
+    return robot.controller.programs.state == "PLAYING"
+
+
+def finish(robot: Robot, most: int = 20_000) -> Robot:
+    """Tick until the program has ended or is paused."""
+    for _ in range(most):
+        robot.tick()
+        if not playing(robot):
+            return robot
+    raise AssertionError("the program goes on")
+
+
+def run(robot: Robot, *lines: str) -> Robot:
+    """Run a program to its end."""
+    start(robot, *lines)
+    return finish(robot)
+
+
+def said(robot: Robot) -> list[str]:
+    """Texts that programs have written."""
+    return [event.why for event in robot.events if event.kind == "text"]
+
+
+def failure(robot: Robot):
+    """The event of the error that ended a program; None if there was none."""
+    found = [event for event in robot.events if event.kind == "warning" and event.line is not None]
+    return found[-1] if found else None
