@@ -4,7 +4,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from tvist_urscript import Array, Pose, signature
 
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import a_list, a_pose, integer
@@ -13,6 +12,7 @@ from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import JointSegment
 from tvist_protocol.stream import State
+from tvist_urscript import Array, Pose, signature
 
 _PLAIN = (
     "get_steptime",
