@@ -92,6 +92,12 @@ class State(Struct, frozen=True, kw_only=True, tag_field="type", tag="state", gc
     """Number of control periods since the start that began too late."""
     shaper_clipped: bool = False
     """Whether the shaper cannot meet its specification: it would need a longer delay line, or leaves more vibration."""
+    unshaped_q: list[float] | None = None
+    """Reference before shaping at the tick of `target_q`, a tick before `reference_q`; null: the same [rad]."""
+    unshaped_qd: list[float] | None = None
+    """Velocity of the reference before shaping; null: the same as `target_qd` [rad/s]."""
+    unshaped_qdd: list[float] | None = None
+    """Acceleration of the reference before shaping; null: the same as `target_qdd` [rad/s²]."""
 
 
 class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc=False):
