@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from tvist_urscript import Fault
 
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
@@ -11,6 +10,7 @@ from tvist_controller.kinematics.tool import ToolKinematics, turn
 from tvist_controller.motion import MotionControl
 from tvist_controller.paths.poses import placement, placement_vector
 from tvist_plant.description import RobotDescription
+from tvist_urscript import Fault
 
 PoseNumbers = tuple[float, float, float, float, float, float]
 

@@ -2,8 +2,6 @@
 
 from typing import NamedTuple
 
-from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
-
 from tvist_controller.command_row import Call, Row
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arm import ProgramArm
@@ -25,6 +23,7 @@ from tvist_protocol.programs import (
 )
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
+from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
 
 TOLD_EVERY = 50
 """Ticks between two changes of the line in `io`, which changes with almost every tick."""
@@ -143,7 +142,7 @@ class ProgramPlayer:
 
     def stop_moving(self) -> None:
         """End a program that may move the arm, so that no motion begins after a stop."""
-        if self.state == "PLAYING" and self._loaded is not None and self._loaded.calls & MOVING:
+        if self.state == "PLAYING" and self._loaded is not None and self._loaded.used & MOVING:
             self.end()
 
     def _watch(self, tick: int) -> None:
@@ -167,7 +166,7 @@ class ProgramPlayer:
         if running not in self._all:
             return
         self._close(running)
-        if running.script.calls & MOVING and self._motion.activity in {Activity.GUIDED, Activity.MOVING}:
+        if running.script.used & MOVING and self._motion.activity in {Activity.GUIDED, Activity.MOVING}:
             self._motion.stop(None, "the program has ended")
 
     def _close(self, running: _Running) -> None:
@@ -189,7 +188,7 @@ class ProgramPlayer:
         return any(
             (id(running.machine), number) == thread
             for running in self._all
-            for number in running.machine.threads
+            for number in running.machine.living
         )
 
     # ------------------------------------------------------------------ commands

@@ -1,12 +1,11 @@
 """Functions for messages to people, and for time."""
 
-from tvist_urscript import signature, to_str
-
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, number
 from tvist_controller.programs.arm import ProgramArm, Turns
 from tvist_controller.programs.popups import Popups
 from tvist_plant.plant import PERIOD
+from tvist_urscript import signature, to_str
 
 LONGEST_SLEEP = 1e6
 """[s]"""

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
 import numpy as np
-from tvist_urscript import Array, Fault, signature
 
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.programs.access import Access
@@ -15,6 +14,7 @@ from tvist_controller.refusal import SLOWEST, RefusalError, check_joints
 from tvist_controller.trajectory import Guided, JointSpeed, ToolSpeed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment
+from tvist_urscript import Array, Fault, signature
 
 MAX_BLEND: Final = 10.0
 LONGEST: Final = 3600.0
