@@ -86,4 +86,5 @@ def geometry_of(description: RobotDescription) -> Geometry:
         ],
         payload_radius=collision.payload_radius,
         floor=collision.floor,
+        has_floor=collision.has_floor,
     )

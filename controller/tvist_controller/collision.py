@@ -37,7 +37,7 @@ class Meeting:
 
 
 class CollisionModel:
-    """The arm's bodies, its declared payload and the floor.
+    """The arm's bodies, its declared payload and the floor, if there is one.
 
     Args:
         description: The robot; if it has no bodies, there are no collisions.
@@ -207,7 +207,7 @@ class CollisionModel:
             names = frozenset((self._names[first], self._names[second]))
             if second - first > 1 and names not in apart:
                 self._geometry.addCollisionPair(pin.CollisionPair(first, second))
-        if not self._names:
+        if not self._names or not collision.has_floor:
             return
         floor = coal.Halfspace(np.array([0.0, 0.0, 1.0]), collision.floor)
         self._geometry.addGeometryObject(pin.GeometryObject(FLOOR, 0, pin.SE3.Identity(), floor))

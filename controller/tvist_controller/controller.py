@@ -74,6 +74,7 @@ class Controller:
         self.cycle = ControlCycle(
             setup.description, tvist, q=np.array(setup.q, dtype=float), declared=body(setup.payload),
             carried=body(setup.carried or setup.payload), seed=setup.seed, plant=plant,
+            compensate_sag=setup.compensate_sag,
         )  # fmt: skip
         if setup.truth:
             truth_of(self.cycle.plant)  # raises now rather than at the first tick if the plant has no truth

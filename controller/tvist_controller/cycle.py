@@ -60,6 +60,7 @@ class ControlCycle:
         carried: Payload that the arm carries.
         seed: Seed of the arm's noise and gear errors.
         plant: Plant to control; None for the flexible arm of the description.
+        compensate_sag: Whether the drives lead by the twist of the gears under gravity.
 
     Raises:
         ValueError: The plant cannot start there, or its measurement has the wrong shape.
@@ -75,12 +76,13 @@ class ControlCycle:
         carried: Payload,
         seed: int,
         plant: Plant | None = None,
+        compensate_sag: bool = False,
     ) -> None:
         self.description = description
         self.line_filter = LineFilter(tvist, arm_limits(description))
         self._plant: Plant = FlexibleArm(description, carried) if plant is None else plant
         self.inverse_dynamics = InverseDynamics(description, declared)
-        self._joint_controllers = JointControllers(description, PERIOD)
+        self._joint_controllers = JointControllers(description, PERIOD, compensate_sag=compensate_sag)
         self._shaped = ShapedReference(q, PERIOD)
         self.trajectory: Trajectory = Rest(q)
         self.reference = q
@@ -272,9 +274,9 @@ class ControlCycle:
         self.inverse_dynamics.settle()
         self.line_filter.begin(self.tvist, q)
         self._shaped.reset(q)
-        self._joint_controllers.reset()
         still = np.zeros_like(q)
         torque = self.inverse_dynamics.gravity(q)
+        self._joint_controllers.reset(torque, torque)
         command = self._joint_controllers.command(Target(q, still, still), torque, torque)
         measured = self._plant.reset(command, payload=carried, seed=seed)
         self.standing = Sample(q, Target(q, still, still), torque, command.torque, measured)

@@ -48,6 +48,10 @@ class Setup:
     """Whether to publish what a real robot cannot measure."""
     own_shapers: tuple[OwnShaper, ...] = ()
     """Shapers from files, available by name beside those that come with the package."""
+    compensate_sag: bool = False
+    """Whether the drives lead by the twist of the gears under gravity, so that the arm rests on its target."""
+    shape_servo: bool = False
+    """Whether `servoj`, `speedj` and `speedl` of programs are shaped where they begin at rest."""
 
     @cached_property
     def registry(self) -> Registry:
@@ -99,6 +103,8 @@ class Setup:
             "clock": self.clock,
             "truth": self.truth,
             "own_shapers": [msgspec.to_builtins(own.recorded) for own in self.own_shapers],
+            "compensate_sag": self.compensate_sag,
+            "shape_servo": self.shape_servo,
         }
 
     @classmethod
@@ -125,6 +131,8 @@ class Setup:
                     own_shapers=tuple(own_shapers),
                 ),
                 **{key: content[key] for key in ("name", "shaper", "seed", "clock", "truth")},
+                # Recordings from before these options existed do not have them.
+                **{key: content[key] for key in ("compensate_sag", "shape_servo") if key in content},
             )
         except KeyError as error:
             raise ValueError(f"initial setup in the recording: {error.args[0]} is missing") from error

@@ -42,3 +42,5 @@ class Geometry(Struct, frozen=True, kw_only=True, gc=False):
     """Radius of the capsule from the flange through the centre of mass of the payload to twice its distance [m]."""
     floor: float = 0.0
     """Height of the floor [m]."""
+    has_floor: bool = True
+    """Whether there is a floor, which motions keep clear of."""

@@ -172,6 +172,8 @@ class Collision(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     floor: Number = 0.0
     """Height of the floor [m]; the first two bodies stand on it and cannot collide with it."""
+    has_floor: bool = True
+    """Whether there is a floor."""
     payload_radius: Positive = 0.05
     """Radius of the capsule from the flange through the payload's centre to twice its distance [m]."""
     apart: tuple[tuple[str, str], ...] = ()
@@ -205,6 +207,11 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
         return msgspec.structs.replace(
             self, sensors=Sensors(accelerometer_noise=0.0, encoder_step=QUIET_STEP)
         )
+
+    def without_floor(self) -> "RobotDescription":
+        """Return the same arm without a floor that it could collide with."""
+        replace = msgspec.structs.replace
+        return replace(self, collision=replace(self.collision, has_floor=False))
 
     def clean(self) -> "RobotDescription":
         """Return the same arm without noise, gear error and Coulomb friction (its linear equivalent stays)."""

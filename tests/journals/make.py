@@ -254,9 +254,13 @@ def asked(host, port, *lines, waits=0.2):
     return said
 
 
+UR = ("--profile", "real", "--start", "Q1", "--ur-address")
+"""Options that open UR's interfaces, without the profile of UR's simulator."""
+
+
 def live_programs_of_the_dashboard(path):
     address = "127.20.251.7"
-    with robot(path, "--ur", "--ur-address", address, clock="realtime") as hand:
+    with robot(path, *UR, address, clock="realtime") as hand:
         hand.do("release_control")
         asked(address, 29999, "load paper.urp", "play", "programState")
         hand.wait(1500)
@@ -273,7 +277,7 @@ def live_rtde_inputs(path):
     import rtde_io
 
     address = "127.20.251.8"
-    with robot(path, "--ur", "--ur-address", address, "--shaper", "auto", clock="realtime") as hand:
+    with robot(path, *UR, address, "--shaper", "auto", clock="realtime") as hand:
         hand.do("release_control")
         io = rtde_io.RTDEIOInterface(address)
         asked(address, 29999, "load paper.urp", "play")

@@ -4,7 +4,7 @@ import dataclasses
 import ipaddress
 import tempfile
 import tomllib
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 from msgspec import Meta, Struct
 from msgspec.structs import replace
@@ -20,10 +20,12 @@ from tvist_protocol.info import Clock
 from tvist_protocol.values import RobotName, Seed
 from tvist_server.fleet import members
 from tvist_server.initial import read_state, shaped_by
+from tvist_server.profiles import PLAIN, PROFILES, Profile, ProfileName
 from tvist_server.ur_ports import InterfaceName, UrPorts
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 DEFAULT_NAME = "ur5e"
+T = TypeVar("T")
 _INSTEAD = {
     "name": "leave name out, since several robots are named after their files",
     "robot": "add it to the list of robots",
@@ -36,7 +38,7 @@ class ConfigError(ValueError):
 
 
 class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Options of `tvist serve`; every key is optional."""
+    """Options of `tvist serve`; every key is optional. What is None depends on the profile, if not stated otherwise."""
 
     name: RobotName = DEFAULT_NAME
     """Name of the robot on the network."""
@@ -50,12 +52,16 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Folder with certificates and roles, made by `tvist keys`; endpoints are then tls/…"""
     insecure: bool = False
     """Accept remote connections without TLS and do not authenticate clients; anyone can move the robot."""
+    profile: ProfileName | None = None
+    """Set of defaults: `ursim` is like UR's simulator, `real` like a robot; default: `ursim` with `ur`, else none."""
     payload: Annotated[float, Meta(ge=0, le=100)] | None = None
-    """Mass of the disc on the flange, both declared and carried [kg]; default: the robot file's payload."""
+    """Mass of the disc on the flange, both declared and carried [kg]."""
     overload: bool = False
     """Start even if the declared payload exceeds the robot's rating."""
-    shaper: str = "zv"
+    shaper: str | None = None
     """Initial shaper: its name, or FILE.py:NAME for your own."""
+    shape_servo: bool = False
+    """Shape `servoj`, `speedj` and `speedl` of programs where they begin at rest."""
     calibration: str | None = None
     """Name of a calibration that comes with the package, or path of one; "none" for a robot yet to be identified;
     default: the one that comes with the package for this robot."""
@@ -65,7 +71,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Simulation speed relative to real time [-]; only with the clock realtime."""
     realtime_priority: bool = False
     """Run the control loop with real-time priority, if the system permits it; only with the clock realtime."""
-    start: str | tuple[float, ...] = "Q1"
+    start: str | tuple[float, ...] | None = None
     """Initial pose: a name from the robot file, or joint angles [rad]."""
     state: str | None = None
     """TOML or JSON file with the initial state: any of q, payload (the carried one), mode, shaper, seed."""
@@ -77,8 +83,12 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Folder to save the last second before a failure of the simulated arm to."""
     truth: bool = False
     """Publish what a real robot cannot measure, too."""
-    quiet: bool = False
+    quiet: bool | None = None
     """Simulate sensors without noise and angles with an encoder's resolution: at rest, no value changes."""
+    floor: bool | None = None
+    """Keep the arm clear of the floor of the robot file; false: there is no floor."""
+    compensate_sag: bool | None = None
+    """Let the drives lead by the twist of the gears under gravity, so that the arm rests on its target."""
     ur: bool = False
     """Open UR's own interfaces, too."""
     ur_address: str = "127.0.0.1"
@@ -151,23 +161,24 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             UserFileError: A file that is named has the wrong kind of content.
         """
         try:
-            description = load(self.robot)
+            chosen, description = self.profile_in_force, load(self.robot)
+            profile = PLAIN if chosen is None else PROFILES[chosen]
             calibration = self._calibration(description.robot.model)
             setup = Setup(
-                description=description,
-                q=self._start(description),
-                payload=paper_payload(description, self.payload),
+                description=self._described(description, profile),
+                q=self._start(description, profile),
+                payload=paper_payload(description, _either(self.payload, profile.payload)),
                 calibration=calibration,
                 name=self.name,
                 seed=self.seed,
                 clock=self.clock,
                 truth=self.truth,
+                compensate_sag=_either(self.compensate_sag, profile.compensate_sag),
+                shape_servo=self.shape_servo,
             )
-            setup = shaped_by(setup, self.shaper)
+            setup = shaped_by(setup, _either(self.shaper, profile.shaper))
             if self.state is not None:
                 setup = read_state(self.state).on(setup)
-            if self.quiet:
-                setup = dataclasses.replace(setup, description=setup.description.quiet())
             setup.check()
         except user_file.UserFileError:
             raise
@@ -185,6 +196,17 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             )
         return setup
 
+    @property
+    def profile_in_force(self) -> ProfileName | None:
+        """Profile that gives the defaults; None for those of a robot without a profile."""
+        return self.profile or ("ursim" if self.ur else None)
+
+    def _described(self, description: RobotDescription, profile: Profile) -> RobotDescription:
+        """Return the robot with the sensors and the floor that it is to have."""
+        if _either(self.quiet, profile.quiet):
+            description = description.quiet()
+        return description if _either(self.floor, profile.floor) else description.without_floor()
+
     def _calibration(self, model: str) -> Calibration | None:
         """Load the calibration that is named or, if none is, the one that comes with the package for this model."""
         name = calibrations.default_for(model) if self.calibration is None else self.calibration
@@ -194,18 +216,24 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             )
         return None if name == "none" else calibrations.load(name)
 
-    def _start(self, description: RobotDescription) -> tuple[float, ...]:
-        if not isinstance(self.start, str):
-            return self.start
+    def _start(self, description: RobotDescription, profile: Profile) -> tuple[float, ...]:
+        start = _either(self.start, profile.start(description) or "Q1")
+        if not isinstance(start, str):
+            return start
         for name, pose in description.poses.items():
-            if name.lower() == self.start.strip().lower():
+            if name.lower() == start.strip().lower():
                 return pose
         try:
-            return tuple(float(angle) for angle in self.start.split(","))
+            return tuple(float(angle) for angle in start.split(","))
         except ValueError:
             known = ", ".join(description.poses)
-            why = f"start is {self.start.strip()!r}: must be one of {known}, or angles separated by commas"
+            why = f"start is {start.strip()!r}: must be one of {known}, or angles separated by commas"
             raise ConfigError(why) from None
+
+
+def _either(given: T | None, default: T) -> T:
+    """Return what is given, or else the default."""
+    return default if given is None else given
 
 
 def from_mapping(content: object, source: str) -> ServeConfig:

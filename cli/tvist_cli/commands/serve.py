@@ -4,7 +4,9 @@ import asyncio
 import os
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.misuse import lower
@@ -22,9 +24,11 @@ def serve(
     listen: list[str] | None = None,
     security: str | None = None,
     insecure: bool = False,
+    profile: str | None = None,
     payload: float | None = None,
     overload: bool = False,
     shaper: str | None = None,
+    shape_servo: bool = False,
     calibration: str | None = None,
     clock: str | None = None,
     speed: float | None = None,
@@ -35,7 +39,9 @@ def serve(
     record: str | None = None,
     dump: str | None = None,
     truth: bool = False,
-    quiet: bool = False,
+    quiet: Annotated[bool | None, Parameter(negative="--no-quiet")] = None,
+    floor: Annotated[bool | None, Parameter(negative="--no-floor")] = None,
+    compensate_sag: Annotated[bool | None, Parameter(negative="--no-compensate-sag")] = None,
     ur: bool = False,
     ur_address: str | None = None,
     ur_port: list[str] | None = None,
@@ -52,12 +58,18 @@ def serve(
         security: Folder made by tvist keys. The endpoint is then tls/ADDRESS:PORT, and clients without a role have no
             access.
         insecure: Accept remote connections without TLS and do not authenticate clients; anyone can move the robot.
+        profile: Set of defaults. ursim is like UR's simulator: it starts an arm of UR's kind in URSim's posture, with a
+            payload of 0 kg, shaper none, --quiet, --no-floor and --compensate-sag. real starts in the same posture and
+            is otherwise like a robot: it has the robot file's payload, noise, a floor, sag and shaper zv. Options
+            that you give take precedence [ursim with --ur; without it, the defaults named at each option].
         payload: Mass of the disc on the flange in kg, both carried and declared to the controller [that of the robot
             file; 5 for the ur5e].
         overload: Start even if the payload exceeds the robot's rating. The drives may not hold it; the robot then makes
             a protective stop.
         shaper: Any name that tvist shapers lists, such as none, zv or ei3; or auto, short or auto-target; or
             FILE.py:NAME, which runs that file and adds your own shaper to those that clients can choose [zv].
+        shape_servo: Shape servoj, speedj and speedl of programs too, where they begin at rest. Without this option they
+            bypass the shaper, since their client usually closes a loop, to which the shaper would add its delay.
         calibration: Name of a calibration that comes with the package, or path of a calibration file; none for a robot
             that is yet to be identified [the one that comes with the package for this robot].
         clock: realtime, or lockstep, in which a client steps the simulation [realtime].
@@ -72,8 +84,12 @@ def serve(
         truth: Publish what a real robot cannot measure, such as the arm's deflection, on tvist/NAME/truth and in the
             recording.
         quiet: Simulate sensors without noise and angles with an encoder's resolution, for clients that wait until
-            values stop changing.
-        ur: Open UR's own interfaces as well: RTDE, real-time client, dashboard, primary and secondary.
+            values stop changing [off].
+        floor: Refuse motions that bring the arm or its payload to the floor of the robot file [on].
+        compensate_sag: Let the drives lead by the angle that gravity twists the gears, so that the measured joint
+            angles at rest are the target angles [off].
+        ur: Open UR's own interfaces as well: RTDE, real-time client, dashboard, primary and secondary. The profile is
+            then ursim, if you give no other.
         ur_address: IP address on which UR's interfaces listen; each further robot uses the next address [127.0.0.1].
         ur_port: Change the port of one UR interface, repeatable: rtde=31004, or dashboard=off to close it. The others
             are primary, secondary, realtime, primary_read_only, secondary_read_only and realtime_read_only.
@@ -81,10 +97,12 @@ def serve(
     """
     given: dict[str, Any] = {
         "name": name, "robot": robot, "robots": robots, "listen": listen, "security": security,
-        "insecure": insecure or None, "payload": payload, "overload": overload or None, "shaper": lower(shaper),
+        "insecure": insecure or None, "profile": lower(profile), "payload": payload,
+        "overload": overload or None, "shaper": lower(shaper), "shape_servo": shape_servo or None,
         "calibration": calibration, "clock": lower(clock), "speed": speed,
         "realtime_priority": realtime_priority or None, "start": start, "state": state, "seed": seed,
-        "record": record, "dump": dump, "truth": truth or None, "quiet": quiet or None,
+        "record": record, "dump": dump, "truth": truth or None, "quiet": quiet,
+        "floor": floor, "compensate_sag": compensate_sag,
         "ur": (ur or ur_address is not None or ur_port is not None) or None, "ur_address": ur_address,
         "ur_ports": None if ur_port is None else dict(map(_ur_port, ur_port)),
     }  # fmt: skip
@@ -112,7 +130,8 @@ def serve(
     def ready() -> None:
         took = time.monotonic() - began
         say(
-            f"{_introduction([robot.setup for robot in server.robots])} on {', '.join(checked.listen)}, "
+            f"{_introduction([robot.setup for robot in server.robots], checked.profile_in_force)} "
+            f"on {', '.join(checked.listen)}, "
             f"clock {checked.clock}; ready after {took:.1f} s. Press Control+C to stop."
         )
 
@@ -149,12 +168,13 @@ def _ur_port(text: str) -> tuple[str, int]:
     return interface, 0 if port == "off" else int(port)
 
 
-def _introduction(setups: Sequence["Setup"]) -> str:
+def _introduction(setups: Sequence["Setup"], profile: str | None) -> str:
     """Describe what listens: one robot with its settings, or the names of several."""
     first = setups[0]
+    how = f"shaper {first.shaper}" + ("" if profile is None else f", profile {profile}")
     if len(setups) == 1:
         model = first.description.robot.model
-        return f"{first.name} ({model}, {first.payload.mass:g} kg, shaper {first.shaper}) listens"
+        return f"{first.name} ({model}, {first.payload.mass:g} kg, {how}) listens"
     names = [setup.name for setup in setups]
     listed = ", ".join(names) if len(names) < 8 else f"{', '.join(names[:3])} … {names[-1]}"
-    return f"a server of {len(names)} robots ({listed}; shaper {first.shaper}) listens"
+    return f"a server of {len(names)} robots ({listed}; {how}) listens"

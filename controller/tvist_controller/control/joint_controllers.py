@@ -13,19 +13,22 @@ class JointControllers:
     - Torque: τ_ff = τ* + B q̈* + friction; the rotors' inertia and a share of Coulomb friction are added to the
       torque of the rigid arm.
     - Wind-up: a gear that transmits τ - g twists by (τ - g)/K_g. The motor leads by a share c_w of that, so that the
-      link is closer to its reference. The twist by gravity itself is not compensated, since the paper's robot reports
-      joint angles.
+      link is closer to its reference.
+    - Sag: the twist by gravity itself, g/K_g, is left, as on the paper's robot, or the motor leads by all of it, so
+      that the link rests on its reference. g(q*) has neither feedback nor a delay, and is as smooth as q*.
 
     Args:
         description: The robot.
         period: Tick [s].
+        compensate_sag: Whether the motors lead by the twist of the gears under gravity.
     """
 
-    def __init__(self, description: RobotDescription, period: float) -> None:
+    def __init__(self, description: RobotDescription, period: float, *, compensate_sag: bool = False) -> None:
         drives = description.drives
         self._period = period
         self._rotor = np.array(drives.rotor_inertia)
         self._compliance = np.array(drives.windup_feedforward) / np.array(drives.gear_stiffness)
+        self._yielding = 1.0 / np.array(drives.gear_stiffness) if compensate_sag else None
         friction = np.array(drives.coulomb_friction)
         self._linear = drives.linear_friction
         self._viscous = friction / drives.friction_width
@@ -33,9 +36,14 @@ class JointControllers:
         self._width = drives.friction_feedforward_width
         self._windup = np.zeros(description.joints)
 
-    def reset(self) -> None:
-        """Restart at rest."""
-        self._windup = np.zeros_like(self._windup)
+    def reset(self, torque: Floats, gravity: Floats) -> None:
+        """Restart at rest, with the wind-up that belongs to these torques; see `command`."""
+        self._windup = self._lead(torque, gravity)
+
+    def _lead(self, torque: Floats, gravity: Floats) -> Floats:
+        """Angle by which the motors lead the reference, shape (n,) [rad]."""
+        lead: Floats = self._compliance * (torque - gravity)
+        return lead if self._yielding is None else lead + self._yielding * gravity
 
     def command(self, target: Target, torque: Floats, gravity: Floats) -> DriveCommand:
         """Drive command for a target.
@@ -45,7 +53,7 @@ class JointControllers:
             torque: τ* of the rigid arm, shape (n,) [N m].
             gravity: The part of the torque that balances gravity, shape (n,) [N m].
         """
-        windup = self._compliance * (torque - gravity)
+        windup = self._lead(torque, gravity)
         windup_speed = (windup - self._windup) / self._period
         self._windup = windup
         friction = (

@@ -34,6 +34,11 @@ def arm_table(description: RobotDescription) -> Floats:
     return np.vstack((np.column_stack((dh, limits)), (form, forearm, angle, 0.0, 0.0)))
 
 
+def is_of_ur_form(description: RobotDescription) -> bool:
+    """Return whether an arm has six joints, of which the axes 2, 3 and 4 are parallel, as UR's arms have."""
+    return _form(dh_table(description)) == PARALLEL
+
+
 def _form(dh: Floats) -> float:
     """Recognise a form that `postures` solves."""
     if len(dh) != 6:

@@ -39,7 +39,7 @@ class ScriptCompiler:
             script = compile_script(text, SIGNATURES)
         except ScriptError as error:
             raise _refusal(error.line, error.column, error.text) from error
-        moves = script.calls & MOVING
+        moves = script.used & MOVING
         if script.secondary and moves:
             raise _refusal(
                 1, 1, f"a secondary program cannot move the arm: it calls {', '.join(sorted(moves))}"

@@ -147,7 +147,7 @@ class ProgramPlayer:
 
     def stop_moving(self, why: str) -> None:
         """End a program that may move the arm, so that no motion begins after a stop; `why` as for `end`."""
-        if self.state == "PLAYING" and self._loaded is not None and self._loaded.calls & MOVING:
+        if self.state == "PLAYING" and self._loaded is not None and self._loaded.used & MOVING:
             self.end(why)
 
     def _watch(self, tick: int) -> None:
@@ -172,7 +172,7 @@ class ProgramPlayer:
         if running not in self._all:
             return
         self._close(running)
-        if running.script.calls & MOVING and self._motion.activity in {Activity.GUIDED, Activity.MOVING}:
+        if running.script.used & MOVING and self._motion.activity in {Activity.GUIDED, Activity.MOVING}:
             self._motion.stop(None, "the program has ended")
 
     def _close(self, running: _Running, why: str | None = None) -> None:
@@ -194,7 +194,7 @@ class ProgramPlayer:
         return any(
             (id(running.machine), number) == thread
             for running in self._all
-            for number in running.machine.threads
+            for number in running.machine.living
         )
 
     # ------------------------------------------------------------------ commands
