@@ -1,0 +1,30 @@
+"""URScript, the language of UR robots: compiled to Python and run tick by tick, with no robot, clock or thread."""
+
+from tvist_urscript.checker import check
+from tvist_urscript.compiler import Script, compile_script
+from tvist_urscript.errors import Fault, ScriptError
+from tvist_urscript.library import PURE
+from tvist_urscript.machine import EVALUATIONS, Machine
+from tvist_urscript.signatures import REQUIRED, Parameter, Signature, Signatures, signature
+from tvist_urscript.values import LONGEST, Array, Pose, Value, to_str
+
+__all__ = [
+    "EVALUATIONS",
+    "LONGEST",
+    "PURE",
+    "REQUIRED",
+    "Array",
+    "Fault",
+    "Machine",
+    "Parameter",
+    "Pose",
+    "Script",
+    "ScriptError",
+    "Signature",
+    "Signatures",
+    "Value",
+    "check",
+    "compile_script",
+    "signature",
+    "to_str",
+]

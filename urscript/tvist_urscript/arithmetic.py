@@ -1,0 +1,209 @@
+"""What the operators compute: numbers, and lists of them as vectors and matrices."""
+
+import math
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+from tvist_urscript.errors import Fault
+from tvist_urscript.values import Array, Pose, Value, kind, number, whole
+
+MOST_PRODUCTS = 4096
+"""Multiplications of one product of matrices: two of 16 by 16."""
+
+Number: TypeAlias = int | float
+Work: TypeAlias = Callable[[int], None]
+"""Takes the number of elements that are about to be computed."""
+
+
+def _sum(a: Number, b: Number) -> Number:
+    c = a + b
+    return c if type(c) is float else whole(c)  # type: ignore[arg-type]
+
+
+def _difference(a: Number, b: Number) -> Number:
+    c = a - b
+    return c if type(c) is float else whole(c)  # type: ignore[arg-type]
+
+
+def _product(a: Number, b: Number) -> Number:
+    c = a * b
+    return c if type(c) is float else whole(c)  # type: ignore[arg-type]
+
+
+def _quotient(a: Number, b: Number) -> Number:
+    if b == 0:
+        raise Fault("division by zero")
+    return a / b
+
+
+def add(a: Value, b: Value, work: Work) -> Value:
+    """Return a + b of numbers, or of lists of equal length.
+
+    Raises:
+        Fault: The operands do not fit.
+    """
+    return _beside(_sum, a, b, "added", work)
+
+
+def subtract(a: Value, b: Value, work: Work) -> Value:
+    """Return a - b of numbers, or of lists of equal length.
+
+    Raises:
+        Fault: The operands do not fit.
+    """
+    return _beside(_difference, a, b, "subtracted", work)
+
+
+def _beside(of: Callable[[Any, Any], Value], a: Value, b: Value, done: str, work: Work) -> Value:
+    if type(a) is Array and type(b) is Array:
+        return _elementwise(of, a, b, done, work)
+    if type(a) in NUMBERS and type(b) in NUMBERS:
+        return of(a, b)
+    advice = ""
+    if type(a) is Pose and type(b) is Pose:
+        advice = ": use pose_add or pose_trans" if done == "added" else ": use pose_sub"
+    elif type(a) is str or type(b) is str:
+        advice = ": use str_cat"
+    raise Fault(f"{kind(a)} and {kind(b)} cannot be {done}{advice}")
+
+
+def _elementwise(of: Callable[[Any, Any], Value], a: Array, b: Array, done: str, work: Work) -> Array:
+    if len(a.items) != len(b.items):
+        raise Fault(f"lists of {len(a.items)} and {len(b.items)} elements cannot be {done}")
+    work(len(a.items))
+    return Array(
+        of(x, y) if type(x) in NUMBERS and type(y) in NUMBERS else _beside(of, x, y, done, work)
+        for x, y in zip(a.items, b.items, strict=True)
+    )
+
+
+def multiply(a: Value, b: Value, work: Work) -> Value:
+    """Return a * b of numbers, of a number and a list, of lists of equal length by elements, of matrices and vectors.
+
+    Raises:
+        Fault: The operands do not fit.
+    """
+    if type(a) in NUMBERS:
+        if type(b) in NUMBERS:
+            return _product(a, b)  # type: ignore[arg-type]
+        if type(b) is Array:
+            return _scaled(b, a, _product, work)  # type: ignore[arg-type]
+    elif type(a) is Array:
+        if type(b) in NUMBERS:
+            return _scaled(a, b, _product, work)  # type: ignore[arg-type]
+        if type(b) is Array:
+            return _list_product(a, b, work)
+    raise Fault(f"{kind(a)} and {kind(b)} cannot be multiplied")
+
+
+def divide(a: Value, b: Value, work: Work) -> Value:
+    """Return a / b of numbers, or of a list and a number; quotients are floats.
+
+    Raises:
+        Fault: The operands do not fit, or b is 0.
+    """
+    if type(b) in NUMBERS:
+        if type(a) in NUMBERS:
+            return _quotient(a, b)  # type: ignore[arg-type]
+        if type(a) is Array:
+            return _scaled(a, b, _quotient, work)  # type: ignore[arg-type]
+    raise Fault(f"{kind(a)} cannot be divided by {kind(b)}")
+
+
+def remainder(a: Value, b: Value) -> Value:
+    """Return a % b, the remainder with the sign of a.
+
+    Raises:
+        Fault: An operand is no number, or b is 0.
+    """
+    if type(a) not in NUMBERS or type(b) not in NUMBERS:
+        raise Fault(f"{kind(a)} has no remainder by {kind(b)}")
+    if b == 0:
+        raise Fault("division by zero")
+    if type(a) is int and type(b) is int:
+        rest = abs(a) % abs(b)
+        return rest if a >= 0 else -rest
+    if math.isinf(a):  # type: ignore[arg-type]
+        return math.nan
+    return math.fmod(a, b)  # type: ignore[arg-type]
+
+
+def negate(a: Value, work: Work) -> Value:
+    """Return -a of a number, or of a list by elements.
+
+    Raises:
+        Fault: It is neither.
+    """
+    if type(a) is float:
+        return -a
+    if type(a) is int:
+        return whole(-a)
+    if type(a) is Array:
+        return _scaled(a, -1, _product, work)
+    raise Fault(f"{kind(a)} has no negative")
+
+
+def _scaled(a: Array, by: Number, of: Callable[[Any, Any], Value], work: Work) -> Array:
+    work(len(a.items))
+    return Array(
+        of(x, by)
+        if type(x) in NUMBERS
+        else _scaled(x, by, of, work)
+        if type(x) is Array
+        else of(number(x, "an element of the list"), by)
+        for x in a.items
+    )
+
+
+def _list_product(a: Array, b: Array, work: Work) -> Value:
+    rows, columns = matrix(a), matrix(b)
+    if rows is None and columns is None:
+        return _elementwise(_product, a, b, "multiplied", work)
+    left = rows if rows is not None else [_numbers(a)]
+    right = columns if columns is not None else [[x] for x in _numbers(b)]
+    inner = len(left[0])
+    if inner != len(right):
+        raise Fault(
+            f"a matrix of {len(left)} by {inner} cannot be multiplied with one of {len(right)} by {len(right[0])}"
+        )
+    if (products := len(left) * inner * len(right[0])) > MOST_PRODUCTS:
+        raise Fault(f"these matrices need {products} multiplications: the limit is {MOST_PRODUCTS}")
+    work(products)
+    result = [[_dot(row, column) for column in zip(*right, strict=True)] for row in left]
+    if rows is None:
+        return Array(result[0])
+    if columns is None:
+        return Array(row[0] for row in result)
+    return Array(Array(row) for row in result)
+
+
+def _dot(a: list[Number], b: tuple[Number, ...]) -> Number:
+    total: Number = 0
+    for x, y in zip(a, b, strict=True):
+        total = _sum(total, _product(x, y))
+    return total
+
+
+def _numbers(a: Array) -> list[Number]:
+    if not a.items:
+        raise Fault("an empty list cannot be multiplied with a matrix")
+    return [number(x, "an element of the list") for x in a.items]
+
+
+def matrix(a: Array) -> list[list[Number]] | None:
+    """Return the rows of a list of lists of numbers, None for a list without lists.
+
+    Raises:
+        Fault: The rows have unequal lengths, or an element is no number.
+    """
+    if not any(isinstance(row, Array) for row in a.items):
+        return None
+    rows: list[list[Number]] = []
+    for row in a.items:
+        if type(row) is not Array or not row.items or len(row.items) != len(rows[0] if rows else row.items):
+            raise Fault("the rows of a matrix have to be lists of equal length")
+        rows.append([number(x, "an element of a matrix") for x in row.items])
+    return rows
+
+
+NUMBERS = frozenset((int, float))

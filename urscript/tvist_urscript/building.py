@@ -1,0 +1,187 @@
+"""The tree of a script, built bottom-up while it is parsed: no recursion, whatever a text nests."""
+
+from typing import Any, TypeVar
+
+from lark import Token, Transformer
+
+from tvist_urscript import tree
+from tvist_urscript.errors import ScriptError, syntax_error
+from tvist_urscript.values import LONGEST_TEXT, whole
+
+DEEPEST = 100
+"""Levels of expressions inside each other, where a block counts as BLOCK of them."""
+BLOCK = 4
+
+Children = list[Any]
+T = TypeVar("T", bound=tree.Node)
+
+
+class Builder(Transformer[Token, Any]):
+    """Makes a node of each rule's children."""
+
+    def start(self, children: Children) -> list[tree.Statement]:
+        return children
+
+    def block(self, children: Children) -> list[tree.Statement]:
+        return children
+
+    def function(self, children: Children) -> tree.Function:
+        kind, name, *parameters, body = children
+        node = tree.Function(name.line, name.column, str(kind), str(name), parameters, body)  # type: ignore[arg-type]
+        return _deeper(node, body, [default for _, default in parameters if default is not None])
+
+    def parameter(self, children: Children) -> tuple[tree.Name, tree.Expression | None]:
+        return self.name(children), children[1] if len(children) > 1 else None
+
+    def branches(self, children: Children) -> tree.If:
+        word, *rest = children
+        branches = list(zip(rest[0::2], rest[1::2], strict=False))
+        otherwise = rest[-1] if len(rest) % 2 else []
+        node = tree.If(word.line, word.column, branches, otherwise)
+        return _deeper(node, otherwise, *([condition, *body] for condition, body in branches))
+
+    def loop(self, children: Children) -> tree.While:
+        word, condition, body = children
+        return _deeper(tree.While(word.line, word.column, condition, body), body, [condition])
+
+    def evaluate(self, children: Children) -> tree.Evaluate:
+        (value,) = children
+        return _deeper(tree.Evaluate(value.line, value.column, value), children)
+
+    def return_value(self, children: Children) -> tree.Return:
+        word, *value = children
+        return _deeper(tree.Return(word.line, word.column, value[0] if value else None), value)
+
+    def handle(self, children: Children) -> tree.Handle:
+        word, value = children
+        return _deeper(tree.Handle(word.line, word.column, str(word), value), [value])  # type: ignore[arg-type]
+
+    def word(self, children: Children) -> tree.Word:
+        (word,) = children
+        return tree.Word(word.line, word.column, str(word))  # type: ignore[arg-type]
+
+    def assign(self, children: Children) -> tree.Assign:
+        *qualifier, target, equal, value = children
+        indices: list[tree.Expression] = []
+        inner = target
+        while isinstance(inner, tree.Index):
+            indices[:0] = inner.indices
+            inner = inner.value
+        if not isinstance(inner, tree.Name):
+            raise _syntax(equal, "only a variable or an element of one can be assigned")
+        if qualifier and indices:
+            raise _syntax(qualifier[0], f"{qualifier[0]} declares a variable, not an element")
+        node = tree.Assign(
+            inner.line,
+            inner.column,
+            inner,
+            indices,
+            value,
+            str(qualifier[0]) if qualifier else None,  # type: ignore[arg-type]
+        )
+        return _deeper(node, indices, [value])
+
+    def either(self, children: Children) -> tree.Logic:
+        return _logic("or", children)
+
+    def unequal(self, children: Children) -> tree.Logic:
+        return _logic("xor", children)
+
+    def both(self, children: Children) -> tree.Logic:
+        return _logic("and", children)
+
+    def unary(self, children: Children) -> tree.Expression:
+        operator, value = children
+        if operator == "-" and isinstance(value, tree.Constant) and type(value.value) in (int, float):
+            value.value = -value.value  # type: ignore[operator]
+            value.line, value.column = operator.line, operator.column
+            return value
+        return _deeper(tree.Unary(operator.line, operator.column, str(operator), value), [value])  # type: ignore[arg-type]
+
+    def plus(self, children: Children) -> tree.Expression:
+        operator, value = children
+        if not (isinstance(value, tree.Constant) and type(value.value) in (int, float)):
+            raise _syntax(operator, "a plus sign needs a number behind it")
+        return value
+
+    def binary(self, children: Children) -> tree.Binary:
+        left, operator, right = children
+        return _deeper(tree.Binary(operator.line, operator.column, str(operator), left, right), [left, right])
+
+    def index(self, children: Children) -> tree.Index:
+        value, bracket, *indices = children
+        return _deeper(tree.Index(bracket.line, bracket.column, value, indices), [value], indices)
+
+    def number(self, children: Children) -> tree.Constant:
+        (token,) = children
+        try:
+            value = whole(int(token)) if token.isdigit() else float(token)
+        except (ValueError, OverflowError):  # Python reads at most 4300 digits
+            value = float("inf")
+        if value == float("inf"):
+            raise _syntax(token, "a number is too large")
+        return tree.Constant(token.line, token.column, value)
+
+    def text(self, children: Children) -> tree.Constant:
+        (token,) = children
+        value = str(token)[1:-1]
+        if len(value.encode(errors="surrogatepass")) > LONGEST_TEXT:
+            raise _syntax(token, f"a text is too long, the limit is {LONGEST_TEXT} bytes")
+        return tree.Constant(token.line, token.column, value)
+
+    def constant(self, children: Children) -> tree.Constant:
+        (token,) = children
+        return tree.Constant(token.line, token.column, {"True": True, "False": False, "None": None}[token])
+
+    def name(self, children: Children) -> tree.Name:
+        token = children[0]
+        return tree.Name(token.line, token.column, str(token))
+
+    def call(self, children: Children) -> tree.Call:
+        name, *arguments = children
+        node = tree.Call(name.line, name.column, str(name), arguments)
+        return _deeper(node, arguments)
+
+    def run(self, children: Children) -> tree.Call:
+        _, call = children
+        call.runs = True
+        return call  # type: ignore[no-any-return]
+
+    def positional(self, children: Children) -> tree.Argument:
+        (value,) = children
+        return _deeper(tree.Argument(value.line, value.column, None, value), children)
+
+    def named(self, children: Children) -> tree.Argument:
+        name, value = children
+        return _deeper(tree.Argument(name.line, name.column, str(name), value), [value])
+
+    def listing(self, children: Children) -> tree.Listing:
+        bracket, *items = children
+        return _deeper(tree.Listing(bracket.line, bracket.column, items), items)
+
+    def parentheses(self, children: Children) -> tree.Expression:
+        return self.listing(children) if len(children) > 2 else children[1]
+
+
+def _logic(operator: str, values: list[tree.Expression]) -> tree.Logic:
+    first = values[0]
+    return _deeper(tree.Logic(first.line, first.column, operator, values), values)  # type: ignore[arg-type]
+
+
+def _deeper(node: T, *parts: list[Any]) -> T:
+    deepest = 0
+    for part in parts:
+        for child in part:
+            deepest = max(deepest, child.depth)
+    node.depth = deepest + (BLOCK if isinstance(node, tree.If | tree.While | tree.Function) else 1)
+    if node.depth > DEEPEST:
+        raise ScriptError(
+            node.line, node.column, syntax_error(node.line, f"more than {DEEPEST} levels are nested here")
+        )
+    return node
+
+
+def _syntax(token: Token, why: str) -> ScriptError:
+    assert token.line is not None
+    assert token.column is not None
+    return ScriptError(token.line, token.column, syntax_error(token.line, why))

@@ -1,0 +1,117 @@
+"""From the tree of a script to Python's code: one generator function for each function of the script."""
+
+import ast
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import CodeType, MappingProxyType
+
+from tvist_urscript import tree
+from tvist_urscript.errors import ScriptError, syntax_error
+from tvist_urscript.failures import FILE
+from tvist_urscript.names import scopes
+from tvist_urscript.parsing import parse
+from tvist_urscript.signatures import Signatures
+from tvist_urscript.statements import Statements
+
+
+@dataclass(frozen=True)
+class Script:
+    """A compiled script. It can run any number of times.
+
+    Attributes:
+        name: The name of its program; of one without `def` the first word.
+        secondary: It is a `sec`, which runs beside the program.
+        text: What it was compiled from.
+        main: The name of its main function.
+        functions: The code of its functions.
+        constants: Values that the code uses by name.
+        used: The built-in functions that it calls.
+    """
+
+    name: str
+    secondary: bool
+    text: str
+    main: str
+    functions: tuple[CodeType, ...]
+    constants: Mapping[str, object]
+    used: frozenset[str]
+
+
+def compile_script(text: str, signatures: Signatures) -> Script:
+    """Compile a program: a `def` or `sec` with its `end`, or statements without.
+
+    Args:
+        text: The script as it was sent.
+        signatures: The built-in functions of the controller; the language's own are known.
+
+    Raises:
+        ScriptError: The first thing that is wrong in the order of the text.
+    """
+    script, errors = translate(text, signatures)
+    if errors:
+        raise errors[0]
+    assert script is not None
+    return script
+
+
+def translate(text: str, signatures: Signatures) -> tuple[Script | None, list[ScriptError]]:
+    """Compile a program and return it, or what is wrong with it in the order of the text."""
+    from tvist_urscript.library import PURE
+
+    known = {**{name: entry[0] for name, entry in PURE.items()}, **signatures}
+    errors: dict[tuple[int, int, str], ScriptError] = {}
+
+    def report(line: int, column: int, why: str) -> None:
+        errors.setdefault((line, column, why), ScriptError(line, column, why))
+
+    try:
+        program = _program(text)
+    except ScriptError as error:
+        return None, [error]
+    found = scopes(program)
+    translator = Statements(known, report)
+    trees = [translator.function(scope) for scope in found]
+    if errors:
+        return None, [errors[key] for key in sorted(errors)]
+    return (
+        Script(
+            program.name,
+            program.kind == "sec",
+            text,
+            found[0].code_name,
+            tuple(map(_code, trees)),
+            MappingProxyType(translator.constants),
+            frozenset(translator.used),
+        ),
+        [],
+    )
+
+
+def _program(text: str) -> tree.Function:
+    statements = parse(text)
+    if not statements:
+        raise ScriptError(1, 1, syntax_error(1, "the text has no statement"))
+    head = statements[0]
+    if isinstance(head, tree.Function):
+        if head.kind == "thread":
+            raise ScriptError(
+                head.line, head.column, syntax_error(head.line, "a thread belongs into a program")
+            )
+        if len(statements) > 1:
+            after = statements[1]
+            raise ScriptError(
+                after.line, after.column, syntax_error(after.line, f"the program {head.name} has ended above")
+            )
+        if head.parameters:
+            name, _ = head.parameters[0]
+            raise ScriptError(name.line, name.column, f"the program {head.name} cannot have parameters")
+        return head
+    word = re.search(r"^[ \t]*([A-Za-z_]\w*)", text, re.MULTILINE)
+    return tree.Function(head.line, head.column, "def", word[1] if word else "program", [], statements)
+
+
+def _code(made: ast.FunctionDef) -> CodeType:
+    """Compile one function alone: what holds the interpreter's lock is no longer than that."""
+    module = compile(ast.Module([made], []), FILE, "exec", dont_inherit=True, optimize=0)
+    return next(constant for constant in module.co_consts if isinstance(constant, CodeType))

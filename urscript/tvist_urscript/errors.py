@@ -1,0 +1,37 @@
+"""What is wrong with a script, and where."""
+
+
+class ScriptError(Exception):
+    """A script cannot be compiled, or a program has failed.
+
+    Attributes:
+        line: Line of the script as it was given, from 1.
+        column: Column of the first character of the token at fault, from 1; a tab counts as one.
+        text: The error in the controller's words, such as `compile_error_name_not_found:x:`.
+    """
+
+    def __init__(self, line: int, column: int, text: str) -> None:
+        super().__init__(line, column, text)
+        self.line = line
+        self.column = column
+        self.text = text
+
+    def __str__(self) -> str:
+        return f"line {self.line}, column {self.column}: {self.text}"
+
+
+class Fault(Exception):  # noqa: N818  it becomes a ScriptError where it is called
+    """A function cannot do what a script asks of it.
+
+    Built-in functions raise it with a text for people; the machine adds the position of the call.
+    """
+
+
+def name_not_found(name: str) -> str:
+    """Return the words by which clients recognize an unknown name."""
+    return f"compile_error_name_not_found:{name}:"
+
+
+def syntax_error(line: int, why: str) -> str:
+    """Return the words by which clients recognize a text that is no program."""
+    return f"syntax_error_on_line:{line}:{why}:"

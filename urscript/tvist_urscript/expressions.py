@@ -1,0 +1,293 @@
+"""Expressions of a script as Python's: arithmetic by functions that check the operands, comparisons by Python's own."""
+
+import ast
+from collections.abc import Callable, Sequence
+
+from tvist_urscript import tree
+from tvist_urscript.arithmetic import NUMBERS
+from tvist_urscript.errors import name_not_found
+from tvist_urscript.names import BUILT_IN_ARRAYS, Scope
+from tvist_urscript.pieces import DEPTH, MISSING, Position
+from tvist_urscript.signatures import REQUIRED, Signatures
+from tvist_urscript.values import LONGEST, Array, Pose
+
+MOST_OPERATIONS = 1000
+"""Evaluations of one statement; beyond them nothing could interrupt it in time."""
+
+ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "remainder"}
+ORDER: dict[str, type[ast.cmpop]] = {"<": ast.Lt, ">": ast.Gt, "<=": ast.LtE, ">=": ast.GtE}
+EQUALITY: dict[str, tuple[type[ast.cmpop], str]] = {
+    "==": (ast.Eq, "is_equal"),
+    "!=": (ast.NotEq, "is_unequal"),
+}
+
+Report = Callable[[int, int, str], None]
+
+
+class Expressions:
+    """Translates expressions.
+
+    Attributes:
+        scope: What names mean here.
+        cost: Evaluations of what has been translated since it was set to 0.
+        used: Built-in functions that the script calls.
+        constants: Lists and default values, by the names that compiled functions have for them.
+    """
+
+    def __init__(self, signatures: Signatures, report: Report) -> None:
+        self.signatures = signatures
+        self.report = report
+        self.scope: Scope
+        self.cost = 0
+        self.used: set[str] = set()
+        self.constants: dict[str, object] = {}
+        self.globals: set[str] = set()
+
+    def value(self, node: tree.Expression) -> ast.expr:  # noqa: PLR0911  one for each kind of node
+        """Translate an expression for its value."""
+        match node:
+            case tree.Constant():
+                return Position.of(node).constant(node.value)
+            case tree.Name():
+                return self.name(node)
+            case tree.Binary():
+                return self.binary(node)
+            case tree.Call():
+                return self.run(node) if node.runs else self.call(node)
+            case tree.Index():
+                return self.index(node)
+            case tree.Listing():
+                return self.listing(node)
+            case tree.Unary(operator="-"):
+                self.cost += 1
+                return Position.of(node).call("negate", self.value(node.value))
+            case tree.Unary():
+                return Position.of(node).invert(self.test(node.value))
+            case tree.Logic():
+                at = Position.of(node)
+                return at.invert(at.invert(self.test(node)))
+
+    def test(self, node: tree.Expression) -> ast.expr:
+        """Translate an expression of which only the truth matters."""
+        match node:
+            case tree.Logic(operator="xor"):
+                at = Position.of(node)
+                result = at.invert(self.test(node.values[0]))
+                self.cost += len(node.values) - 1
+                for value in node.values[1:]:
+                    result = at.invert(at.compare(result, ast.NotEq(), at.invert(self.test(value))))
+                return at.invert(result)
+            case tree.Logic():
+                self.cost += len(node.values) - 1
+                operator = ast.And() if node.operator == "and" else ast.Or()
+                return ast.BoolOp(
+                    operator, [self.test(value) for value in node.values], **Position.of(node).given
+                )
+            case tree.Unary(operator="not"):
+                self.cost += 1
+                return Position.of(node).invert(self.test(node.value))
+            case _:
+                return self.value(node)
+
+    def name(self, node: tree.Name) -> ast.expr:
+        """Translate a variable that is read."""
+        at = Position.of(node)
+        variable = self.scope.variable(node.name)
+        if variable is None:
+            self.report(node.line, node.column, name_not_found(node.name))
+        return at.name(f"v_{node.name}" if variable == "local" else f"g_{node.name}")
+
+    def binary(self, node: tree.Binary) -> ast.expr:
+        """Translate arithmetic or a comparison."""
+        at = Position.of(node)
+        self.cost += 1
+        left, right = self.value(node.left), self.value(node.right)
+        if node.operator in ARITHMETIC:
+            return at.call(ARITHMETIC[node.operator], left, right)
+        if node.operator in ORDER:
+            return at.compare(left, ORDER[node.operator](), right)
+        operator, function = EQUALITY[node.operator]
+        if isinstance(node.left, tree.Constant) or isinstance(node.right, tree.Constant):
+            return at.compare(left, operator(), right)
+        return at.call(function, left, right)
+
+    def listing(self, node: tree.Listing) -> ast.expr:
+        """Translate a list; one of constants is made once."""
+        at = Position.of(node)
+        if len(node.items) > LONGEST:
+            self.report(
+                node.line,
+                node.column,
+                f"a list of {len(node.items)} elements is too long: the limit is {LONGEST}",
+            )
+            return at.constant(None)
+        values = [item.value for item in node.items if isinstance(item, tree.Constant)]
+        if len(values) == len(node.items):
+            return at.name(self.keep(Array(values)))
+        self.cost += len(node.items)
+        return at.call("listed", at.tuple([self.value(item) for item in node.items]))
+
+    def keep(self, value: object) -> str:
+        """Return a name for a value that compiled functions use."""
+        name = f"c{len(self.constants)}"
+        self.constants[name] = value
+        return name
+
+    def index(self, node: tree.Index) -> ast.expr:
+        """Translate an element, or a pose: `p[...]` with six expressions is one."""
+        value, indices = node.value, node.indices
+        at = Position(*first(indices[0]))
+        is_p = isinstance(value, tree.Name) and value.name == "p"
+        if is_p and len(indices) == 6:
+            return self.pose(node)
+        if len(indices) > 2 or (is_p and self.scope.variable("p") is None):
+            self.report(
+                value.line,
+                value.column,
+                f"p[...] takes six numbers, not {len(indices)}"
+                if is_p
+                else f"an element has one or two indices, not {len(indices)}",
+            )
+            return at.constant(None)
+        if array := self.built_in_array(value):
+            return self.call_built_in(Position.of(value), BUILT_IN_ARRAYS[array][0], indices)
+        self.cost += 1
+        function = "element" if len(indices) == 1 else "element_of_matrix"
+        return at.call(function, self.value(value), *(self.value(index) for index in indices))
+
+    def pose(self, node: tree.Index) -> ast.expr:
+        """Translate a pose of six expressions."""
+        at = Position.of(node.value)
+        self.cost += 1
+        values = [item.value for item in node.indices if isinstance(item, tree.Constant)]
+        if len(values) == 6 and all(type(value) in NUMBERS for value in values):
+            return at.name(self.keep(Pose(values)))
+        return at.call("posed", at.tuple([self.value(item) for item in node.indices]))
+
+    def built_in_array(self, node: tree.Expression) -> str | None:
+        """Return the name of the controller's array that an expression means."""
+        if (
+            isinstance(node, tree.Name)
+            and node.name in BUILT_IN_ARRAYS
+            and self.scope.variable(node.name) is None
+        ):
+            return node.name
+        return None
+
+    def call_built_in(self, at: Position, name: str, arguments: Sequence[tree.Expression]) -> ast.expr:
+        """Translate what means a call of a built-in function without naming it."""
+        if name not in self.signatures:
+            self.report(at.given["lineno"], at.given["col_offset"], name_not_found(name))
+            return at.constant(None)
+        node = tree.Call(
+            at.given["lineno"],
+            at.given["col_offset"],
+            name,
+            [tree.Argument(argument.line, argument.column, None, argument) for argument in arguments],
+        )
+        return self.call(node, built_in=True)
+
+    def call(self, node: tree.Call, *, built_in: bool = False) -> ast.expr:
+        """Translate a call, of a function of the script before one of the controller."""
+        at = Position.of(node)
+        self.cost += 1
+        scope = None if built_in else self.scope.find(node.name)
+        if scope is not None:
+            if scope.function.kind == "thread":
+                self.report(
+                    node.line, node.column, f"{node.name} is a thread: write `run {node.name}()` to start it"
+                )
+            parameters = [
+                (parameter.name, MISSING if default is not None else None)
+                for parameter, default in scope.function.parameters
+            ]
+            deeper = ast.BinOp(at.name(DEPTH), ast.Add(), at.constant(1), **at.given)
+            return at.waiting(at.call(scope.code_name, deeper, *self.arguments(node, parameters)))
+        signature = self.signatures.get(node.name)
+        if signature is None:
+            self.report(node.line, node.column, name_not_found(node.name))
+            for argument in node.arguments:
+                self.value(argument.value)
+            return at.constant(None)
+        self.used.add(node.name)
+        self.cost += signature.cost - 1
+        known = [
+            (parameter.name, None if parameter.default is REQUIRED else self.keep(parameter.default))
+            for parameter in signature.parameters
+        ]
+        call = at.call(f"b_{node.name}", *self.arguments(node, known))
+        return at.waiting(call) if signature.blocks else call
+
+    def arguments(self, node: tree.Call, parameters: list[tuple[str, str | None]]) -> list[ast.expr]:
+        """Put the arguments of a call into the order of the parameters.
+
+        Args:
+            node: The call.
+            parameters: For each parameter its name, and the name of its default where it has one.
+        """
+        at = Position.of(node)
+        given: dict[str, ast.expr] = {}
+        names = [name for name, _ in parameters]
+        for place, argument in enumerate(node.arguments):
+            value = self.value(argument.value)
+            name = argument.name
+            if name is None:
+                if place >= len(names):
+                    limit = f"at most {_counted(len(names))}" if names else "no arguments"
+                    self.report(
+                        argument.line,
+                        argument.column,
+                        f"{node.name} takes {limit}, but {len(node.arguments)} are given",
+                    )
+                    return []
+                if place and node.arguments[place - 1].name is not None:
+                    self.report(
+                        argument.line, argument.column, "an argument without a name follows one with a name"
+                    )
+                name = names[place]
+            elif name not in names:
+                self.report(argument.line, argument.column, f"{node.name} has no parameter {name}")
+            if name in given:
+                self.report(argument.line, argument.column, f"{node.name} is given {name} twice")
+            given[name] = value
+        result = []
+        for name, default in parameters:
+            if name in given:
+                result.append(given[name])
+            elif default is not None:
+                result.append(at.name(default))
+            else:
+                self.report(node.line, node.column, f"{node.name} needs a value for its parameter {name}")
+        return result
+
+    def run(self, node: tree.Call) -> ast.expr:
+        """Translate the start of a thread."""
+        at = Position.of(node)
+        self.cost += 1
+        scope = self.scope.find(node.name)
+        if scope is None and node.name not in self.signatures:
+            self.report(node.line, node.column, name_not_found(node.name))
+        elif scope is None or scope.function.kind != "thread":
+            self.report(
+                node.line, node.column, f"{node.name} is no thread: `run` starts what `thread` has defined"
+            )
+        elif node.arguments:
+            self.report(node.line, node.column, f"{node.name} is a thread, which takes no arguments")
+        else:
+            return at.call("run", at.name(scope.code_name))
+        return at.constant(None)
+
+
+def first(node: tree.Expression) -> tuple[int, int]:
+    """Return line and column of the first token of an expression."""
+    while True:
+        if isinstance(node, tree.Binary):
+            node = node.left
+        elif isinstance(node, tree.Index):
+            node = node.value
+        else:
+            return node.line, node.column
+
+
+def _counted(number: int) -> str:
+    return "1 argument" if number == 1 else f"{number} arguments"

@@ -1,0 +1,67 @@
+"""What a Python exception in compiled code means to the author of the script."""
+
+import re
+from types import TracebackType
+
+from tvist_urscript.errors import Fault, ScriptError
+
+FILE = "<urscript>"
+"""The file name of compiled code, by which a traceback's frames are known."""
+
+_KINDS = {
+    "int": "an integer",
+    "float": "a float",
+    "bool": "a boolean",
+    "str": "a text",
+    "Array": "a list",
+    "Pose": "a pose",
+    "NoneType": "None",
+}
+
+
+class TooDeep(Fault):
+    """A function has been called too deep; the position is that of the call."""
+
+
+def failure(error: Exception) -> ScriptError:
+    """Return the error of the script, at the position where compiled code raised it."""
+    if isinstance(error, ScriptError):
+        return error
+    places = _places(error.__traceback__)
+    line, column = places[-2 if isinstance(error, TooDeep) and len(places) > 1 else -1] if places else (1, 1)
+    return ScriptError(line, column, _words(error))
+
+
+def _places(traceback: TracebackType | None) -> list[tuple[int, int]]:
+    places = []
+    while traceback is not None:
+        code = traceback.tb_frame.f_code
+        if code.co_filename == FILE:
+            positions = list(code.co_positions())
+            line, _, column, _ = positions[traceback.tb_lasti // 2]
+            places.append((line or 1, column or 1))
+        traceback = traceback.tb_next
+    return places
+
+
+def _words(error: Exception) -> str:  # noqa: PLR0911  one for each kind of exception
+    match error:
+        case Fault():
+            return str(error)
+        case NameError():
+            found = re.search(r"'[gv]_(\w+)'", str(error))
+            return f"the variable {found[1] if found else '?'} has no value yet"
+        case ZeroDivisionError():
+            return "division by zero"
+        case OverflowError():
+            return "the result is too large"
+        case RecursionError():
+            return "functions are called too deep"
+        case TypeError():
+            found = re.search(r"'(\S+)' not supported between instances of '(\w+)' and '(\w+)'", str(error))
+            if found:
+                left, right = _KINDS.get(found[2], found[2]), _KINDS.get(found[3], found[3])
+                return f"{left} and {right} cannot be compared by {found[1]}"
+            return f"a value does not fit here: {error}"
+        case _:
+            return f"an argument does not fit: {error}"

@@ -1,0 +1,61 @@
+"""Elements of lists, poses and matrices: reading one, and the list in which one is another."""
+
+from typing import Any
+
+from tvist_urscript.errors import Fault
+from tvist_urscript.values import Array, Pose, Value, integer, kind, number
+
+
+def element(value: Value, index: Any) -> Value:
+    """Return value[index].
+
+    Raises:
+        Fault: The value is no list, or the index is no integer from 0 to its length less 1.
+    """
+    items = _array(value).items
+    if type(index) is int and 0 <= index < len(items):
+        return items[index]
+    return items[_place(index, value)]  # type: ignore[arg-type]
+
+
+def element_of_matrix(value: Value, row: Any, column: Any) -> Value:
+    """Return value[row, column].
+
+    Raises:
+        Fault: As `element`.
+    """
+    return element(element(value, row), column)
+
+
+def replaced(new: Value, indices: tuple[Any, ...], value: Value) -> Array:
+    """Return the list in which the element at these indices is another.
+
+    Raises:
+        Fault: As `element`, or a pose would get an element that is no number.
+    """
+    whole = _array(value)
+    place = _place(indices[0], whole)
+    inner = new if len(indices) == 1 else replaced(new, indices[1:], whole.items[place])
+    items = list(whole.items)
+    if type(whole) is Pose:
+        items[place] = number(inner, "an element of a pose")
+        return Pose(items)
+    items[place] = inner
+    return Array(items)
+
+
+def _array(value: Value) -> Array:
+    if isinstance(value, Array):
+        return value
+    raise Fault(f"{kind(value)} has no elements")
+
+
+def _place(index: Any, value: Array) -> int:
+    place = integer(index, "a list index")
+    length = len(value.items)
+    what = "pose" if type(value) is Pose else "list"
+    if place < 0:
+        raise Fault(f"list index {place} is negative: the {what} has {length} elements")
+    if place >= length:
+        raise Fault(f"list index {place} is beyond the end: the {what} has {length} elements")
+    return place

@@ -1,0 +1,72 @@
+"""Where a statement ends: indentation and most line breaks have no meaning."""
+
+from collections.abc import Iterator
+
+from lark import Token
+
+END = "_NEWLINE"
+
+_OPENS = frozenset(("LPAR", "LSQB"))
+_CLOSES = frozenset(("RPAR", "RSQB"))
+_GOES_ON = frozenset(
+    (
+        "PLUS",
+        "MINUS",
+        "STAR",
+        "SLASH",
+        "PERCENT",
+        "COMPARISON",
+        "EQUAL",
+        "AND",
+        "OR",
+        "XOR",
+        "NOT",
+        "COMMA",
+        "COLON",
+        "RUN",
+    )
+)
+"""After these a line break is no end, as nothing is complete."""
+_BEGINS = frozenset(
+    ("DEF", "SEC", "THREAD", "IF", "WHILE", "RETURN", "KILL", "JOIN", "BREAK", "CONTINUE", "PASS", "HALT",
+     "ENTER_CRITICAL", "EXIT_CRITICAL", "GLOBAL", "LOCAL", "END", "ELIF", "ELSE")
+)  # fmt: skip
+"""Before these a statement ends without a line break: ur_rtde sends `global a =`, then `0  global b = 1`."""
+
+
+class Lines:
+    """Turns the tokens of a text into those of the grammar, where each statement has one end."""
+
+    always_accept = (END,)
+
+    def process(self, tokens: Iterator[Token]) -> Iterator[Token]:
+        """Drop line breaks that end nothing, and add ends that no line break tells."""
+        brackets = 0
+        last = END
+        pending: Token | None = None
+        for token in tokens:
+            kind = token.type
+            if kind == END:
+                if brackets == 0 and last != END and last not in _GOES_ON and pending is None:
+                    pending = token
+                continue
+            if pending is not None:
+                if kind != "COLON":
+                    yield pending
+                    last = END
+                pending = None
+            if kind in _BEGINS and brackets == 0 and last not in (END, "COLON"):
+                yield _end(token)
+            if kind in _OPENS:
+                brackets += 1
+            elif kind in _CLOSES and brackets > 0:
+                brackets -= 1
+            yield token
+            last = kind
+            token_before = token
+        if last != END:
+            yield pending if pending is not None else _end(token_before)
+
+
+def _end(at: Token) -> Token:
+    return Token.new_borrow_pos(END, "\n", at)

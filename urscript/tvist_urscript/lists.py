@@ -1,0 +1,107 @@
+"""The functions of lists, vectors and matrices."""
+
+import math
+
+from tvist_urscript.arithmetic import MOST_PRODUCTS, matrix
+from tvist_urscript.errors import Fault
+from tvist_urscript.poses import pose_inv
+from tvist_urscript.values import Array, Pose, Value, array, integer, kind, vector
+
+_BITS = 32
+
+
+def get_list_length(value: Value) -> int:
+    """Return the number of elements of a list."""
+    if isinstance(value, Array):
+        return len(value.items)
+    raise Fault(f"{kind(value)} has no length")
+
+
+def length(value: Value) -> int:
+    """Return the number of elements of a list, or of characters of a text."""
+    return len(value) if type(value) is str else get_list_length(value)
+
+
+def size(value: Value) -> Value:
+    """Return the number of elements of a list, or the rows and columns of a matrix."""
+    if type(value) is Array and (rows := matrix(value)) is not None:
+        return Array((len(rows), len(rows[0])))
+    return length(value)
+
+
+def norm(value: Value) -> float:
+    """Return the absolute value of a number, or the Euclidean length of a list of numbers."""
+    if type(value) is int or type(value) is float:
+        return abs(value)
+    return math.hypot(*vector(value, "the argument of norm"))
+
+
+def normalize(value: Value) -> Array:
+    """Return a list of numbers divided by its Euclidean length."""
+    numbers = vector(value, "the argument of normalize")
+    whole = math.hypot(*numbers)
+    if whole == 0:
+        raise Fault("a vector of length 0 has no direction")
+    return Array(x / whole for x in numbers)
+
+
+def integer_to_binary_list(value: Value) -> Array:
+    """Return the 32 bits of an integer, the lowest first."""
+    bits = integer(value, "the argument of integer_to_binary_list")
+    return Array(bool(bits >> place & 1) for place in range(_BITS))
+
+
+def binary_list_to_integer(value: Value) -> int:
+    """Return the integer of at most 32 bits, the lowest first; 32 of them are a signed number."""
+    bits = array(value, "the argument of binary_list_to_integer").items
+    if len(bits) > _BITS:
+        raise Fault(f"an integer has at most {_BITS} bits, not {len(bits)}")
+    result = sum(1 << place for place, bit in enumerate(bits) if bit)
+    return result - (1 << _BITS) if result >= 1 << _BITS - 1 else result
+
+
+def make_list(elements: Value, initial_value: Value) -> Array:
+    """Return a list of this many equal elements."""
+    count = integer(elements, "the length of make_list")
+    if count < 0:
+        raise Fault("a list cannot have a negative length")
+    if count > 1_000_000:
+        raise Fault(f"a list of {count} elements is too long")
+    return Array([initial_value] * count)
+
+
+def transpose(value: Value) -> Array:
+    """Return a matrix with its rows as columns."""
+    rows = _matrix(value, "transpose")
+    return Array(Array(column) for column in zip(*rows, strict=True))
+
+
+def inv(value: Value) -> Array:
+    """Return the inverse of a pose or of a square matrix, by Gauss and Jordan with pivots."""
+    if type(value) is Pose:
+        return pose_inv(value)
+    rows = _matrix(value, "inv")
+    n = len(rows)
+    if len(rows[0]) != n:
+        raise Fault(f"a matrix of {n} by {len(rows[0])} has no inverse")
+    if n**3 > MOST_PRODUCTS:
+        raise Fault(f"a matrix of {n} by {n} is too large for inv")
+    work = [[*map(float, row), *(float(i == j) for j in range(n))] for i, row in enumerate(rows)]
+    for column in range(n):
+        pivot = max(range(column, n), key=lambda i: abs(work[i][column]))
+        if work[pivot][column] == 0:
+            raise Fault("a singular matrix has no inverse")
+        work[column], work[pivot] = work[pivot], work[column]
+        divisor = work[column][column]
+        work[column] = [x / divisor for x in work[column]]
+        for i in range(n):
+            if i != column and (factor := work[i][column]) != 0:
+                work[i] = [x - factor * y for x, y in zip(work[i], work[column], strict=True)]
+    return Array(Array(row[n:]) for row in work)
+
+
+def _matrix(value: Value, name: str) -> list[list[int | float]]:
+    rows = matrix(array(value, f"the argument of {name}"))
+    if rows is None:
+        raise Fault(f"the argument of {name} has to be a matrix")
+    return rows

@@ -1,0 +1,349 @@
+"""Runs a compiled script, a tick at a time."""
+
+from collections.abc import Callable, Generator, Mapping
+from types import FunctionType
+from typing import Any
+
+from tvist_urscript import arithmetic, indexing
+from tvist_urscript.compiler import Script
+from tvist_urscript.errors import Fault, ScriptError
+from tvist_urscript.failures import FILE, TooDeep, failure
+from tvist_urscript.library import PURE
+from tvist_urscript.pieces import HERE, MISSING, SPENT
+from tvist_urscript.statements import DEEPEST_CALLS
+from tvist_urscript.threads import MOST_THREADS, Thread
+from tvist_urscript.values import Array, Pose, Value
+
+EVALUATIONS = 500
+"""Evaluations of all threads in a tick."""
+PATIENCE = 50
+"""Ticks in which a thread may use up its budget one after the other, before it counts as an endless loop."""
+OVERDRAFT = 5000
+"""Evaluations by which one statement may exceed the budget."""
+
+_SPENT = object()
+_MISSING = object()
+Steps = Generator[Any, None, Any]
+
+
+class Halted(Exception):  # noqa: N818  no error: the script has said `halt`
+    """The program ends now."""
+
+
+class Killed(Exception):  # noqa: N818  no error: the script has killed the thread that runs
+    """The thread that runs ends now."""
+
+
+class Machine:
+    """A program that runs: its threads, its variables and its budget.
+
+    Attributes:
+        left: What is left of the budget of this tick; compiled code takes from it.
+        thread: Number of the thread that runs now, or ran last; 0 is the main thread.
+
+    Args:
+        script: What it runs.
+        functions: The built-in functions that the script calls, without those of `PURE`.
+        finish: Called as a blocking function at the regular end of each thread, before it ends.
+
+    Raises:
+        ValueError: The script calls a function that is not given.
+    """
+
+    def __init__(
+        self,
+        script: Script,
+        functions: Mapping[str, Callable[..., Any]],
+        *,
+        finish: Callable[[], Steps] | None = None,
+    ) -> None:
+        self.script = script
+        self.left = 0
+        self.thread = 0
+        self._finish = finish
+        self._started = 0
+        self._holder: Thread | None = None
+        self._line = 1
+        self._names = self._surroundings(functions)
+        self._main = Thread(0, self._body(self._names[script.main]), None)
+        self._running = self._main
+        self._threads: list[Thread] = [self._main]
+        self._missed: list[Thread] = []
+        self._turns: list[Thread] = []
+
+    @property
+    def running(self) -> bool:
+        """Whether the main thread has not ended."""
+        return not self._main.ended
+
+    @property
+    def living(self) -> list[int]:
+        """Numbers of the threads that have not ended, in the order of their age."""
+        return [thread.number for thread in self._threads if not thread.ended]
+
+    @property
+    def line(self) -> int:
+        """The present line of the main thread."""
+        self._line = _line_of(self._main) or self._line
+        return self._line
+
+    def resume(self, budget: int = EVALUATIONS) -> int:
+        """Run all threads for one tick.
+
+        Threads that did not get their turn in the last tick come first, then all in the order of their age.
+
+        Args:
+            budget: Evaluations that they may use together.
+
+        Returns:
+            What is left of the budget; at least 0.
+
+        Raises:
+            ScriptError: A thread has failed. All threads have ended.
+        """
+        self.left = budget
+        missed, self._missed = self._missed, []
+        self._turns = missed + [thread for thread in self._threads if thread not in missed]
+        for thread in self._turns:  # it grows where a thread starts another
+            if thread.ended:
+                continue
+            if self.left <= 0 or not self._may_enter(thread):
+                self._missed.append(thread)
+            else:
+                self._turn(thread)
+        return max(self.left, 0)
+
+    def end(self) -> None:
+        """End all threads: GeneratorExit reaches the blocking functions in which they wait."""
+        for thread in reversed(self._threads):
+            self._close(thread)
+        self._threads = []
+
+    def charge(self, work: int) -> None:
+        """Take the elements of a list from the budget.
+
+        Raises:
+            Fault: One statement works on too many.
+        """
+        self.left -= work
+        if self.left < -OVERDRAFT:
+            raise Fault("a statement works on too many list elements at once")
+
+    def _turn(self, thread: Thread) -> None:
+        self._running = thread
+        self.thread = thread.number
+        try:
+            why = next(thread.steps)
+        except StopIteration:
+            self._ended(thread)
+        except Killed:
+            self._ended(thread)
+        except Halted:
+            self.end()
+        except (
+            Fault,
+            ScriptError,
+            NameError,
+            TypeError,
+            ValueError,
+            ArithmeticError,
+            RecursionError,
+        ) as error:
+            script_error = failure(error)
+            self.end()
+            raise script_error from error
+        except BaseException:
+            self.end()
+            raise
+        else:
+            self._waits(thread, spent=why is _SPENT)
+
+    def _waits(self, thread: Thread, *, spent: bool) -> None:
+        if not spent:
+            thread.spent = 0
+            if self._holder is thread:
+                self._holder = None
+            return
+        thread.spent += 1
+        if thread.spent >= PATIENCE:
+            line = _line_of(thread) or 1
+            self.end()
+            raise ScriptError(
+                line,
+                1,
+                f"an endless loop: the thread has computed for {PATIENCE} ticks without waiting for time to pass",
+            )
+
+    def _may_enter(self, thread: Thread) -> bool:
+        if not thread.critical:
+            return True
+        if self._holder is None:
+            self._holder = thread
+        return self._holder is thread
+
+    def _ended(self, thread: Thread) -> None:
+        thread.ended = True
+        if self._holder is thread:
+            self._holder = None
+        if thread is self._main:
+            self.end()
+        elif thread in self._threads:
+            self._threads.remove(thread)
+
+    def _close(self, thread: Thread) -> None:
+        if not thread.ended:
+            thread.ended = True
+            if thread is not self._running or not getattr(thread.steps, "gi_running", False):
+                thread.steps.close()
+        if self._holder is thread:
+            self._holder = None
+
+    def _body(self, function: Callable[[int], Steps]) -> Steps:
+        yield from function(1)
+        if self._finish is not None:
+            yield from self._finish()
+
+    # What compiled code calls.
+
+    def _run(self, function: Callable[[int], Steps]) -> int:
+        if len(self._threads) >= MOST_THREADS:
+            raise Fault(f"a program has at most {MOST_THREADS} threads")
+        self._started += 1
+        thread = Thread(self._started, self._body(function), self._running)
+        self._threads.append(thread)
+        self._turns.append(thread)
+        return self._started
+
+    def _find(self, handle: Value) -> Thread | None:
+        if type(handle) is not int:
+            raise Fault("only the value of `run` names a thread")
+        return next((thread for thread in self._threads if thread.number == handle != 0), None)
+
+    def _kill(self, handle: Value) -> None:
+        victim = self._find(handle)
+        if victim is None:
+            return
+        itself = False
+        for thread in [one for one in self._threads if one.descends_from(victim)]:
+            if thread is self._running:
+                itself = True
+            else:
+                self._close(thread)
+                self._threads.remove(thread)
+        if itself:
+            raise Killed
+
+    def _join(self, handle: Value) -> Steps:
+        thread = self._find(handle)
+        while thread is not None and not thread.ended:
+            yield
+
+    def _enter(self) -> Steps:
+        thread = self._running
+        thread.critical += 1
+        if self._holder is None:
+            self._holder = thread
+        elif self._holder is not thread:
+            yield
+
+    def _exit(self) -> None:
+        thread = self._running
+        thread.critical = max(thread.critical - 1, 0)
+        if not thread.critical and self._holder is thread:
+            self._holder = None
+
+    def _is_equal(self, a: Value, b: Value) -> bool:
+        if isinstance(a, Array):
+            self.charge(a.size)
+        return a == b
+
+    def _is_unequal(self, a: Value, b: Value) -> bool:
+        return not self._is_equal(a, b)
+
+    def _replaced(self, new: Value, indices: tuple[Value, ...], value: Value) -> Value:
+        if isinstance(value, Array):
+            self.charge(len(value.items) // 16)
+        return indexing.replaced(new, indices, value)
+
+    def _surroundings(self, functions: Mapping[str, Callable[..., Any]]) -> dict[str, Any]:
+        def add(a: Any, b: Any) -> Any:
+            if type(a) is float and type(b) is float:
+                return a + b
+            return arithmetic.add(a, b, self.charge)
+
+        def subtract(a: Any, b: Any) -> Any:
+            if type(a) is float and type(b) is float:
+                return a - b
+            return arithmetic.subtract(a, b, self.charge)
+
+        def multiply(a: Any, b: Any) -> Any:
+            if type(a) is float and type(b) is float:
+                return a * b
+            return arithmetic.multiply(a, b, self.charge)
+
+        names: dict[str, Any] = {
+            "__builtins__": {},
+            HERE: self,
+            SPENT: _SPENT,
+            MISSING: _MISSING,
+            "add": add,
+            "subtract": subtract,
+            "multiply": multiply,
+            "divide": lambda a, b: arithmetic.divide(a, b, self.charge),
+            "remainder": arithmetic.remainder,
+            "negate": lambda a: arithmetic.negate(a, self.charge),
+            "is_equal": self._is_equal,
+            "is_unequal": self._is_unequal,
+            "element": indexing.element,
+            "element_of_matrix": indexing.element_of_matrix,
+            "replaced": self._replaced,
+            "listed": Array,
+            "posed": Pose,
+            "run": self._run,
+            "kill": self._kill,
+            "join": self._join,
+            "enter_critical": self._enter,
+            "exit_critical": self._exit,
+            "halt": _halt,
+            "too_deep": _too_deep,
+            **self.script.constants,
+        }
+        for name in self.script.used:
+            names[f"b_{name}"] = self._built_in(name, functions)
+        for code in self.script.functions:
+            names[code.co_name] = FunctionType(code, names)
+        return names
+
+    def _built_in(self, name: str, functions: Mapping[str, Callable[..., Any]]) -> Callable[..., Any]:
+        if name in functions:
+            return functions[name]
+        if name not in PURE:
+            raise ValueError(f"the script calls {name}, which is not given")
+        signature, function = PURE[name]
+        if not signature.linear:
+            return function
+
+        def charged(*arguments: Any) -> Any:
+            self.charge(sum(argument.size for argument in arguments if isinstance(argument, Array)))
+            return function(*arguments)
+
+        return charged
+
+
+def _line_of(thread: Thread) -> int:
+    """Return the line at which a thread is, 0 where it has not begun or has ended."""
+    line = 0
+    steps: Any = thread.steps
+    while (frame := getattr(steps, "gi_frame", None)) is not None:
+        if frame.f_code.co_filename == FILE:
+            line = frame.f_lineno
+        steps = steps.gi_yieldfrom
+    return line
+
+
+def _halt() -> None:
+    raise Halted
+
+
+def _too_deep() -> None:
+    raise TooDeep(f"functions are called more than {DEEPEST_CALLS} deep")

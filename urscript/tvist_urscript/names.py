@@ -1,0 +1,101 @@
+"""Which variable and which function a name means."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Literal
+
+from tvist_urscript import tree
+
+BUILT_IN_ARRAYS: dict[str, tuple[str, str]] = {
+    "digital_in": ("get_digital_in", ""),
+    "digital_out": ("get_digital_out", "set_digital_out"),
+    "analog_in": ("get_analog_in", ""),
+    "analog_out": ("get_analog_out", "set_analog_out"),
+}
+"""Arrays of the controller: the functions that read and write an element."""
+
+
+@dataclass(eq=False)
+class Scope:
+    """What the names inside one function mean.
+
+    A variable is local if it is a parameter, if `local` has declared it further up, or if no global has its name.
+    Everything that the outermost level assigns is global. A function sees its own functions and those of the functions
+    around it, but not the variables of these.
+    """
+
+    function: tree.Function
+    outer: "Scope | None"
+    number: int
+    globals: set[str]
+    functions: dict[str, "Scope"] = field(default_factory=dict)
+    twice: list[tree.Function] = field(default_factory=list)
+    assigned: set[str] = field(default_factory=set)
+    local: set[str] = field(default_factory=set)
+
+    @property
+    def code_name(self) -> str:
+        """The name of its Python function."""
+        return f"f{self.number}_{self.function.name}"
+
+    def variable(self, name: str) -> Literal["local", "global"] | None:
+        """Tell which variable a name means here, None where there is none."""
+        if name in self.local:
+            return "local"
+        if name in self.globals:
+            return "global"
+        return "local" if name in self.assigned else None
+
+    def declare(self, name: str, qualifier: Literal["global", "local"] | None) -> Literal["local", "global"]:
+        """Tell which variable an assignment means, from which on the name means it."""
+        if qualifier == "global" or self.outer is None:
+            return "global"
+        if qualifier == "local":
+            self.local.add(name)
+        return self.variable(name) or "local"
+
+    def find(self, name: str) -> "Scope | None":
+        """Return the script's function of this name that is seen from here."""
+        scope: Scope | None = self
+        while scope is not None:
+            if name in scope.functions:
+                return scope.functions[name]
+            scope = scope.outer
+        return None
+
+
+def scopes(program: tree.Function) -> list[Scope]:
+    """Return the scopes of a program, its own first, then those of its functions in the order of the text."""
+    shared: set[str] = set()
+    found: list[Scope] = []
+    waiting: list[tuple[tree.Function, Scope | None]] = [(program, None)]
+    while waiting:
+        function, outer = waiting.pop()
+        scope = Scope(function, outer, len(found), shared)
+        found.append(scope)
+        scope.local.update(parameter.name for parameter, _ in function.parameters)
+        if outer is not None:
+            if function.name in outer.functions:
+                outer.twice.append(function)
+            outer.functions[function.name] = scope
+        inner: list[tree.Function] = []
+        for statement in _inside(function.body):
+            if isinstance(statement, tree.Function):
+                inner.append(statement)
+            elif not statement.indices:
+                everywhere = outer is None or statement.qualifier == "global"
+                (shared if everywhere else scope.assigned).add(statement.target.name)
+        waiting += [(function, scope) for function in reversed(inner)]
+    return found
+
+
+def _inside(body: list[tree.Statement]) -> Iterator[tree.Assign | tree.Function]:
+    for statement in body:
+        if isinstance(statement, tree.Assign | tree.Function):
+            yield statement
+        elif isinstance(statement, tree.While):
+            yield from _inside(statement.body)
+        elif isinstance(statement, tree.If):
+            for _, branch in statement.branches:
+                yield from _inside(branch)
+            yield from _inside(statement.otherwise)

@@ -1,0 +1,69 @@
+"""The functions of numbers."""
+
+import math
+from collections.abc import Callable
+
+from tvist_urscript.errors import Fault
+from tvist_urscript.values import HIGHEST, LOWEST, Value, number
+
+
+def _real(name: str, of: Callable[[float], float], where: str) -> Callable[[Value], float]:
+    def function(f: Value) -> float:
+        x = number(f, f"the argument of {name}")
+        try:
+            return of(x)
+        except (ValueError, OverflowError):
+            raise Fault(f"{name} takes {where}, not {x:g}") from None
+
+    return function
+
+
+sin = _real("sin", math.sin, "a finite angle")
+cos = _real("cos", math.cos, "a finite angle")
+tan = _real("tan", math.tan, "a finite angle")
+asin = _real("asin", math.asin, "a number from -1 to 1")
+acos = _real("acos", math.acos, "a number from -1 to 1")
+atan = _real("atan", math.atan, "a number")
+sqrt = _real("sqrt", math.sqrt, "a number that is not negative")
+d2r = _real("d2r", math.radians, "a number")
+r2d = _real("r2d", math.degrees, "a number")
+
+
+def atan2(x: Value, y: Value) -> float:
+    """Return the angle of the point whose first argument is opposite, and whose second is adjacent [rad]."""
+    return math.atan2(number(x, "the first argument of atan2"), number(y, "the second argument of atan2"))
+
+
+def power(base: Value, exponent: Value) -> float:
+    """Return base to the power of exponent."""
+    a, b = number(base, "the base of pow"), number(exponent, "the exponent of pow")
+    try:
+        return math.pow(a, b)
+    except (ValueError, OverflowError):
+        raise Fault(f"pow has no value for the base {a:g} and the exponent {b:g}") from None
+
+
+def log(base: Value, f: Value) -> float:
+    """Return the logarithm of f to a base."""
+    a, x = number(base, "the base of log"), number(f, "the second argument of log")
+    try:
+        return math.log(x) / math.log(a)
+    except (ValueError, ZeroDivisionError):
+        raise Fault(f"log has no value for the base {a:g} and the number {x:g}") from None
+
+
+def floor(f: Value) -> int:
+    """Return the largest integer that is not above a number."""
+    return _integer("floor", math.floor, f)
+
+
+def ceil(f: Value) -> int:
+    """Return the smallest integer that is not below a number."""
+    return _integer("ceil", math.ceil, f)
+
+
+def _integer(name: str, of: Callable[[float], int], f: Value) -> int:
+    x = number(f, f"the argument of {name}")
+    if LOWEST <= x <= HIGHEST:
+        return of(x)
+    raise Fault(f"{name} has no integer of 32 bits for {x:g}")

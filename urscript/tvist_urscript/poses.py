@@ -1,0 +1,114 @@
+"""The functions of poses."""
+
+import math
+from typing import Any
+
+from tvist_urscript.errors import Fault
+from tvist_urscript.rotations import (
+    Quaternion,
+    Vector,
+    cross,
+    from_rpy,
+    inverse,
+    product,
+    quaternion,
+    rotation_vector,
+    to_rpy,
+    turned,
+)
+from tvist_urscript.values import Array, Pose, Value, number, pose, vector
+
+
+def _parts(value: Any, what: str) -> tuple[Vector, Quaternion]:
+    x, y, z, rx, ry, rz = pose(value, what).numbers
+    return (x, y, z), quaternion((rx, ry, rz))
+
+
+def _pose(position: Vector, turn: Quaternion) -> Pose:
+    return Pose((*position, *rotation_vector(turn)))
+
+
+def pose_trans(p_from: Value, p_from_to: Value) -> Pose:
+    """Return p_from_to, which is given in the frame p_from, in the frame of p_from itself."""
+    (x, y, z), turn = _parts(p_from, "p_from")
+    offset, inner = _parts(p_from_to, "p_from_to")
+    dx, dy, dz = turned(turn, offset)
+    return _pose((x + dx, y + dy, z + dz), product(turn, inner))
+
+
+def pose_inv(p_from: Value) -> Pose:
+    """Return the pose of the base in the frame p_from."""
+    (x, y, z), turn = _parts(p_from, "p_from")
+    back = inverse(turn)
+    return _pose(turned(back, (-x, -y, -z)), back)
+
+
+def pose_add(p_1: Value, p_2: Value) -> Pose:
+    """Return the sum of the positions and the rotation p_2 followed by p_1: R = R_1 R_2."""
+    a, turn = _parts(p_1, "p_1")
+    b, second = _parts(p_2, "p_2")
+    return _pose((a[0] + b[0], a[1] + b[1], a[2] + b[2]), product(turn, second))
+
+
+def pose_sub(p_to: Value, p_from: Value) -> Pose:
+    """Return the difference of the positions and the rotation from p_from to p_to: R = R_to R_fromᵀ."""
+    a, turn = _parts(p_to, "p_to")
+    b, second = _parts(p_from, "p_from")
+    return _pose((a[0] - b[0], a[1] - b[1], a[2] - b[2]), product(turn, inverse(second)))
+
+
+def pose_dist(p_from: Value, p_to: Value) -> float:
+    """Return the distance of two positions [m]."""
+    return math.dist(pose(p_from, "p_from").numbers[:3], pose(p_to, "p_to").numbers[:3])
+
+
+def point_dist(p_from: Value, p_to: Value) -> float:
+    """Return the distance of two points [m]: poses, or lists whose first three elements are the position."""
+    a, b = vector(p_from, "p_from"), vector(p_to, "p_to")
+    if len(a) < 3 or len(b) < 3:
+        raise Fault("point_dist needs positions of three numbers")
+    return math.dist(a[:3], b[:3])
+
+
+def interpolate_pose(p_from: Value, p_to: Value, alpha: Value) -> Pose:
+    """Return the pose on the line and the shortest rotation between two, at the share alpha."""
+    a, turn = _parts(p_from, "p_from")
+    b, second = _parts(p_to, "p_to")
+    share = float(number(alpha, "alpha"))
+    rx, ry, rz = rotation_vector(product(second, inverse(turn)))
+    step = quaternion((share * rx, share * ry, share * rz))
+    x, y, z = (start + share * (end - start) for start, end in zip(a, b, strict=True))
+    return _pose((x, y, z), product(step, turn))
+
+
+def wrench_trans(T_from_to: Value, w_from: Value) -> Array:
+    """Return a wrench at the origin of the frame "from", seen from and at the frame "to".
+
+    F' = Rᵀ F and M' = Rᵀ (M - t x F), where t and R are those of T_from_to.
+    """
+    offset, turn = _parts(T_from_to, "T_from_to")
+    wrench = vector(w_from, "w_from")
+    if len(wrench) != 6:
+        raise Fault(f"w_from has to be a list of 6 numbers, not of {len(wrench)}")
+    force = (wrench[0], wrench[1], wrench[2])
+    lever = cross(offset, force)
+    back = inverse(turn)
+    moment = turned(back, (wrench[3] - lever[0], wrench[4] - lever[1], wrench[5] - lever[2]))
+    return Array((*turned(back, force), *moment))
+
+
+def rpy2rotvec(rpy_vector: Value) -> Array:
+    """Return the rotation vector of roll, pitch and yaw [rad] about fixed axes."""
+    return Array(rotation_vector(from_rpy(*_three(rpy_vector, "rpy_vector"))))
+
+
+def rotvec2rpy(rotation: Value) -> Array:
+    """Return roll, pitch and yaw [rad] about fixed axes."""
+    return Array(to_rpy(quaternion(_three(rotation, "rotation_vector"))))
+
+
+def _three(value: Value, what: str) -> Vector:
+    numbers = vector(value, what)
+    if len(numbers) != 3:
+        raise Fault(f"{what} has to be a list of 3 numbers, not of {len(numbers)}")
+    return (numbers[0], numbers[1], numbers[2])

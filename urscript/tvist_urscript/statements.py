@@ -1,0 +1,276 @@
+"""Statements and functions of a script as Python's, with the costs that they take from the budget."""
+
+import ast
+from itertools import count
+
+from tvist_urscript import tree
+from tvist_urscript.errors import syntax_error
+from tvist_urscript.expressions import MOST_OPERATIONS, Expressions, Report, first
+from tvist_urscript.names import BUILT_IN_ARRAYS, Scope
+from tvist_urscript.pieces import DEPTH, MISSING, Position
+from tvist_urscript.signatures import Signatures
+
+DEEPEST_CALLS = 200
+"""Calls of functions inside each other."""
+PIECE = 40
+"""Evaluations after which a straight piece of a program looks at the budget."""
+MOST_LOOPS = 15
+"""Loops inside each other; Python has 20 blocks."""
+LINK = 15
+"""Branches of one chain of Python's; longer chains of `elif` are several."""
+
+Branch = tuple[tree.Expression, list[tree.Statement]]
+Link = tuple[Position, ast.expr, list[ast.stmt]]
+
+
+class Statements(Expressions):
+    """Translates functions."""
+
+    def __init__(self, signatures: Signatures, report: Report) -> None:
+        super().__init__(signatures, report)
+        self.loops = 0
+        self.temporary = count()
+
+    def function(self, scope: Scope) -> ast.FunctionDef:
+        """Translate a function of the script, without those inside it."""
+        function = scope.function
+        self.scope, self.globals, self.loops = scope, set(), 0
+        for twice in scope.twice:
+            self.report(twice.line, twice.column, f"{twice.name} is defined twice")
+        at = Position.of(function)
+        parameters = self.parameters(scope)
+        self.cost = 0
+        defaults: list[ast.stmt] = []
+        for name, default in function.parameters:
+            if default is not None:
+                here = Position.of(name)
+                missing = here.compare(here.name(f"v_{name.name}"), ast.Is(), here.name(MISSING))
+                defaults.append(here.branch(missing, [here.assign(f"v_{name.name}", self.value(default))]))
+        too_deep = at.branch(
+            at.compare(at.name(DEPTH), ast.Gt(), at.constant(DEEPEST_CALLS)),
+            [at.statement(at.call("too_deep"))],
+        )
+        body, _ = self.block(function.body, 0)
+        declared: list[ast.stmt] = [ast.Global(sorted(self.globals), **at.given)] if self.globals else []
+        return ast.FunctionDef(
+            scope.code_name,
+            ast.arguments(
+                [], [ast.arg(name, **at.given) for name in [DEPTH, *parameters]], None, [], [], None, []
+            ),
+            [*declared, *at.charge(1, check=True), too_deep, *defaults, *body],
+            [],
+            **at.given,
+        )
+
+    def parameters(self, scope: Scope) -> list[str]:
+        """Check the parameters of a function and return their names in Python."""
+        names: list[str] = []
+        needed = True
+        for name, default in scope.function.parameters:
+            if scope.function.kind == "thread":
+                self.report(
+                    name.line, name.column, f"the thread {scope.function.name} cannot have parameters"
+                )
+            if f"v_{name.name}" in names:
+                self.report(name.line, name.column, f"the parameter {name.name} is named twice")
+            if default is None and not needed:
+                self.report(
+                    name.line, name.column, f"the parameter {name.name} needs a default as the one before it"
+                )
+            needed = needed and default is None
+            names.append(f"v_{name.name}")
+        return names
+
+    def block(self, body: list[tree.Statement], since: int, cost: int = 0) -> tuple[list[ast.stmt], int]:
+        """Translate statements.
+
+        Args:
+            body: They.
+            since: Evaluations that may have passed since something looked at the budget.
+            cost: Evaluations before them that nothing has taken from the budget.
+
+        Returns:
+            Python's statements, and `since` at their end.
+        """
+        result: list[ast.stmt] = []
+        piece: list[ast.stmt] = []
+
+        def flush(at: Position) -> None:
+            nonlocal cost, since
+            since += cost
+            result.extend(at.charge(cost, check=since >= PIECE))
+            since = 0 if since >= PIECE else since
+            result.extend(piece)
+            cost = 0
+            piece.clear()
+
+        for statement in body:
+            at = Position.of(statement)
+            self.cost = 1
+            match statement:
+                case tree.Function():
+                    continue
+                case tree.If():
+                    test = self.test(statement.branches[0][0])
+                    cost += self.limited(statement)
+                    flush(at)
+                    links, since = self.branches(statement, test, since)
+                    result.extend(links)
+                case tree.While():
+                    test = self.test(statement.condition)
+                    turn = self.limited(statement)
+                    cost += turn
+                    flush(at)
+                    result.append(self.loop(statement, test, turn))
+                    since += PIECE
+                case _:
+                    made = self.simple(statement, at)
+                    spent = self.limited(statement)
+                    if cost + spent > PIECE:
+                        flush(at)
+                    cost += spent
+                    piece.extend(made)
+        if cost:
+            flush(Position.of(body[-1]) if body else Position(1, 1))
+        return result, since
+
+    def limited(self, statement: tree.Statement) -> int:
+        """Return the cost of what has been translated, which has a limit."""
+        if self.cost > MOST_OPERATIONS:
+            self.report(
+                statement.line,
+                statement.column,
+                f"a statement of {self.cost} operations is too long: the limit is {MOST_OPERATIONS}",
+            )
+        return self.cost
+
+    def branches(self, statement: tree.If, test: ast.expr, since: int) -> tuple[list[ast.stmt], int]:
+        """Translate the branches of an `if`, of which the first condition is translated and paid for.
+
+        Each branch pays for the conditions before it.
+        """
+        at = Position.of(statement)
+        chains = [
+            statement.branches[start : start + LINK] for start in range(0, len(statement.branches), LINK)
+        ]
+        if len(chains) == 1:
+            links, cost, latest = self.links(statement, chains[0], test, since, 0)
+            otherwise, ends = self.block(statement.otherwise, since, cost)
+            return _chained(links, otherwise), max(latest, ends)
+        # Python nests each `elif` in the one before, and not deep: a variable tells whether a branch has been taken.
+        searching = f"t{next(self.temporary)}"
+        result: list[ast.stmt] = [at.assign(searching, at.constant(True))]
+        latest, cost = since, 0
+        for chain in chains:
+            before: list[ast.stmt] = []
+            if chain is not chains[0]:
+                self.cost = 1
+                test = self.test(chain[0][0])
+                before = at.charge(cost + self.limited(statement), check=True)
+                since = cost = 0
+            links, cost, ends = self.links(statement, chain, test, since, cost)
+            latest = max(latest, ends)
+            for here, _, body in links:
+                body.insert(0, here.assign(searching, here.constant(False)))
+            made = _chained(links, [])
+            result += [at.branch(at.name(searching), [*before, *made])] if before else made
+        otherwise, ends = self.block(statement.otherwise, since, cost)
+        if otherwise:
+            result.append(at.branch(at.name(searching), otherwise))
+        return result, max(latest, ends)
+
+    def links(
+        self, statement: tree.If, chain: list[Branch], test: ast.expr, since: int, cost: int
+    ) -> tuple[list[Link], int, int]:
+        """Translate some branches, of which the first condition is translated and paid for.
+
+        Returns:
+            For each its position, condition and statements; what to pay where none is taken; `since` at the latest.
+        """
+        links: list[Link] = []
+        latest = since
+        for condition, body in chain:
+            if links:
+                self.cost = 1
+                test = self.test(condition)
+                cost += self.limited(statement)
+            made, ends = self.block(body, since, cost)
+            latest = max(latest, ends)
+            links.append((Position(*first(condition)), test, made))
+        return links, cost, latest
+
+    def loop(self, statement: tree.While, test: ast.expr, cost: int) -> ast.stmt:
+        """Translate a loop; each turn looks at the budget."""
+        at = Position.of(statement)
+        self.loops += 1
+        if self.loops > MOST_LOOPS:
+            self.report(statement.line, statement.column, f"more than {MOST_LOOPS} loops are nested here")
+        body, _ = self.block(statement.body, 0)
+        self.loops -= 1
+        return ast.While(test, [*at.charge(cost, check=True), *body], [], **at.given)
+
+    def simple(self, statement: tree.Statement, at: Position) -> list[ast.stmt]:
+        """Translate a statement without statements inside it."""
+        match statement:
+            case tree.Assign():
+                return [self.assign(statement, at)]
+            case tree.Evaluate():
+                return [at.statement(self.value(statement.value))]
+            case tree.Return():
+                value = self.value(statement.value) if statement.value is not None else at.constant(None)
+                return [ast.Return(value, **at.given)]
+            case tree.Handle(word="kill"):
+                return [at.statement(at.call("kill", self.value(statement.value)))]
+            case tree.Handle():
+                return [at.statement(at.waiting(at.call("join", self.value(statement.value))))]
+            case tree.Word():
+                return self.word(statement, at)
+            case _:
+                raise AssertionError(statement)
+
+    def word(self, statement: tree.Word, at: Position) -> list[ast.stmt]:
+        """Translate a statement of one word."""
+        match statement.word:
+            case "pass":
+                return []
+            case "break" | "continue":
+                if not self.loops:
+                    self.report(
+                        statement.line,
+                        statement.column,
+                        syntax_error(statement.line, f"{statement.word} is outside of a loop"),
+                    )
+                return [ast.Break(**at.given) if statement.word == "break" else ast.Continue(**at.given)]
+            case "enter_critical":
+                return [at.statement(at.waiting(at.call("enter_critical")))]
+            case _:
+                return [at.statement(at.call(statement.word))]
+
+    def assign(self, statement: tree.Assign, at: Position) -> ast.stmt:
+        """Translate an assignment. The value is computed before the variable is read or declared."""
+        name, indices = statement.target.name, statement.indices
+        if indices and self.built_in_array(statement.target):
+            setter = BUILT_IN_ARRAYS[name][1]
+            if not setter:
+                self.report(statement.line, statement.column, f"{name} cannot be assigned")
+                return at.statement(at.constant(None))
+            return at.statement(self.call_built_in(at, setter, [*indices, statement.value]))
+        value = self.value(statement.value)
+        if indices:
+            here = Position(*first(indices[0]))
+            self.cost += len(indices)
+            places = at.tuple([self.value(index) for index in indices])
+            value = here.call("replaced", value, places, self.name(statement.target))
+            variable = self.scope.variable(name)
+        else:
+            variable = self.scope.declare(name, statement.qualifier)
+        if variable == "global":
+            self.globals.add(f"g_{name}")
+            return at.assign(f"g_{name}", value)
+        return at.assign(f"v_{name}", value)
+
+
+def _chained(links: list[Link], otherwise: list[ast.stmt]) -> list[ast.stmt]:
+    for at, test, body in reversed(links):
+        otherwise = [at.branch(test, body, otherwise)]
+    return otherwise

@@ -1,0 +1,161 @@
+"""A script as a tree. Each node has the position of the token that an error of it names."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+
+@dataclass(slots=True)
+class Node:
+    """A part of a script.
+
+    Attributes:
+        line: Line of its token, from 1.
+        column: Column of its token, from 1.
+        depth: Levels of nodes below it.
+    """
+
+    line: int
+    column: int
+    depth: int = field(default=1, init=False)
+
+
+@dataclass(slots=True)
+class Constant(Node):
+    """A number, a text, True, False or None."""
+
+    value: int | float | bool | str | None
+
+
+@dataclass(slots=True)
+class Name(Node):
+    """A variable that is read or assigned."""
+
+    name: str
+
+
+@dataclass(slots=True)
+class Listing(Node):
+    """`[a, b]` or `(a, b)`."""
+
+    items: list["Expression"]
+
+
+@dataclass(slots=True)
+class Index(Node):
+    """`a[i]` or `m[i, j]`; or a pose, where the name is `p` and there are six: the names decide."""
+
+    value: "Expression"
+    indices: list["Expression"]
+
+
+@dataclass(slots=True)
+class Argument(Node):
+    """An argument of a call, with its name where it is given by name."""
+
+    name: str | None
+    value: "Expression"
+
+
+@dataclass(slots=True)
+class Call(Node):
+    """`name(arguments)`, or `run name(arguments)`."""
+
+    name: str
+    arguments: list[Argument]
+    runs: bool = False
+
+
+@dataclass(slots=True)
+class Unary(Node):
+    """`-a` or `not a`."""
+
+    operator: Literal["-", "not"]
+    value: "Expression"
+
+
+@dataclass(slots=True)
+class Binary(Node):
+    """Arithmetic or a comparison; its position is that of the operator."""
+
+    operator: str
+    left: "Expression"
+    right: "Expression"
+
+
+@dataclass(slots=True)
+class Logic(Node):
+    """`a and b and c`, or the same with `or` or `xor`."""
+
+    operator: Literal["and", "or", "xor"]
+    values: list["Expression"]
+
+
+Expression = Constant | Name | Listing | Index | Call | Unary | Binary | Logic
+
+
+@dataclass(slots=True)
+class Assign(Node):
+    """`target = value`, with `global` or `local` before it."""
+
+    target: Name
+    indices: list[Expression]
+    value: Expression
+    qualifier: Literal["global", "local"] | None = None
+
+
+@dataclass(slots=True)
+class Evaluate(Node):
+    """An expression as a statement."""
+
+    value: Expression
+
+
+@dataclass(slots=True)
+class If(Node):
+    """`if`, `elif` and `else`."""
+
+    branches: list[tuple[Expression, list["Statement"]]]
+    otherwise: list["Statement"]
+
+
+@dataclass(slots=True)
+class While(Node):
+    """A loop."""
+
+    condition: Expression
+    body: list["Statement"]
+
+
+@dataclass(slots=True)
+class Return(Node):
+    """`return`, with or without a value."""
+
+    value: Expression | None
+
+
+@dataclass(slots=True)
+class Handle(Node):
+    """`kill` or `join` of a thread's handle."""
+
+    word: Literal["kill", "join"]
+    value: Expression
+
+
+@dataclass(slots=True)
+class Word(Node):
+    """A statement of one word."""
+
+    word: Literal["break", "continue", "halt", "pass", "enter_critical", "exit_critical"]
+
+
+@dataclass(slots=True)
+class Function(Node):
+    """A function, a thread, or a whole program; its position is that of its name."""
+
+    kind: Literal["def", "sec", "thread"]
+    name: str
+    parameters: list[tuple[Name, Expression | None]]
+    body: list["Statement"]
+
+
+Statement = Assign | Evaluate | If | While | Return | Handle | Word | Function

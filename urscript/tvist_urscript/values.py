@@ -1,0 +1,225 @@
+"""The values of a script: numbers, booleans, texts and None as Python's own, lists and poses as immutable arrays.
+
+As no value can change, an assignment and an argument are by value without a copy; an assignment to an element gives the
+variable a new list.
+"""
+
+from collections.abc import Iterable, Iterator
+from typing import Any, TypeAlias
+
+from tvist_urscript.errors import Fault
+
+LONGEST = 1000
+"""Elements of a list."""
+LARGEST = 4000
+"""Elements of a list with those of the lists inside it."""
+LONGEST_TEXT = 1023
+"""Bytes of a text in UTF-8."""
+LOWEST, HIGHEST = -(2**31), 2**31 - 1
+"""Integers have 32 bits; a result beyond them is a float."""
+
+
+class Array:
+    """A list.
+
+    Attributes:
+        items: Its elements.
+        size: Number of its elements, with those of the lists inside it.
+
+    Raises:
+        Fault: It has more than LONGEST elements, or more than LARGEST with those inside.
+    """
+
+    __slots__ = ("items", "size")
+    items: tuple["Value", ...]
+    size: int
+
+    def __init__(self, items: Iterable["Value"]) -> None:
+        self.items = tuple(items)
+        size = len(self.items)
+        if size > LONGEST:
+            raise Fault(f"a list of {size} elements is too long: the limit is {LONGEST}")
+        for item in self.items:
+            if isinstance(item, Array):
+                size += item.size
+        if size > LARGEST:
+            raise Fault(
+                f"a list with {size} elements, those of its lists included, is too large: the limit is {LARGEST}"
+            )
+        self.size = size
+
+    def __len__(self) -> int:
+        return len(self.items)
+
+    def __bool__(self) -> bool:
+        return True
+
+    def __iter__(self) -> Iterator["Value"]:
+        return iter(self.items)
+
+    def __getitem__(self, index: int) -> "Value":
+        return self.items[index]
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is type(self) and self.items == other.items
+
+    def __hash__(self) -> int:
+        return hash(self.items)
+
+    def __repr__(self) -> str:
+        return to_str(self)
+
+
+class Pose(Array):
+    """A position [m] and a rotation vector [rad].
+
+    Raises:
+        Fault: It does not consist of six numbers.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, items: Iterable["Value"]) -> None:
+        items = tuple(items)
+        if len(items) != 6:
+            raise Fault(f"a pose consists of 6 numbers, not of {len(items)}")
+        super().__init__(float(number(item, "an element of a pose")) for item in items)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Its six elements."""
+        return self.items  # type: ignore[return-value]
+
+
+Value: TypeAlias = int | float | bool | str | Array | None
+
+KINDS: dict[type, str] = {
+    int: "an integer",
+    float: "a float",
+    bool: "a boolean",
+    str: "a text",
+    Array: "a list",
+    Pose: "a pose",
+    type(None): "None",
+}
+
+
+def kind(value: object) -> str:
+    """Say what a value is, for messages."""
+    return KINDS.get(type(value), "a value of the controller")
+
+
+def number(value: Any, what: str) -> int | float:
+    """Return a value that has to be a number.
+
+    Raises:
+        Fault: It is none; the message calls it `what`.
+    """
+    if type(value) is float or type(value) is int:
+        return value
+    raise Fault(f"{what} has to be a number, not {kind(value)}")
+
+
+def integer(value: Any, what: str) -> int:
+    """Return a value that has to be a whole number; 3.0 is one, since `/` gives floats.
+
+    Raises:
+        Fault: It is none; the message calls it `what`.
+    """
+    if type(value) is int:
+        return value
+    if type(value) is float and value.is_integer() and LOWEST <= value <= HIGHEST:
+        return int(value)
+    if type(value) is float:
+        raise Fault(f"{what} has to be an integer, not {to_str(value)}")
+    raise Fault(f"{what} has to be an integer, not {kind(value)}")
+
+
+def text(value: Any, what: str) -> str:
+    """Return a value that has to be a text.
+
+    Raises:
+        Fault: It is none; the message calls it `what`.
+    """
+    if type(value) is str:
+        return value
+    raise Fault(f"{what} has to be a text, not {kind(value)}")
+
+
+def array(value: Any, what: str) -> Array:
+    """Return a value that has to be a list; a pose is none.
+
+    Raises:
+        Fault: It is none; the message calls it `what`.
+    """
+    if type(value) is Array:
+        return value
+    raise Fault(f"{what} has to be a list, not {kind(value)}")
+
+
+def pose(value: Any, what: str) -> Pose:
+    """Return a value that has to be a pose.
+
+    Raises:
+        Fault: It is none; the message calls it `what`.
+    """
+    if type(value) is Pose:
+        return value
+    raise Fault(f"{what} has to be a pose, not {kind(value)}")
+
+
+def vector(value: Any, what: str) -> tuple[float, ...]:
+    """Return the elements of a list of numbers or of a pose.
+
+    Raises:
+        Fault: It is neither; the message calls it `what`.
+    """
+    if not isinstance(value, Array):
+        raise Fault(f"{what} has to be a list of numbers, not {kind(value)}")
+    return tuple(float(number(item, f"an element of {what}")) for item in value.items)
+
+
+def whole(value: int) -> int | float:
+    """Return an integer of 32 bits as it is, a larger one as a float."""
+    return value if LOWEST <= value <= HIGHEST else float(value)
+
+
+def short(value: str) -> str:
+    """Return a text that is not too long.
+
+    Raises:
+        Fault: It has more than LONGEST_TEXT bytes.
+    """
+    size = len(value) if value.isascii() else len(value.encode(errors="surrogatepass"))
+    if size > LONGEST_TEXT:
+        raise Fault(f"a text of {size} bytes is too long: the limit is {LONGEST_TEXT}")
+    return value
+
+
+def to_str(value: Value) -> str:
+    """Write a value as the controller does: floats with six decimals, without zeros at their end.
+
+    Raises:
+        Fault: The text is too long.
+    """
+    return short(_written(value))
+
+
+def _written(value: Value) -> str:
+    if type(value) is str:
+        return value
+    if type(value) is float:
+        written = f"{value:.6f}"
+        if "." in written:
+            written = written.rstrip("0").rstrip(".")
+        return "0" if written == "-0" else written
+    if isinstance(value, Array):
+        parts: list[str] = []
+        length = 0
+        for item in value.items:
+            parts.append(_written(item))
+            length += len(parts[-1]) + 2
+            if length > LONGEST_TEXT + 8:
+                raise Fault(f"a list is too long as a text: the limit is {LONGEST_TEXT} bytes")
+        return f"{'p' if type(value) is Pose else ''}[{', '.join(parts)}]"
+    return str(value)
