@@ -64,12 +64,15 @@ def run_in_lockstep(
                 recorder.close()
                 record.unlink(missing_ok=True)
             raise
-        while not watch.over:
-            while waiting:
-                host.request(encode(waiting.pop()))
-            host.tick()
-            if watch.news or watch.tick % ATTEND_EVERY == 0:
-                attend(watch)
+        try:
+            while not watch.over:
+                while waiting:
+                    host.request(encode(waiting.pop()))
+                host.tick()
+                if watch.news or watch.tick % ATTEND_EVERY == 0:
+                    attend(watch)
+        except KeyboardInterrupt:
+            watch.end("signal", "SIGINT ended the run")
     return watch
 
 
