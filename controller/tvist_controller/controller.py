@@ -91,12 +91,12 @@ class Controller:
         self._setpoints = Setpoints(self.session, self.motion, self.counters)
         safety = SafetyControl(self.motion, self._emit)
         self._faults = Faults(self.motion, safety)
-        self.filters = Filters(self.motion, source, setup.payload, self._emit)
-        self._payload = DeclaredPayload(setup.payload, self.motion, self.filters, self._emit)
         self.peripherals = Peripherals(self._reporter.set_tcp, self.motion.set_tcp)
         guidance = Guidance(self.motion)
         self.programs = ProgramPlayer(self._access(guidance, order or self._commands.plan_later), safety)
         self._told_program = self.programs.progress
+        self.filters = Filters(self.motion, source, setup.payload, self._emit)
+        self._payload = DeclaredPayload(setup.payload, self.motion, self.filters, self._emit)
         parts = (
             self._authority, MotionCommands(self.motion, safety, self.programs),
             GuidedCommands(guidance, setup.description, self.programs), self.filters, self._payload, self.peripherals,

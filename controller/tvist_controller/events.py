@@ -25,6 +25,8 @@ class Fields(Told, total=False):
     program: str | None
     title: str | None
     level: Literal["message", "warning", "error"] | None
+    blocking: bool | None
+    secondary: bool | None
 
 
 class Emit(Protocol):

@@ -124,6 +124,10 @@ class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc
     """Title of a popup."""
     level: Literal["message", "warning", "error"] | None = None
     """How serious a popup is."""
+    blocking: bool | None = None
+    """Whether the program waits until the popup is closed."""
+    secondary: bool | None = None
+    """Whether the program runs beside the one that `io` tells of; null for that one itself."""
 
 
 class Truth(Struct, frozen=True, kw_only=True, tag_field="type", tag="truth", gc=False):

@@ -167,7 +167,7 @@ def test_servoj_follows_and_the_end_of_its_thread_stops_the_arm():
         robot,
         "thread servo():",
         "  while True:",
-        f"    servoj({[angle + 0.5 for angle in URSIM]})",
+        f"    servoj({[angle + 0.1 for angle in URSIM]})",
         "  end",
         "end",
         "handle = run servo()",

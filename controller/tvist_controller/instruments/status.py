@@ -83,13 +83,24 @@ class StatusValues(Reading):
 
     @property
     def runtime_state(self) -> int:
-        """State: RTDE's number; 1 is STOPPED, 2 PLAYING: a motion or a stream runs."""
-        return self.state.runtime_state
+        """Computed: that of the program; of the motion if no program runs; 1 is STOPPED, 2 PLAYING, 4 PAUSED.
+
+        A paused program whose arm still moves is PAUSING, 3.
+        """
+        moving = self.state.runtime_state
+        match self.io.program_state:
+            case "PLAYING":
+                return RuntimeState.PLAYING
+            case "PAUSED" if moving in {RuntimeState.STOPPING, RuntimeState.PAUSING}:
+                return RuntimeState.PAUSING
+            case "PAUSED":
+                return RuntimeState.PAUSED
+        return moving
 
     @property
     def robot_status_bits(self) -> int:
         """Computed: from the modes; bit 0 is power on, bit 1 running; bits 2 and 3, of two buttons, are 0."""
-        return int(self.powered) | (self.state.runtime_state in _RUNNING) << 1
+        return int(self.powered) | (self.runtime_state in _RUNNING) << 1
 
     @property
     def safety_status_bits(self) -> int:
@@ -113,8 +124,8 @@ class StatusValues(Reading):
 
     @property
     def script_control_line(self) -> int:
-        """Constant: 0; no program is run."""
-        return 0
+        """Io: line of the program, counted from 1; 0 if no program runs. It is up to date to a tenth of a second."""
+        return self.io.program_line
 
     @property
     def actual_main_voltage(self) -> float:

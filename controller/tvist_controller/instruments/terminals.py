@@ -91,8 +91,8 @@ class TerminalValues(Reading):
 
     @property
     def tool_output_voltage(self) -> int:
-        """Constant: 0, the tool's supply is off [V]."""
-        return 0
+        """Io: voltage of the tool's supply; 0 if it is off [V]."""
+        return self.io.tool_output_voltage
 
     @property
     def tool_output_current(self) -> float:

@@ -112,7 +112,7 @@ class ProgramArm:
             self._check_ready()
             plan = yield from self._planned(path.legs)
             if isinstance(plan.found, RefusalError):
-                self._refused(plan.found)
+                self._refused(plan.found, path.legs)
                 yield  # in a protective stop the program is paused here, and tries again when it is resumed
                 continue
             command = _command(path.legs)
@@ -163,10 +163,10 @@ class ProgramArm:
         except RefusalError as refusal:
             raise Fault(refusal.reply.why) from refusal
 
-    def _refused(self, refusal: RefusalError) -> None:
-        """End a program whose move is impossible, or stop the arm if it is impossible to carry it through."""
+    def _refused(self, refusal: RefusalError, legs: list[Segment]) -> None:
+        """End a program whose move is impossible, or stop the robot if it is a line or path that leads nowhere."""
         reply = refusal.reply
-        if reply.code not in _UNREACHABLE:
+        if isinstance(_command(legs), MoveJ) or reply.code not in _UNREACHABLE:
             raise Fault(reply.why)
         self._motion.protect(f"the program's move was refused: {reply.why}", reply.code)
 

@@ -178,7 +178,8 @@ class ProgramPlayer:
     def _close(self, running: _Running, why: str | None = None) -> None:
         self._all.remove(running)
         running.machine.end()
-        self._emit("program_stopped", program=running.name, why=why)
+        secondary = running.script.secondary or None
+        self._emit("program_stopped", program=running.name, why=why, secondary=secondary)
         if running is self._main:
             self._main, self.state, self.line = None, "STOPPED", 0
             self._watchdogs.clear()
@@ -287,5 +288,5 @@ class ProgramPlayer:
         machine = Machine(script, self._functions, finish=self.arm.finish)
         running = _Running(name, script, machine)
         self._all.append(running)
-        self._emit("program_started", program=name)
+        self._emit("program_started", program=name, secondary=script.secondary or None)
         return running

@@ -18,16 +18,17 @@ class Popups:
         """Whether there is a popup that nobody has closed."""
         self.rows = (Row(ProgramClosePopup, self._close, lease="none"),)
 
-    def show(self, text: str, title: str, kind: str) -> None:
+    def show(self, text: str, title: str, kind: str, *, blocking: bool) -> None:
         """Show a popup.
 
         Args:
             text: What it says.
             title: Its title.
             kind: `message`, `warning` or `error`.
+            blocking: Whether the program waits until it is closed.
         """
         self.shown = True
-        self._emit("popup", why=text, title=title, level=kind)
+        self._emit("popup", why=text, title=title, level=kind, blocking=blocking)
 
     def close(self) -> None:
         """Close the popup, if there is one."""

@@ -40,9 +40,10 @@ class MessageFunctions:
         """Show a message; with `blocking`, wait until somebody closes it."""
         text, head = to_str(s), to_str(title)
         kind = "error" if flag("error", error) else "warning" if flag("warning", warning) else "message"
+        waits = flag("blocking", blocking)
         yield from self._arm.finish()
-        self._popups.show(text, head, kind)
-        if flag("blocking", blocking):
+        self._popups.show(text, head, kind, blocking=waits)
+        if waits:
             while self._popups.shown:
                 yield
 

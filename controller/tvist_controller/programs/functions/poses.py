@@ -10,7 +10,6 @@ from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import a_list, a_pose, is_pose, numbers, pose
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.refusal import RefusalError, check_joints
-from tvist_controller.setup import body
 
 _INVERSE = "x, qnear=None, maxPositionError=1e-10, maxOrientationError=1e-10, tcp=None"
 SIGNATURES = {
@@ -34,7 +33,7 @@ class PoseFunctions:
     def __init__(self, access: Access, kinematics: ProgramKinematics) -> None:
         self._access, self._kinematics = access, kinematics
         self._joints = access.description.joints
-        self._dynamics = InverseDynamics(access.description, body(access.declared()))
+        self._dynamics = InverseDynamics(access.description, access.motion.cycle.inverse_dynamics.payload)
 
     def get_inverse_kin(
         self, x: object, qnear: object, position_error: object, orientation_error: object, tcp: object

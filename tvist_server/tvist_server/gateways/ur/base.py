@@ -61,6 +61,11 @@ class PortSession(ABC):
         """Whether the client is being sent what it requested; it may then be silent for any time."""
         return False
 
+    @property
+    def waiting(self) -> int:
+        """Number of received requests that wait for others to be carried out; many of them pause reading."""
+        return 0
+
     def opened(self) -> None:  # noqa: B027  not every session has to
         """Send the greeting, if any, to a client that has just connected."""
 

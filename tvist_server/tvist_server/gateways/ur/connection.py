@@ -137,7 +137,7 @@ class Connection(asyncio.BufferedProtocol):
             return
         if session.over:
             transport.close()
-        elif self._behind or self._control.unanswered >= MAX_COMMANDS:
+        elif self._behind or self._control.unanswered + session.waiting >= MAX_COMMANDS:
             transport.pause_reading()
         else:
             transport.resume_reading()

@@ -153,7 +153,7 @@ class ConnectionControl(ControllerAccess):
 
     def lasting(self) -> "ConnectionControl":
         """Return a further access for the same host, which does not end with the connection."""
-        return ConnectionControl(self._lease)
+        return ConnectionControl(self._lease, self._hear, self.peer)
 
     def leave(self) -> None:
         """Give back control, when the connection or what outlasted it has ended."""

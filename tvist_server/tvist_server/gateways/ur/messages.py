@@ -96,12 +96,22 @@ def safety_mode(time: int, mode: int) -> bytes:
     return _message(time, MessageKind.SAFETY_MODE, _SAFETY.pack(0, 0, mode & 0xFF, 0, 0))
 
 
-def popup(time: int, title: str, what: str) -> bytes:
-    """Encode a pop-up window for the person at the robot; it expects no answer."""
+def popup(
+    time: int, title: str, what: str, *, warning: bool = False, error: bool = False, blocking: bool = False
+) -> bytes:
+    """Encode a pop-up window for the person at the robot; it asks for no value.
+
+    Args:
+        time: Time of the message [µs].
+        title: Title of the window.
+        what: What it says.
+        warning: Whether it is a warning.
+        error: Whether it is an error.
+        blocking: Whether the program waits until it is closed.
+    """
     head = _text(title, 255)
-    return _message(
-        time, MessageKind.POPUP, _POPUP.pack(0, 0, False, False, False, len(head)) + head + _text(what)
-    )
+    body = _POPUP.pack(0, 0, warning, error, blocking, len(head)) + head + _text(what)
+    return _message(time, MessageKind.POPUP, body)
 
 
 def _message(time: int, kind: MessageKind, body: bytes) -> bytes:

@@ -1,23 +1,36 @@
-"""The controller's program as UR's interfaces present it: by path, key message and runtime exception."""
+"""The controller's programs as UR's interfaces present them: by path, key message, popup and runtime exception."""
 
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable
 from pathlib import PurePosixPath
-from typing import Protocol
+from typing import Final, Protocol
 
 from tvist_controller.instruments.snapshot import Snapshot
-from tvist_controller.programs.built_in import ProgramLine
 from tvist_protocol.io import Io
-from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramState, ProgramStop
+from tvist_protocol.programs import (
+    ProgramClosePopup,
+    ProgramLoad,
+    ProgramPause,
+    ProgramPlay,
+    ProgramRun,
+    ProgramState,
+    ProgramStop,
+)
 from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import Event
 from tvist_server.gateways.ur import messages
 from tvist_server.gateways.ur.base import ControllerAccess
 
-FOLDER = "/programs"
+FOLDER: Final = "/programs"
 """Folder in which a controller keeps programs; every other folder is accepted too."""
+_SAVED: Final = (".urp", ".script")
+"""How the names of files end. The name of a script that a client has sent has no ending."""
+_PLACE: Final = re.compile(r"text:(\d+):(\d+)")
 
 Heard = Callable[[bool], None]
 """Takes whether the request succeeded."""
+Outcome = Callable[[Refused | None], None]
+"""Takes the refusal, or None if the request succeeded."""
 
 
 class ProgramRobot(Protocol):
@@ -32,68 +45,91 @@ class ProgramRobot(Protocol):
 
 
 class Programs:
-    """Asks the controller to load, play, pause and stop a program, and reports its state to clients.
+    """Asks the controller to load, run, play, pause and stop programs, and reports to clients what they do.
 
     It learns the program's state from replies and from `io`, which arrive in the controller's order.
 
     Args:
         host: Access to the robot.
-        known: Programs that can be loaded: name to moves.
     """
 
-    def __init__(self, host: ProgramRobot, known: Mapping[str, Sequence[ProgramLine]]) -> None:
+    def __init__(self, host: ProgramRobot) -> None:
         self._host = host
-        self._known = known
         self.path: str | None = None
-        """Path of the loaded program; None before the first."""
+        """Path of the loaded program; only its name if a client has sent it as a script; None before the first."""
         self.state: ProgramState = "STOPPED"
         self._control: ControllerAccess | None = None
         """Access of the client that plays the program. It lasts as long as the program, even after the client
         disconnects.
         """
+        self._beginning: list[ControllerAccess] = []
+        """Accesses of clients whose secondary programs were accepted, before `program_started` tells of them."""
+        self._beside: list[ControllerAccess] = []
+        """Accesses of clients whose secondary programs run. They last until no secondary program runs."""
+        self._running_beside = 0
 
     @property
     def name(self) -> str | None:
-        """File name of the loaded program."""
+        """File name of the loaded program, or the name of the script."""
         return None if self.path is None else PurePosixPath(self.path).name
+
+    @property
+    def saved(self) -> bool:
+        """Whether the loaded program is a file."""
+        return self.path is not None and self.path.endswith(_SAVED)
 
     @property
     def playing(self) -> bool:
         """Whether a program runs."""
         return self.state == "PLAYING"
 
-    @property
-    def paused(self) -> bool:
-        """Whether a program is paused."""
-        return self.state == "PAUSED"
+    # ------------------------------------------------------------------ requests
 
-    @property
-    def moves(self) -> bool:
-        """Whether a program that moves the arm is running or paused."""
-        return self.state != "STOPPED" and bool(self._known.get(self.name or ""))
-
-    def has(self, path: str) -> bool:
-        """Return whether there is such a file; the folders in its path are ignored."""
-        return PurePosixPath(path).name in self._known
-
-    def load(self, path: str, control: ControllerAccess, heard: Heard) -> None:
+    def load(self, path: str, control: ControllerAccess, outcome: Outcome) -> None:
         """Load a program, and stop the running one.
 
         Args:
             path: Path of the file; its folders are ignored.
             control: Access of the client that loads it.
-            heard: Called once.
+            outcome: Called once.
         """
         name = PurePosixPath(path).name
 
         def then(reply: Reply) -> None:
-            loaded = not isinstance(reply, Refused)
-            if loaded:
+            refused = reply if isinstance(reply, Refused) else None
+            if refused is None:
                 self._become("STOPPED")
-                self.path = path if "/" in path else f"{FOLDER}/{name}"
-            heard(loaded)
+                self.path = path if "/" in path else _path_of(name)
+            outcome(refused)
 
-        control.ask(ProgramLoad(name=name), then)
+        if name:
+            control.ask(ProgramLoad(name=name), then)
+        else:
+            outcome(Refused(code="out_of_range", where="name", why="the path does not name a file"))
+
+    def run(self, text: str, control: ControllerAccess, outcome: Outcome, *, secondary: bool) -> None:
+        """Start a script that a client has sent.
+
+        Args:
+            text: Its text in URScript.
+            control: Access of the client, which has to last until the reply.
+            outcome: Called once, as soon as the script has started or was refused.
+            secondary: Whether it runs beside the program, and does not replace it.
+        """
+        lasting = control.lasting()
+
+        def then(reply: Reply) -> None:
+            refused = reply if isinstance(reply, Refused) else None
+            if refused is not None:
+                lasting.leave()
+                self._except(refused)
+            elif secondary:
+                self._beginning.append(lasting)
+            else:
+                self._hold(lasting)
+            outcome(refused)
+
+        lasting.change(lambda token: ProgramRun(token=token, text=text), then)
 
     def play(self, control: ControllerAccess, heard: Heard) -> None:
         """Start the loaded program, or resume a paused one.
@@ -131,7 +167,7 @@ class Programs:
             control.change(lambda token: ProgramPause(token=token), self._changed("PAUSED", heard))
 
     def stop(self, control: ControllerAccess, heard: Heard) -> None:
-        """Stop the program and any motion; no control is needed.
+        """Stop all programs and any motion; no control is needed.
 
         Args:
             control: Access of the client that stops it.
@@ -139,18 +175,58 @@ class Programs:
         """
         control.ask(ProgramStop(), self._changed("STOPPED", heard))
 
+    def close_popup(self, control: ControllerAccess, heard: Heard) -> None:
+        """Close the popup of a program, which may be waiting for that; no control is needed.
+
+        Args:
+            control: Access of the client that closes it.
+            heard: Called once.
+        """
+        control.ask(ProgramClosePopup(), lambda reply: heard(not isinstance(reply, Refused)))
+
+    # ------------------------------------------------------------------ what the robot tells
+
     def io(self, io: Io) -> None:
         """Take over the program's state from the controller."""
         if io.program is not None and io.program != self.name:
-            self._become("STOPPED")  # the previous program, under its own name
-            self.path = f"{FOLDER}/{io.program}"
+            self.path = _path_of(io.program)
         self._become(io.program_state)
 
     def event(self, event: Event) -> None:
-        """Handle an event of the robot."""
-        if event.line is not None:
+        """Handle an event of the robot: tell the clients if it concerns a program."""
+        stamp, program = messages.stamp(self._host.latest), event.program or ""
+        match event.kind:
+            case "program_started" | "program_stopped" if event.secondary:
+                self._count_beside(started=event.kind == "program_started")
+            case "program_started":
+                self._host.tell(messages.key(stamp, "PROGRAM_XXX_STARTED", _title(program)))
+            case "program_stopped":
+                self._host.tell(messages.key(stamp, "PROGRAM_XXX_STOPPED", _title(program)))
+            case "text":
+                self._host.tell(messages.text(stamp, event.why or ""))
+            case "popup":
+                shown = messages.popup(
+                    stamp,
+                    event.title or "",
+                    event.why or "",
+                    warning=event.level == "warning",
+                    error=event.level == "error",
+                    blocking=bool(event.blocking),
+                )
+                self._host.tell(shown)
+            case "warning" if event.line is not None:
+                why = event.why or ""
+                self._host.tell(messages.runtime_exception(stamp, event.line, event.column or 1, why))
+
+    def _except(self, refused: Refused) -> None:
+        """Tell all clients where the text of a program is not valid."""
+        place = _PLACE.fullmatch(refused.where)
+        if refused.code == "script_error" and place is not None:
+            line, column = map(int, place.groups())
             stamp = messages.stamp(self._host.latest)
-            self._host.tell(messages.runtime_exception(stamp, event.line, 1, event.why or ""))
+            self._host.tell(messages.runtime_exception(stamp, line, column, refused.why))
+
+    # ------------------------------------------------------------------ state and control
 
     def _changed(self, state: ProgramState, heard: Heard) -> Callable[[Reply], None]:
         def then(reply: Reply) -> None:
@@ -162,17 +238,36 @@ class Programs:
         return then
 
     def _become(self, state: ProgramState) -> None:
-        before, self.state = self.state, state
+        self.state = state
         if state == "STOPPED":
             self._hold(None)
-        if "STOPPED" in {before, state} and before != state:
-            self._say("PROGRAM_XXX_STOPPED" if state == "STOPPED" else "PROGRAM_XXX_STARTED")
 
     def _hold(self, control: ControllerAccess | None) -> None:
         before, self._control = self._control, control
         if before is not None:
             before.leave()
 
-    def _say(self, title: str) -> None:
-        stamp = messages.stamp(self._host.latest)
-        self._host.tell(messages.key(stamp, title, (self.name or "").removesuffix(".urp")))
+    def _count_beside(self, *, started: bool) -> None:
+        """Count the secondary programs, and leave the accesses of those that have ended."""
+        if started:
+            self._running_beside += 1
+            self._beside += self._beginning
+            self._beginning = []
+            return
+        self._running_beside = max(self._running_beside - 1, 0)
+        if self._running_beside == 0:
+            ended, self._beside = self._beside, []
+            for control in ended:
+                control.leave()
+
+
+def _path_of(name: str) -> str:
+    """Path that clients are told: that of a file, or only the name of a script."""
+    return f"{FOLDER}/{name}" if name.endswith(_SAVED) else name
+
+
+def _title(name: str) -> str:
+    """Name of a program in key messages."""
+    for ending in _SAVED:
+        name = name.removesuffix(ending)
+    return name

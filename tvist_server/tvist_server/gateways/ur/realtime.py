@@ -107,10 +107,14 @@ class RealtimeSession(PortSession):
                 self._orders.carry_out(unit)
 
     def closed(self) -> None:
-        """Report what the client leaves unfinished."""
-        unfinished = self._intake.unfinished
-        if self._orders is not None and unfinished is not None:
-            self._orders.leave(unfinished)
+        """Report what the client leaves unfinished, and carry out what it has finished."""
+        if self._orders is not None:
+            self._orders.leave(self._intake.unfinished)
+
+    @property
+    def waiting(self) -> int:
+        """Number of units of its text that wait to be carried out."""
+        return 0 if self._orders is None else self._orders.waiting
 
     def sample(self, snapshot: Snapshot) -> bytes:
         """Return the package of the tick."""

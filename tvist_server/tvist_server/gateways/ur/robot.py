@@ -4,7 +4,6 @@ from collections.abc import Callable
 from zlib import crc32
 
 from tvist_controller.instruments.snapshot import Snapshot
-from tvist_controller.programs.built_in import built_in
 from tvist_plant.description import RobotDescription
 from tvist_server.gateways.ur.input_owners import InputOwners
 from tvist_server.gateways.ur.programs import Programs
@@ -39,7 +38,7 @@ class UrRobot:
         self.operational_mode = NO_MODE
         """Operational mode set by the dashboard."""
         self.inputs = InputOwners()
-        self.programs = Programs(self, built_in(description))
+        self.programs = Programs(self)
         self._tell = tell
         self._report = report
 

@@ -24,8 +24,8 @@ TOO_SOON: Final = (
 
 Answer = Callable[[str], None]
 """Takes the answer, once, now or later."""
-AtRest = Callable[[bool, Callable[[bool], None]], None]
-"""Takes whether something was moving and a function to call at rest, with whether rest was reached in time."""
+AtRest = Callable[[Callable[[bool], None]], None]
+"""Takes a function to call at rest, with whether rest was reached in time."""
 
 
 @dataclass(frozen=True)
@@ -121,23 +121,21 @@ def _safety(number: int | None) -> str:
 
 
 def _load(request: Request) -> None:
-    path, programs = request.argument, request.robot.programs
-    moves = programs.moves
+    path = request.argument
     failed = f"Error while loading program: {path}"
 
-    def heard(accepted: bool) -> None:
-        if accepted:
+    def outcome(refused: Refused | None) -> None:
+        if refused is None:
             loaded = f"Loading program: {path}"
-            request.at_rest(moves, lambda well: request.answer(loaded if well else failed))
-        else:
-            request.answer(failed)
+            request.at_rest(lambda well: request.answer(loaded if well else failed))
+            return
+        request.robot.report(f"the program {path} was not loaded for {request.control.peer}: {refused.why}")
+        request.answer(f"File not found: {path}" if refused.where == "name" else failed)
 
     if request.control.held_by_other:
         request.answer(failed)
-    elif not programs.has(path):
-        request.answer(f"File not found: {path}")
     else:
-        programs.load(path, request.control, heard)
+        request.robot.programs.load(path, request.control, outcome)
 
 
 def _load_installation(request: Request) -> None:
@@ -159,11 +157,11 @@ def _pause(request: Request) -> None:
 
 
 def _stop(request: Request) -> None:
-    moves, stopped = request.robot.programs.moves, request.if_done("Stopped")
+    stopped = request.if_done("Stopped")
 
     def heard(well: bool) -> None:
         if well:
-            request.at_rest(moves, stopped)
+            request.at_rest(stopped)
         else:
             request.failed()
 
@@ -185,8 +183,8 @@ def _loaded_program(request: Request) -> None:
 
 
 def _is_program_saved(request: Request) -> None:
-    name = request.robot.programs.name
-    request.answer(f"{_bool(name is not None)} {name or UNNAMED}")
+    programs = request.robot.programs
+    request.answer(f"{_bool(programs.saved)} {programs.name or UNNAMED}")
 
 
 # ---------------------------------------------------------------------- the person at the robot
@@ -196,6 +194,10 @@ def _popup(request: Request) -> None:
     stamp = messages.stamp(request.robot.latest)
     request.robot.tell(messages.popup(stamp, "Message", request.argument))
     request.answer("showing popup")
+
+
+def _close_popup(request: Request) -> None:
+    request.robot.programs.close_popup(request.control, request.if_done("closing popup"))
 
 
 def _add_to_log(request: Request) -> None:
@@ -278,7 +280,7 @@ COMMANDS: Final = (
     Command("get loaded program", _loaded_program),
     Command("isProgramSaved", _is_program_saved),
     Command("popup", _popup, argument=True),
-    Command("close popup", _say("closing popup")),
+    Command("close popup", _close_popup),
     Command("addToLog", _add_to_log, argument=True),
     Command("saveLog", _say("Log saved to disk")),
     Command("set operational mode", _set_operational_mode, argument=True),

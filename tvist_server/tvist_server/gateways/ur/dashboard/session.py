@@ -113,10 +113,10 @@ class DashboardSession(PortSession):
             keyword = command.keyword
             command.carry_out(Request(self._robot, self._control, keyword, argument, answer, self._at_rest))
 
-    def _at_rest(self, moves: bool, then: Callable[[bool], None]) -> None:
+    def _at_rest(self, then: Callable[[bool], None]) -> None:
         """Call a function at rest, see `AtRest`, so that a stopped program can be played once its stop is answered."""
         latest = self._robot.latest
-        if latest is None or (latest.runtime_state == RuntimeState.STOPPED and not moves):
+        if latest is None or latest.runtime_state == RuntimeState.STOPPED:
             then(True)
         else:
             self._rested, self._last = then, latest.state.tick + PATIENCE

@@ -1,5 +1,6 @@
-"""Commands from clients of the primary, secondary or real-time interface."""
+"""Commands and programs from clients of the primary, secondary or real-time interface."""
 
+from collections import deque
 from collections.abc import Callable
 from typing import Final
 
@@ -10,20 +11,23 @@ from tvist_server.gateways.ur.messages import ErrorLevel
 from tvist_server.gateways.ur.primary.scripts import LONGEST, Unit
 from tvist_server.gateways.ur.robot import UrRobot
 
-NOT_RUN: Final = "program_not_run: this controller does not run URScript programs yet"
 TOO_LONG: Final = f"program_too_long: it has more than {LONGEST} bytes and was thrown away"
 READ_ONLY: Final = (
     "this interface is read-only: somebody else controls the robot, or the port takes no commands"
 )
 
+Done = Callable[[], None]
+"""Called once when a unit was carried out or refused."""
+
 
 class Orders:
-    """Carries out units of script text: a few commands that are not URScript programs; it declines all others.
+    """Carries out units of script text in their order: the next begins when the previous one was answered.
 
-    The outcome of each unit is also reported on the server's console, since few clients show their answers.
+    A few commands are the interface's own; everything else is a program for the controller. The outcome of each unit
+    is also reported on the server's console, since few clients show their answers.
 
     Args:
-        robot: Robot that carries out the commands.
+        robot: Robot that carries out the units.
         control: Access to its controller.
         answer: Sends a robot message to the client, or to the clients that receive its messages.
     """
@@ -32,19 +36,79 @@ class Orders:
         self._robot = robot
         self._control = control
         self._answer = answer
+        self._units: deque[Unit] = deque()
+        self._begun = self._ended = 0
+        """Number of units begun, and answered."""
+        self._working = False
+        self._lasting: ControllerAccess | None = None
+        """Access for what is left to do after the connection was closed."""
+
+    @property
+    def waiting(self) -> int:
+        """Number of units that are not yet answered."""
+        return len(self._units) + self._begun - self._ended
 
     def carry_out(self, unit: Unit) -> None:
-        """Carry out a unit."""
-        if unit.too_long:
-            self._except(unit, TOO_LONG)
-            self._report(unit, f"was refused: it has more than {LONGEST} bytes")
+        """Carry out a unit in its turn."""
+        self._units.append(unit)
+        self._work()
+
+    def leave(self, unfinished: Unit | None) -> None:
+        """Take note that the connection was closed; its complete units are still carried out.
+
+        Args:
+            unfinished: Beginning of a unit that did not arrive completely, which is reported.
+        """
+        if unfinished is not None:
+            self._report(unfinished, "was not run: the connection ended before its last line feed")
+        if self.waiting:
+            self._control = self._lasting = self._control.lasting()
+
+    def decline(self, unit: Unit) -> None:
+        """Report that this interface accepts no commands."""
+        self._read_only()
+        self._report(unit, "was refused: this port is read-only")
+
+    def _work(self) -> None:
+        """Carry out the waiting units, until one has to wait for its answer."""
+        if self._working:
             return
-        words = unit.words if len(unit.text) < 1000 else ""
-        robot, control = self._robot, self._control
+        self._working = True
+        while self._units and self._begun == self._ended:
+            self._begin(self._units.popleft())
+        self._working = False
+        if self._lasting is not None and not self.waiting:
+            self._lasting.leave()
+            self._lasting = None
+
+    def _begin(self, unit: Unit) -> None:
+        self._begun += 1
+
+        def done() -> None:
+            self._ended += 1
+            self._work()
+
+        if unit.too_long:
+            stamp = messages.stamp(self._robot.latest)
+            self._robot.tell(messages.runtime_exception(stamp, unit.line, unit.column, TOO_LONG))
+            self._report(unit, f"was refused: it has more than {LONGEST} bytes")
+            done()
+        elif len(unit.text) >= 1000 or not self._command(unit, done):
+            self._run(unit, done)
+
+    def _command(self, unit: Unit, done: Done) -> bool:
+        """Carry out one of the interface's own commands; return whether the unit is one."""
+        robot, control, words = self._robot, self._control, unit.words
 
         def outcome(refused: Refused | None) -> None:
-            self._refused(words, refused)
+            if refused is not None:
+                self._tell_refused(words, refused)
             self._report(unit, "was run" if refused is None else f"was refused: {refused.why}")
+            done()
+
+        def stopped(well: bool) -> None:
+            self._report(unit, "was run" if well else "was refused")
+            done()
 
         match words:
             case "power on":
@@ -56,40 +120,41 @@ class Orders:
             case "set unlock protective stop":
                 power.unlock(robot, control, outcome)
             case "stop program":
-                robot.programs.stop(
-                    control, lambda done: self._report(unit, "was run" if done else "was refused")
-                )
+                robot.programs.stop(control, stopped)
             case "set sim" | "set real":
                 self._report(unit, "changes nothing: the arm is simulated")
+                done()
             case _:
-                self._except(unit, NOT_RUN)
-                self._report(unit, "was not run: URScript programs are not simulated")
+                return False
+        return True
 
-    def leave(self, unit: Unit) -> None:
-        """Report that the client disconnected before a unit was complete."""
-        self._report(unit, "was not run: the connection ended before its last line feed")
+    def _run(self, unit: Unit, done: Done) -> None:
+        """Have the controller run a program."""
 
-    def decline(self, unit: Unit) -> None:
-        """Report that this interface accepts no commands."""
-        self._read_only()
-        self._report(unit, "was refused: this port is read-only")
+        def outcome(refused: Refused | None) -> None:
+            if refused is None:
+                self._report(unit, "was started")
+            elif refused.code == "script_error":  # all clients have got the exception
+                _, line, column = refused.where.split(":")
+                self._report(unit, f"was refused: line {line}, column {column}: {refused.why}")
+            else:
+                self._tell_refused(unit.title, refused)
+                self._report(unit, f"was refused: {refused.why}")
+            done()
 
-    def _read_only(self) -> None:
-        stamp = messages.stamp(self._robot.latest)
-        self._answer(messages.error_code(stamp, messages.READ_ONLY, 0, ErrorLevel.VIOLATION, READ_ONLY))
+        self._robot.programs.run(unit.text, self._control, outcome, secondary=unit.secondary)
 
-    def _except(self, unit: Unit, what: str) -> None:
-        stamp = messages.stamp(self._robot.latest)
-        self._robot.tell(messages.runtime_exception(stamp, unit.line, unit.column, what))
-
-    def _refused(self, words: str, refused: Refused | None) -> None:
-        if refused is None:
-            return
+    def _tell_refused(self, what: str, refused: Refused) -> None:
+        """Tell the client why something was refused."""
         if refused.code in {"no_control", "stale_token"}:
             self._read_only()
         else:
             stamp = messages.stamp(self._robot.latest)
-            self._answer(messages.text(stamp, f"{words} was refused: {refused.why}"))
+            self._answer(messages.text(stamp, f"{what} was refused: {refused.why}"))
+
+    def _read_only(self) -> None:
+        stamp = messages.stamp(self._robot.latest)
+        self._answer(messages.error_code(stamp, messages.READ_ONLY, 0, ErrorLevel.VIOLATION, READ_ONLY))
 
     def _report(self, unit: Unit, what: str) -> None:
         self._robot.report(f'the script "{unit.title}" of {self._control.peer} {what}')

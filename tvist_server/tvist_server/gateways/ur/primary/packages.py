@@ -43,19 +43,17 @@ _TOOL_LINE = Struct(">Biiiff")
 _KEY: Final = "robot state"
 
 
-def robot_state(description: RobotDescription, snapshot: Snapshot, *, playing: bool, paused: bool) -> bytes:
+def robot_state(description: RobotDescription, snapshot: Snapshot) -> bytes:
     """Return the package of a tick, which is created once for all clients of a robot.
 
     Args:
         description: The robot.
         snapshot: Snapshot of the tick.
-        playing: Whether a program is running that the snapshot does not know of.
-        paused: Whether a program is paused.
     """
     made: bytes | None = snapshot.shared.get(_KEY)
     if made is None:
         body = b"".join((
-            _part(0, _robot_mode(snapshot, playing=playing, paused=paused)),
+            _part(0, _robot_mode(snapshot)),
             _part(1, _joints(snapshot)),
             _part(4, _CARTESIAN.pack(*snapshot.actual_TCP_pose, *snapshot.tcp_offset)),
             _part(5, _kinematics(description)),
@@ -84,9 +82,7 @@ def _part(number: int, body: bytes) -> bytes:
     return _PART.pack(_PART.size + len(body), number) + body
 
 
-def _robot_mode(snapshot: Snapshot, *, playing: bool, paused: bool) -> bytes:
-    runs = bool(snapshot.robot_status_bits >> 1 & 1)
-    held = snapshot.runtime_state == RuntimeState.PAUSED
+def _robot_mode(snapshot: Snapshot) -> bytes:
     emergency = (SafetyMode.SYSTEM_EMERGENCY_STOP, SafetyMode.ROBOT_EMERGENCY_STOP)
     return _MODE.pack(
         messages.stamp(snapshot),
@@ -95,8 +91,8 @@ def _robot_mode(snapshot: Snapshot, *, playing: bool, paused: bool) -> bytes:
         snapshot.powered,
         snapshot.safety_mode in emergency,
         snapshot.safety_mode == SafetyMode.PROTECTIVE_STOP,
-        playing or runs,
-        (paused or held) and not playing,
+        snapshot.robot_status_bits >> 1 & 1,
+        snapshot.runtime_state == RuntimeState.PAUSED,
         snapshot.robot_mode & 0xFF,
         0,  # control by position
         snapshot.target_speed_fraction,

@@ -1,23 +1,26 @@
 """Cuts script text from clients into units that can be carried out one by one.
 
-A unit is a line, or a block from `def`, `sec` or another word that opens a block to its `end`. Lines end with a line
-feed; a carriage return before it is dropped. A last line without a line feed is incomplete.
+A unit is a line, or a block from `def`, `sec` or another word that opens a block to its `end`. The word opens the
+block, even where its colon follows on a later line. Lines end with a line feed; a carriage return before it is dropped.
+A last line without a line feed is incomplete.
 """
 
 import re
 from dataclasses import dataclass
 from typing import Final
 
-LONGEST: Final = 1 << 20
-"""Longest unit [bytes]: twenty times the longest program that a known client sends."""
+from tvist_protocol.programs import MAX_SCRIPT
+
+LONGEST: Final = MAX_SCRIPT
+"""Longest unit with its line feeds [bytes]: twenty times the longest program that a known client sends."""
 GLIMPSE: Final = 200
 """Characters that are kept of a unit that is too long."""
 TITLE: Final = 60
 """Longest title [characters]."""
 
-_OPENS = re.compile(r"(?:def|sec|thread|if|while|for|switch)\b.*:")
-_CLOSES = re.compile(r"\bend$")
-_HEAD = re.compile(r"(?:def|sec)\s+(\w+)")
+_OPENS = re.compile(r"\b(?:def|sec|thread|if|while|for|switch)\b")
+_CLOSES = re.compile(r"\bend\b")
+_HEAD = re.compile(r"(def|sec)\s+(\w+)")
 _STRING = re.compile(r"\"[^\"]*\"?|'[^']*'?")
 
 
@@ -43,7 +46,13 @@ class Unit:
     def name(self) -> str | None:
         """Name of the program that the script defines; None if it defines none."""
         head = _HEAD.match(self._first)
-        return None if head is None else head[1]
+        return None if head is None else head[2]
+
+    @property
+    def secondary(self) -> bool:
+        """Whether it is a secondary program, which runs beside the program."""
+        head = _HEAD.match(self._first)
+        return head is not None and head[1] == "sec"
 
     @property
     def title(self) -> str:
@@ -105,7 +114,7 @@ class Intake:
 
     def _keep(self, piece: bytes, units: list[Unit]) -> None:
         """Append to the incomplete line."""
-        if self.held + len(piece) > LONGEST:
+        if self.held + len(piece) >= LONGEST:  # the line feed is still to come
             if not self._skipping:
                 seen = (self._unit + self._rest + piece).decode(errors="replace")
                 units.append(Unit(seen[:GLIMPSE], *(self._start or (1, 1)), too_long=True))
@@ -125,10 +134,7 @@ class Intake:
             self._start = self._unit.count(b"\n") + 1, len(line) - len(line.lstrip()) + 1
         if not self._skipping:
             self._unit += whole + b"\n"
-        if code == "end":
-            self._depth = max(self._depth - 1, 0)
-        elif _OPENS.match(code) and not _CLOSES.search(code):
-            self._depth += 1
+        self._depth = max(self._depth + len(_OPENS.findall(code)) - len(_CLOSES.findall(code)), 0)
         if self._depth == 0 and (self._start is not None or self._skipping):
             if not self._skipping:
                 line_number, column = self._start or (1, 1)

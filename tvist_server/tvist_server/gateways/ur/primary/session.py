@@ -64,26 +64,29 @@ class PrimarySession(PortSession):
         if tick < self._due:
             return b""
         first, self._due = self._due == 0, (tick // EVERY + 1) * EVERY
-        programs = self._robot.programs
-        state = robot_state(
-            self._robot.description, snapshot, playing=programs.playing, paused=programs.paused
-        )
+        state = robot_state(self._robot.description, snapshot)
         if not first:
             return state
         self._send(state)  # the client waits for it, so it must not be dropped
         return b""
 
     def closed(self) -> None:
-        """Report what the client leaves unfinished."""
-        unfinished = self._intake.unfinished
-        if unfinished is not None:
-            self._orders.leave(unfinished)
+        """Report what the client leaves unfinished, and carry out what it has finished."""
+        self._orders.leave(self._intake.unfinished)
+
+    @property
+    def waiting(self) -> int:
+        """Number of units of its text that wait to be carried out."""
+        return self._orders.waiting
 
     def event(self, event: Event) -> None:
-        """Send a protective stop as an error, and other safety stops and warnings as lines of the log."""
+        """Send a protective stop as an error, and other safety stops and warnings as lines of the log.
+
+        What programs tell is sent by `Programs`, once to all clients.
+        """
         stamp = messages.stamp(self._robot.latest)
         why = event.why or ""
         if event.kind == "protective_stop":
             self._send(messages.error_code(stamp, messages.PROTECTIVE_STOP, 0, ErrorLevel.WARNING, why))
-        elif event.kind in {"warning", "safety_stop"}:
+        elif event.kind == "safety_stop" or (event.kind == "warning" and event.line is None):
             self._send(messages.text(stamp, why))
