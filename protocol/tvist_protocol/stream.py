@@ -37,7 +37,8 @@ EVENT_MEANINGS: dict[EventKind, str] = {
     "shaper_changed": "the shaper or the estimator has changed",
     "warning": "a condition that the user should know about; the robot did not stop",
     "program_started": "the program `program` begins",
-    "program_stopped": "the program `program` has ended; a `warning` with a `line` came before if an error ended it",
+    "program_stopped": "the program `program` has ended; `why` gives the reason if it was ended, a `warning` with a "
+    "`line` came before if an error of its own ended it",
     "text": "a program has written `why` to the log",
     "popup": "a program shows the message `why` with the title `title`, and may wait until it is closed",
 }

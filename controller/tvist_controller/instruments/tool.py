@@ -8,9 +8,7 @@ import numpy as np
 from tvist_controller.instruments.reading import Reading
 from tvist_controller.instruments.rigid_body import Tool, add, carried, cross
 from tvist_plant.model import Floats
-
-GRAVITY = 9.81
-"""Gravitational acceleration, along the base's negative z axis [m/s²]."""
+from tvist_plant.plant import GRAVITY
 
 
 class ToolValues(Reading):
