@@ -28,7 +28,9 @@ def read_script(file: str) -> str:
     if file == STDIN:
         content = sys.stdin.buffer.read(LARGEST + 1)
         if len(content) > LARGEST:
-            raise Failure(f"the standard input has more than {LARGEST >> 20} MiB: is it the right one?", code=2)
+            raise Failure(
+                f"the standard input has more than {LARGEST >> 20} MiB: is it the right one?", code=2
+            )
         try:
             return content.decode()
         except UnicodeDecodeError as error:

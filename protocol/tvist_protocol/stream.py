@@ -26,6 +26,9 @@ EventKind = Literal[
     "popup",
 ]
 
+PopupKind = Literal["message", "warning", "error"]
+"""How serious a popup is."""
+
 EVENT_MEANINGS: dict[EventKind, str] = {
     "motion_started": "the motion `id` begins at this tick",
     "motion_done": "the shaped reference of motion `id` is at rest (to 1e-7 rad); the arm may still vibrate",
@@ -128,7 +131,7 @@ class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc
     """Name of the program that it concerns."""
     title: str | None = None
     """Title of a popup."""
-    level: Literal["message", "warning", "error"] | None = None
+    level: PopupKind | None = None
     """How serious a popup is."""
     blocking: bool | None = None
     """Whether the program waits until the popup is closed."""

@@ -93,7 +93,9 @@ def run(
     if json:
         from tvist_lab.programs.report import as_dict
 
-        print_json({"file": named(file), "lockstep": lockstep, "recording": record and str(record), **as_dict(watch)})
+        print_json(
+            {"file": named(file), "lockstep": lockstep, "recording": record and str(record), **as_dict(watch)}
+        )
     failure = _failure(file, watch, errors)
     if failure is None and not json:
         from tvist_lab.programs.report import summary
@@ -121,7 +123,9 @@ def _check(file: str, text: str, *, json: bool) -> None:
     if json:
         first = {"line": errors[0].line, "column": errors[0].column, "text": errors[0].text}
         print_json({"file": named(file), "ok": False, "exit_reason": "compile_error", "error": first})
-    raise Failure(f"{named(file)} cannot run: it has {len(errors)} {'error' if len(errors) == 1 else 'errors'}")
+    raise Failure(
+        f"{named(file)} cannot run: it has {len(errors)} {'error' if len(errors) == 1 else 'errors'}"
+    )
 
 
 def _configuration(given: dict[str, Any], config: str | None, *, lockstep: bool) -> "ServeConfig":
@@ -131,7 +135,9 @@ def _configuration(given: dict[str, Any], config: str | None, *, lockstep: bool)
     if lockstep:
         for name in ("listen", "ur"):
             if given[name] is not None:
-                raise Failure(f"--lockstep and --{name} exclude each other: in lockstep there is no network", code=2)
+                raise Failure(
+                    f"--lockstep and --{name} exclude each other: in lockstep there is no network", code=2
+                )
     source = "configuration" if config is None else f"configuration {config}"
     with told(ConfigError, code=2):
         content = {} if config is None else read_toml(config)
@@ -146,7 +152,9 @@ def _configuration(given: dict[str, Any], config: str | None, *, lockstep: bool)
 class _Job:
     """A program to run, and whom to tell."""
 
-    def __init__(self, file: str, text: str, inputs: Sequence[str], timeout: float | None, tell: Tell) -> None:
+    def __init__(
+        self, file: str, text: str, inputs: Sequence[str], timeout: float | None, tell: Tell
+    ) -> None:
         self.file, self.text, self.inputs, self.timeout, self.tell = file, text, inputs, timeout, tell
 
     def in_lockstep(self, config: "ServeConfig") -> "tuple[ProgramWatch, list[str], None]":

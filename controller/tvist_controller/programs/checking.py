@@ -4,10 +4,9 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from tvist_urscript import ScriptError, check
-
 from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_controller.programs.library import SIGNATURES
+from tvist_urscript import ScriptError, check
 
 _SIMULATED = {name: one for name, one in SIGNATURES.items() if name not in SUBJECTS}
 _UNKNOWN = re.compile(r"compile_error_name_not_found:(\w+):")
