@@ -247,6 +247,7 @@ class Expressions:
                 name = names[place]
             elif name not in names:
                 self.report(argument.line, argument.column, f"{node.name} has no parameter {name}")
+                return []
             if name in given:
                 self.report(argument.line, argument.column, f"{node.name} is given {name} twice")
             given[name] = value

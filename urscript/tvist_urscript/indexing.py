@@ -53,9 +53,9 @@ def _array(value: Value) -> Array:
 def _place(index: Any, value: Array) -> int:
     place = integer(index, "a list index")
     length = len(value.items)
-    what = "pose" if type(value) is Pose else "list"
+    has = f"the {'pose' if type(value) is Pose else 'list'} has {length} element{'' if length == 1 else 's'}"
     if place < 0:
-        raise Fault(f"list index {place} is negative: the {what} has {length} elements")
+        raise Fault(f"list index {place} is negative: {has}")
     if place >= length:
-        raise Fault(f"list index {place} is beyond the end: the {what} has {length} elements")
+        raise Fault(f"list index {place} is beyond the end: {has}")
     return place

@@ -56,7 +56,7 @@ class Lines:
                     last = END
                 pending = None
             if kind in _BEGINS and brackets == 0 and last not in (END, "COLON"):
-                yield _end(token)
+                yield Token.new_borrow_pos(END, token, token)
             if kind in _OPENS:
                 brackets += 1
             elif kind in _CLOSES and brackets > 0:
@@ -64,9 +64,10 @@ class Lines:
             yield token
             last = kind
             token_before = token
-        if last != END:
-            yield pending if pending is not None else _end(token_before)
-
-
-def _end(at: Token) -> Token:
-    return Token.new_borrow_pos(END, "\n", at)
+        if pending is not None:
+            yield pending
+        elif last != END:
+            before = token_before
+            yield Token(
+                END, "", before.end_pos, before.end_line, before.end_column, before.end_line, before.end_column
+            )
