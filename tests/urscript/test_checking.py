@@ -1,7 +1,9 @@
 """What a checker tells, and what has limits."""
 
+import doctest
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -103,3 +105,8 @@ def test_an_error_of_a_file_has_its_position(tmp_path):
     done = run(path)
     assert (done.returncode, done.stdout) == (1, "hello\n")
     assert done.stderr == f"{path}: line 3, column 9: division by zero\n"
+
+
+def test_the_readme_is_true():
+    readme = Path(__file__).parents[2] / "urscript" / "README.md"
+    assert doctest.testfile(str(readme), module_relative=False).failed == 0

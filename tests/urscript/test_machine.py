@@ -38,7 +38,9 @@ class Robot:
             "fail": self.fail,
             "costly": lambda: 0,
         }
-        self.machine = Machine(compile_script(f"def program(): {script}\nend", SIGNATURES), functions, **keywords)
+        self.machine = Machine(
+            compile_script(f"def program(): {script}\nend", SIGNATURES), functions, **keywords
+        )
 
     def sync(self):
         yield
@@ -138,7 +140,8 @@ def test_each_thread_finishes_before_it_ends_but_no_killed_one():
         finished.append(robot.machine.thread)
 
     robot = Robot(
-        "thread t():\nend\nthread k():\n sync()\n sync()\n sync()\nend\nrun t()\nh = run k()\nsync()\nsync()\nkill h",
+        "thread t():\nend\nthread k():\n sync()\n sync()\n sync()\nend\nrun t()\nh = run k()\n"
+        "sync()\nsync()\nkill h",
         finish=finish,
     )
     robot.ticks(3)
@@ -226,7 +229,8 @@ def test_the_same_program_takes_the_same_ticks_with_any_user():
 def test_who_missed_a_tick_is_first_in_the_next():
     order = []
     script = compile_script(
-        "def program():\nthread busy():\n while True:\n  note(1)\n  i = 0\n  while i < 60:\n   i = i + 1\n  end\n  sync()\n end\nend\n"
+        "def program():\nthread busy():\n while True:\n  note(1)\n  i = 0\n  while i < 60:\n   i = i + 1\n  end\n"
+        "  sync()\n end\nend\n"
         "thread late():\n while True:\n  note(2)\n  sync()\n end\nend\nrun busy()\nrun late()\nsync()\n"
         "while True:\n sync()\nend\nend",
         {"note": signature("x"), "sync": signature("", blocks=True)},

@@ -39,7 +39,7 @@ class Lines:
 
     always_accept = (END,)
 
-    def process(self, tokens: Iterator[Token]) -> Iterator[Token]:
+    def process(self, tokens: Iterator[Token]) -> Iterator[Token]:  # noqa: C901  one pass, as a text is long
         """Drop line breaks that end nothing, and add ends that no line break tells."""
         brackets = 0
         last = END
@@ -67,7 +67,10 @@ class Lines:
         if pending is not None:
             yield pending
         elif last != END:
-            before = token_before
-            yield Token(
-                END, "", before.end_pos, before.end_line, before.end_column, before.end_line, before.end_column
-            )
+            yield _after(token_before)
+
+
+def _after(token: Token) -> Token:
+    """An end without a text, where the text ends."""
+    line, column = token.end_line, token.end_column
+    return Token(END, "", token.end_pos, line, column, line, column)

@@ -46,9 +46,9 @@ def _unfit(text: str, error: UnexpectedInput) -> ScriptError:
         character = text[error.pos_in_stream or 0]
         why = 'a text has no closing "' if character == '"' else f"unexpected character {character!r}"
         return ScriptError(error.line, error.column, syntax_error(error.line, why))
-    if isinstance(error, UnexpectedToken) and error.token.type != "$END" and error.token != "":
+    if isinstance(error, UnexpectedToken) and str(error.token):  # the end of the text is a token without any
         token: Token = error.token
-        what = "end of the line" if token == "\n" else f"'{_shortened(token)}'"
+        what = "end of the line" if str(token) == "\n" else f"'{_shortened(token)}'"
         assert token.line is not None
         assert token.column is not None
         return ScriptError(token.line, token.column, syntax_error(token.line, f"unexpected {what}"))
