@@ -268,17 +268,27 @@ def test_an_endless_recursion_of_threads_is_an_error():
 
 def test_work_on_long_lists_counts_by_their_length():
     prepared = "a = make_list(1000, 1)\nb = 0\n"
-    alone = Robot(prepared).ticks(1)[0]
+    alone = Robot(prepared).ticks(1, budget=10_000)[0]
     for work in ("b = a + a", "b = a * 2", "b = norm(a)", "b = a == [1]", "b = -a"):
         robot = Robot(prepared + work)
-        robot.ticks(1)
+        robot.ticks(1, budget=10_000)
         assert robot.machine.left <= alone - 900, work
+
+
+def test_many_statements_that_work_on_lists_take_their_ticks():
+    robot = Robot("a = make_list(1000, 1)\n" + "a = a + a\n" * 30 + "say(a[0])")
+    ticks = 0
+    while robot.machine.running:
+        robot.ticks(1)
+        assert robot.machine.left >= -1200
+        ticks += 1
+    assert ticks >= 15
 
 
 def test_one_statement_cannot_work_on_lists_for_long():
     robot = Robot("a = make_list(1000, 1)\na = " + " + ".join(["a"] * 90))
     with pytest.raises(ScriptError, match="too many list elements"):
-        robot.ticks(1)
+        robot.ticks(3)
     assert robot.machine.left >= -2 * OVERDRAFT
 
 
