@@ -8,7 +8,8 @@ TEXTS = ['""', '"a"', '"some text"']
 OPERATORS = ["+", "-", "*", "/", "%", "==", "!=", "<", ">", "<=", ">=", "and", "or", "xor"]
 PURE = [
     ("sin", 1), ("sqrt", 1), ("norm", 1), ("floor", 1), ("pow", 2), ("str_cat", 2), ("to_str", 1), ("length", 1),
-    ("pose_trans", 2), ("pose_inv", 1), ("get_list_length", 1), ("make_list", 2), ("integer_to_binary_list", 1), ("str_sub", 2),
+    ("pose_trans", 2), ("pose_inv", 1), ("get_list_length", 1), ("make_list", 2), ("integer_to_binary_list", 1),
+    ("str_sub", 2),
     ("inv", 1), ("transpose", 1), ("size", 1), ("atan2", 2), ("to_num", 1), ("interpolate_pose", 3),
 ]  # fmt: skip
 

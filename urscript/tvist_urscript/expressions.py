@@ -30,6 +30,7 @@ class Expressions:
     Attributes:
         scope: What names mean here.
         cost: Evaluations of what has been translated since it was set to 0.
+        works: What has been translated since it was reset may work on lists, and so take more than that.
         used: Built-in functions that the script calls.
         constants: Lists and default values, by the names that compiled functions have for them.
     """
@@ -39,6 +40,7 @@ class Expressions:
         self.report = report
         self.scope: Scope
         self.cost = 0
+        self.works = False
         self.used: set[str] = set()
         self.constants: dict[str, object] = {}
         self.globals: set[str] = set()
@@ -60,6 +62,7 @@ class Expressions:
                 return self.listing(node)
             case tree.Unary(operator="-"):
                 self.cost += 1
+                self.works = True
                 return Position.of(node).call("negate", self.value(node.value))
             case tree.Unary():
                 return Position.of(node).invert(self.test(node.value))
@@ -103,12 +106,14 @@ class Expressions:
         self.cost += 1
         left, right = self.value(node.left), self.value(node.right)
         if node.operator in ARITHMETIC:
+            self.works = True
             return at.call(ARITHMETIC[node.operator], left, right)
         if node.operator in ORDER:
             return at.compare(left, ORDER[node.operator](), right)
         operator, function = EQUALITY[node.operator]
         if isinstance(node.left, tree.Constant) or isinstance(node.right, tree.Constant):
             return at.compare(left, operator(), right)
+        self.works = True
         return at.call(function, left, right)
 
     def listing(self, node: tree.Listing) -> ast.expr:
@@ -211,6 +216,7 @@ class Expressions:
             return at.constant(None)
         self.used.add(node.name)
         self.cost += signature.cost - 1
+        self.works = self.works or signature.linear
         known = [
             (parameter.name, None if parameter.default is REQUIRED else self.keep(parameter.default))
             for parameter in signature.parameters
@@ -247,6 +253,7 @@ class Expressions:
                 name = names[place]
             elif name not in names:
                 self.report(argument.line, argument.column, f"{node.name} has no parameter {name}")
+                return []
             if name in given:
                 self.report(argument.line, argument.column, f"{node.name} is given {name} twice")
             given[name] = value

@@ -262,11 +262,6 @@ class Machine:
     def _is_unequal(self, a: Value, b: Value) -> bool:
         return not self._is_equal(a, b)
 
-    def _replaced(self, new: Value, indices: tuple[Value, ...], value: Value) -> Value:
-        if isinstance(value, Array):
-            self.charge(len(value.items) // 16)
-        return indexing.replaced(new, indices, value)
-
     def _surroundings(self, functions: Mapping[str, Callable[..., Any]]) -> dict[str, Any]:
         def add(a: Any, b: Any) -> Any:
             if type(a) is float and type(b) is float:
@@ -298,7 +293,7 @@ class Machine:
             "is_unequal": self._is_unequal,
             "element": indexing.element,
             "element_of_matrix": indexing.element_of_matrix,
-            "replaced": self._replaced,
+            "replaced": lambda new, indices, value: indexing.replaced(new, indices, value, self.charge),
             "listed": Array,
             "posed": Pose,
             "run": self._run,
@@ -327,7 +322,10 @@ class Machine:
 
         def charged(*arguments: Any) -> Any:
             self.charge(sum(argument.size for argument in arguments if isinstance(argument, Array)))
-            return function(*arguments)
+            result = function(*arguments)
+            if isinstance(result, Array):
+                self.charge(result.size)
+            return result
 
         return charged
 

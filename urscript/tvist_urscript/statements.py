@@ -60,7 +60,7 @@ class Statements(Expressions):
 
         for statement in body:
             at = Position.of(statement)
-            self.cost = 1
+            self.cost, self.works = 1, False
             match statement:
                 case tree.Function():
                     continue
@@ -68,6 +68,7 @@ class Statements(Expressions):
                     test = self.test(statement.branches[0][0])
                     cost += self.limited(statement)
                     flush(at)
+                    since += PIECE * self.works
                     links, since = self.branches(statement, test, since)
                     result.extend(links)
                 case tree.While():
@@ -80,10 +81,14 @@ class Statements(Expressions):
                 case _:
                     made = self.simple(statement, at)
                     spent = self.limited(statement)
+                    works = self.works
                     if cost + spent > PIECE:
                         flush(at)
                     cost += spent
                     piece.extend(made)
+                    if works:
+                        flush(at)
+                        since += PIECE
         if cost:
             flush(Position.of(body[-1]) if body else Position(1, 1))
         return result, since
@@ -145,9 +150,10 @@ class Statements(Expressions):
         latest = since
         for condition, body in chain:
             if links:
-                self.cost = 1
+                self.cost, self.works = 1, False
                 test = self.test(condition)
                 cost += self.limited(statement)
+                since += PIECE * self.works
             made, ends = self.block(body, since, cost)
             latest = max(latest, ends)
             links.append((Position(*first(condition)), test, made))
@@ -216,6 +222,7 @@ class Statements(Expressions):
         if indices:
             here = Position(*first(indices[0]))
             self.cost += len(indices)
+            self.works = True
             places = at.tuple([self.value(index) for index in indices])
             value = here.call("replaced", value, places, self.name(statement.target))
             variable = self.scope.variable(name)
