@@ -74,7 +74,11 @@ def test_a_robot_without_power_in_a_protective_stop_or_with_a_paused_program_say
     stopped.send(SimulationInject, fault="protective_stop")
     part = state_of(stopped.tick(50))[0][0]
     assert flags(part)[4:] == (True, False, False)
-    for program, told_as in (("STOPPED", (False, False)), ("PLAYING", (True, False)), ("PAUSED", (False, True))):
+    for program, told_as in (
+        ("STOPPED", (False, False)),
+        ("PLAYING", (True, False)),
+        ("PAUSED", (False, True)),
+    ):
         resting = ur5e(io_changes={"program": "f", "program_state": program})
         assert flags(state_of(resting.tick())[0][0])[5:] == told_as
 
@@ -242,18 +246,37 @@ def test_a_client_that_comes_in_a_protective_stop_is_told_of_its_end_alone(robot
     assert [message(data).values["mode"] for data in sent if data[4] == 20] == [1]
 
 
-def test_a_protective_stop_is_error_209_of_argument_0_as_a_warning(robot, control, sent):
+def test_a_protective_stop_is_error_209_of_argument_0_as_a_warning_after_the_state_that_shows_it(
+    robot, control, sent, snapshot
+):
     interface = session(robot, control, sent.append)
+    ticks = Ticks(snapshot)
+    interface.sample(ticks.at(6))
+    sent.clear()
     interface.event(Event(tick=7, kind="protective_stop", code="limit_torque", why="too much"))
-    (error,) = [message(data) for data in sent]
+    interface.sample(ticks.at(7, safety_mode=3))
+    changed, state, error = sent
+    assert (message(changed).kind, split(state)[0][0]) == (5, 16)
+    error = message(error)
     assert error.kind == 6
     assert (error.values["code"], error.values["argument"], error.values["level"]) == (209, 0, 2)
     assert error.values["text"] == "too much"
     assert error.time == round(robot.latest.timestamp * 1e6)
 
 
+def test_the_secondary_interface_gets_states_and_no_messages(robot, control, sent, snapshot):
+    interface = PrimarySession(host(robot), control, sent.append, informed=False)
+    ticks = Ticks(snapshot)
+    interface.sample(ticks.at(6))
+    interface.event(Event(tick=7, kind="protective_stop", code="limit_torque", why="too much"))
+    interface.event(Event(tick=7, kind="warning", why="mind the gap"))
+    interface.sample(ticks.at(7, safety_mode=3))
+    assert {kind for kind, _ in split(b"".join(sent))} == {16}
+
+
 def test_warnings_are_lines_of_the_log_and_other_events_are_not_told(robot, control, sent):
     interface = session(robot, control, sent.append)
+    interface.event(Event(tick=7, kind="warning", why="for all clients, once", line=3, column=5))
     interface.event(Event(tick=7, kind="motion_started", id=1))
     interface.event(Event(tick=7, kind="warning", why="mind the gap"))
     (line,) = [message(data) for data in sent]
@@ -308,7 +331,11 @@ SAMPLES = [
     ["# about it\n# more\ndef f():\nend # of it\n", 'popup("end")\n'],
     ["digital_out[0]=True\n", "set_payload(0.5, (0,0,0))\n", "end\n", "ended = 1\n", "switch_on = 2\n"],
     ["def f(\n  a=1,\n  b=2\n):\n  if a == 1 or\n    a == 2:\n    b = a\n  end\nend\n", "halt\n"],
-    ["def f(): if a: b = 1 end\nend\n", "while True: sync() end\n", "if a:\n  b = 1\nelif c:\n  b = 2\nend\n"],
+    [
+        "def f(): if a: b = 1 end\nend\n",
+        "while True: sync() end\n",
+        "if a:\n  b = 1\nelif c:\n  b = 2\nend\n",
+    ],
 ]
 
 

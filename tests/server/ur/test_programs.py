@@ -1,4 +1,4 @@
-"""The controller's program at UR's interfaces: paths, key messages, texts, popups, exceptions, and who holds control for it."""
+"""The controller's program at UR's interfaces: paths, what it tells clients, and who holds control for it."""
 
 import pytest
 from hypothesis import given
@@ -146,7 +146,9 @@ def test_what_programs_write_and_show_is_told_once_to_all_clients(programs, robo
     text, *popups = told(robot)
     assert (text.kind, text.values["text"]) == (0, "half way")
     assert [popup.values["flags"] for popup in popups] == [[True, False, True], [False, True, False]]
-    assert {(popup.values["title"], popup.values["text"]) for popup in popups} == {("Robot", "Put the part in")}
+    assert {(popup.values["title"], popup.values["text"]) for popup in popups} == {
+        ("Robot", "Put the part in")
+    }
 
 
 def run(programs, control, text="def f():\nend\n", *, secondary=False):

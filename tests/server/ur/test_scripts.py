@@ -111,7 +111,9 @@ async def test_a_blocking_popup_waits_until_somebody_closes_it(desk):
     await desk.tick()
     listener, _ = await connect(desk, "primary")
     _, writer = await connect(desk, "secondary")
-    writer.write(b'def f():\n  popup("Go on?", title="Robot", warning=True, blocking=True)\n  textmsg("on")\nend\n')
+    writer.write(
+        b'def f():\n  popup("Go on?", title="Robot", warning=True, blocking=True)\n  textmsg("on")\nend\n'
+    )
     await until(lambda: desk.controller.programs.state == "PLAYING")
     await desk.tick(5)
     started, popup = await robot_messages(listener, 2)
@@ -140,7 +142,15 @@ async def test_the_dashboard_plays_a_script_again_under_its_name(desk):
     await until(lambda: desk.controller.programs.name == "again")
     await desk.tick(20)
     dashboard = await connect_and_greet(desk)
-    asked = ("programState", "get loaded program", "isProgramSaved", "play", "programState", "pause", "programState")
+    asked = (
+        "programState",
+        "get loaded program",
+        "isProgramSaved",
+        "play",
+        "programState",
+        "pause",
+        "programState",
+    )
     assert await lines(*dashboard, *asked) == [
         "STOPPED again",
         "Loaded program: again",
