@@ -8,6 +8,8 @@ from tvist_server.ending import ending_signals
 
 COMMANDS = {
     "serve": "Run a robot on the network.",
+    "run": "Run a program in URScript on a robot of its own; exit code 0 if it ends by itself.",
+    "check-script": "Look for errors in programs in URScript without running them.",
     "demo": "Run the paper's motions in real time, unshaped and shaped, and say what happened.",
     "check": "Check that a robot answers and is ready to be moved; exit code 0 if so.",
     "unlock": "Make a stopped robot ready to be moved again; exit code 0 if it is.",
@@ -74,11 +76,11 @@ def _run() -> None:
         config=check_whole,
     )
     for place, (name, what) in enumerate(COMMANDS.items()):
-        whole = sys.argv[1:2] == [
-            name
-        ]  # its own help is its docstring, the list of all commands has the short one
+        module = name.replace("-", "_")
+        # Its own help is its docstring, the list of all commands has the short one.
+        whole = sys.argv[1:2] == [name]
         app.command(
-            f"tvist_cli.commands.{name}:{name}", name=name, help=None if whole else what, sort_key=place
+            f"tvist_cli.commands.{module}:{module}", name=name, help=None if whole else what, sort_key=place
         )
     try:
         with told(OSError):  # a folder for figures that is none, mostly

@@ -3,6 +3,7 @@
 The modules behind it may change; `tvist_lab` imports nothing else of this package.
 """
 
+from tvist_controller.about import info_of
 from tvist_controller.ahead import resting_after
 from tvist_controller.calibrations import default_for as default_calibration
 from tvist_controller.calibrations import estimator_of
@@ -15,6 +16,7 @@ from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.controller import Controller
 from tvist_controller.cycle import STILL, ControlCycle
 from tvist_controller.from_rest import plan_from_rest
+from tvist_controller.host import Host
 from tvist_controller.kinematics.tool import ToolKinematics, turned
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.mode_source import ModeSource
@@ -25,6 +27,7 @@ from tvist_controller.refusal import RefusalError
 from tvist_controller.reporting import truth_of
 from tvist_controller.safety import TORQUE_SHARE
 from tvist_controller.setup import Setup, body, paper_payload
+from tvist_controller.sink import Sink
 from tvist_controller.stopping import stopping
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Trajectory, quickest_motion
 
@@ -36,6 +39,7 @@ __all__ = [
     "CollisionModel",
     "ControlCycle",
     "Controller",
+    "Host",
     "InverseDynamics",
     "JointLine",
     "LoopbackHost",
@@ -47,6 +51,7 @@ __all__ = [
     "RecordedShaper",
     "RefusalError",
     "Setup",
+    "Sink",
     "Target",
     "ToolKinematics",
     "Trajectory",
@@ -56,6 +61,7 @@ __all__ = [
     "default_calibration",
     "drivetrain",
     "estimator_of",
+    "info_of",
     "load_calibration",
     "mass_matrix",
     "modal_estimator",

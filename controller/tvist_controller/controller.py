@@ -285,7 +285,7 @@ class Controller:
 
     def _interrupt(self, why: str) -> None:
         """End the activities that need control, when no client has control any more."""
-        self.programs.end()
+        self.programs.end(why)
         self.motion.interrupt(why)
 
     # ------------------------------------------------------------------ programs
@@ -327,7 +327,7 @@ class Controller:
         command = call.command
         check_content(command, self.setup.description)
         chosen: PlannedFilter | None = call.planned()
-        self.programs.end()
+        self.programs.end("simulation.reset")
         self.motion.abandon("simulation.reset")
         self._faults.clear()
         q = self.cycle.position if command.q is None else np.array(command.q, dtype=float)

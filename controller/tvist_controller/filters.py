@@ -39,13 +39,15 @@ class Filters:
 
     def use(self, chosen: PlannedFilter) -> None:
         """Shape with a filter from now on."""
-        before = self.source
+        before, idle = self.source, self._idle
         self.source, tvist = chosen
         self._cycle.use(tvist)
         self._motion.motions.keep_rate()
         self._emit("shaper_changed", why=f"{tvist.name} with estimator {self.source.name}")
         if self.source is not before:
             self._warn_of_arm()
+        if idle:
+            self._warn_of_payload()
 
     def _choose(self, call: Call[SetShaper] | Call[SetEstimator]) -> None:
         chosen: PlannedFilter = call.planned()
@@ -69,11 +71,16 @@ class Filters:
             self._motion.motions.keep_rate()
         self._warn_of_payload()
 
+    @property
+    def _idle(self) -> bool:
+        """Whether there is no shaper, to which the modes would matter."""
+        return self._cycle.tvist.name == "none"
+
     def _warn_of_payload(self) -> None:
-        """Warn if the modes belong to another payload."""
+        """Warn if a shaper uses modes that belong to another payload."""
         declared = self._declared
         calibration = self.source.calibration
-        if calibration is not None and not fits(calibration, declared, self.source.name):
+        if not self._idle and calibration is not None and not fits(calibration, declared, self.source.name):
             self._emit(
                 "warning",
                 code="payload_mismatch",

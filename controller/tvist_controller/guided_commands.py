@@ -50,11 +50,11 @@ class GuidedCommands:
         return Accepted(id=self._guidance.move_tool(twist, *accelerations, shaped=command.shaped))
 
     def _stop_j(self, call: Call[m.StopJ]) -> None:
-        self._programs.stop_moving()
+        self._programs.stop_moving("stop_j was commanded")
         self._guidance.stop_joints(call.command.acceleration)
 
     def _stop_l(self, call: Call[m.StopL]) -> None:
-        self._programs.stop_moving()
+        self._programs.stop_moving("stop_l was commanded")
         self._guidance.stop_tool(*_accelerations(call.command))
 
 

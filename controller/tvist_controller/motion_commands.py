@@ -53,8 +53,9 @@ class MotionCommands:
         self._motion.follow(command.period, limits, call.now)
 
     def _stop(self, call: Call[c.Stop]) -> None:
-        self._programs.stop_moving()
-        self._motion.stop(call.command.deceleration, "a stop was commanded")
+        why = "a stop was commanded"
+        self._programs.stop_moving(why)
+        self._motion.stop(call.command.deceleration, why)
 
     def _pause(self, _: Call[c.Pause]) -> None:
         self._motion.pause()
@@ -67,5 +68,6 @@ class MotionCommands:
         self._motion.power_on(release_brakes=call.command.release_brakes)
 
     def _power_off(self, _: Call[c.PowerOff]) -> None:
-        self._programs.end()
-        self._motion.end("power_off", "power_off was commanded", category=1)
+        why = "power_off was commanded"
+        self._programs.end(why)
+        self._motion.end("power_off", why, category=1)

@@ -14,6 +14,8 @@ from tvist_plant.modes import Modes
 
 PERIOD = 0.002
 """Control period [s]."""
+GRAVITY = 9.81
+"""Gravitational acceleration, along the base's negative z axis [m/s²]."""
 
 
 class PlantError(ArithmeticError):

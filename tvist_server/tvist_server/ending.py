@@ -59,6 +59,17 @@ class Ending:
         if self._wish is not None:
             heard()
 
+    def request(self) -> None:
+        """Request the shutdown from within the process; callable from any thread once `hear` was called."""
+        if self._heard is not None:
+            with contextlib.suppress(RuntimeError):  # the loop is closed: it has ended already
+                self._heard()
+
+    @property
+    def signal(self) -> signal.Signals | None:
+        """The signal that requested the shutdown; None if none did."""
+        return None if self._wish is None else signal.Signals(self._wish)
+
     @property
     def interrupted(self) -> bool:
         """Whether Control+C requested the shutdown."""
@@ -75,9 +86,8 @@ class Ending:
         self._wish = number
         if self._raises:
             self._raise(number)
-        elif self._heard is not None:
-            with contextlib.suppress(RuntimeError):  # the loop is closed: it has ended already
-                self._heard()
+        else:
+            self.request()
 
     def _raise(self, number: int) -> None:
         if number == signal.SIGINT:

@@ -9,6 +9,10 @@ from tvist_controller.controller import Controller
 from tvist_controller.host import Host
 from tvist_controller.planner import Planner
 from tvist_controller.setup import Setup
+from tvist_controller.sink import Sink
+from tvist_protocol.codec import encode
+from tvist_protocol.commands import Command
+from tvist_protocol.replies import Reply
 from tvist_protocol.stream import Telemetry
 from tvist_server.clock import Clock, Mailbox
 from tvist_server.gateways.base import Answer, Gateway
@@ -28,13 +32,20 @@ class ServedRobot:
         setup: Initial setup.
         record: File to record into.
         dump: Folder for the last second before a failure.
+        observe: Makes a further sink of the controller's messages.
 
     Raises:
         ValueError: The setup is invalid.
         RecordingError: The recording cannot be written.
     """
 
-    def __init__(self, setup: Setup, record: Path | None, dump: Path) -> None:
+    def __init__(
+        self,
+        setup: Setup,
+        record: Path | None,
+        dump: Path,
+        observe: Callable[[Controller], Sink] | None = None,
+    ) -> None:
         self.setup = setup
         lockstep = setup.clock != "realtime"
         # When a client advances time, nothing is late, and plans are made when they are needed.
@@ -53,8 +64,9 @@ class ServedRobot:
             )
         black_box = BlackBox(dump, lambda: info_of(self.controller), setup.to_builtins())
         self._publisher = Publisher(lossless=lockstep)
-        recorded = () if self.recorder is None else (self.recorder,)
-        self._host = Host(self.controller, *recorded, black_box, self._publisher)
+        sinks: list[Sink] = [] if self.recorder is None else [self.recorder]
+        sinks += [] if observe is None else [observe(self.controller)]
+        self._host = Host(self.controller, *sinks, black_box, self._publisher)
         self.driven = Mailbox(self._host)
         """The robot as seen by the clock."""
         self._plan_ahead = None if lockstep else PlanAhead(self._host, _planner(setup), self.driven.post)
@@ -72,6 +84,13 @@ class ServedRobot:
         """
         self._gateways = gateways
         self._publisher.open(gateways, wake)
+
+    def request(self, command: Command) -> Reply:
+        """Carry out a command of this process, in the controller's thread or before the clock starts.
+
+        What is done before the first tick does not depend on how fast this machine is.
+        """
+        return self._host.request(encode(command))
 
     def hand_on(self) -> None:
         """Hand on the messages that wait for the gateways."""

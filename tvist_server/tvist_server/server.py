@@ -9,7 +9,9 @@ from functools import partial
 from pathlib import Path
 from threading import Thread
 
+from tvist_controller.controller import Controller
 from tvist_controller.setup import Setup
+from tvist_controller.sink import Sink
 from tvist_plant.plant import PERIOD
 from tvist_server.clock import Clock, Lockstep, Realtime
 from tvist_server.config import ConfigError, ServeConfig
@@ -33,6 +35,7 @@ class Server:
 
     Args:
         config: Configuration of the robots.
+        observe: Makes an observer of a robot's messages, which then tells people about it instead of the console.
 
     Raises:
         ConfigError: The configuration is invalid.
@@ -40,8 +43,9 @@ class Server:
         GatewayError: The server cannot listen on an endpoint.
     """
 
-    def __init__(self, config: ServeConfig) -> None:
+    def __init__(self, config: ServeConfig, observe: Callable[[Controller], Sink] | None = None) -> None:
         setups = config.setups()
+        self._observed = observe is not None
         try:
             listen, guard = guarded(
                 config.listen,
@@ -57,7 +61,7 @@ class Server:
         reading."""
         try:
             for setup in setups:
-                self.robots.append(_robot(setup, config, several=len(setups) > 1))
+                self.robots.append(_robot(setup, config, observe, several=len(setups) > 1))
             self._couriers, self._clocks = _drivers(config, self.robots)
             lockstep = config.clock != "realtime"
             self._network = Network(listen, guard, lockstep=lockstep)
@@ -70,10 +74,14 @@ class Server:
                     self._gateways(robot, config, number), self._couriers[number].wake if lockstep else None
                 )
         except BaseException:  # a signal, too
-            for robot in self.robots:
-                robot.close()
-                robot.discard_recording()
+            self.discard()
             raise
+
+    def discard(self) -> None:
+        """Close the robots of a server that has not started, and remove their recordings."""
+        for robot in self.robots:
+            robot.close()
+            robot.discard_recording()
 
     def _gateways(self, robot: ServedRobot, config: ServeConfig, number: int) -> list[Gateway]:
         name, desk, lockstep = robot.setup.name, robot.reception, config.clock != "realtime"
@@ -84,7 +92,8 @@ class Server:
             interfaces = _interfaces(robot, config, number)
             self.ur.append((interfaces.address, interfaces.ports))
             gateways.append(interfaces)
-        gateways.append(ConsoleGateway(self._console, name, partial(config.command_line, name=name)))
+        if not self._observed:
+            gateways.append(ConsoleGateway(self._console, name, partial(config.command_line, name=name)))
         return gateways
 
     # ------------------------------------------------------------------ life
@@ -167,12 +176,14 @@ class Server:
         self._console.update()
 
 
-def _robot(setup: Setup, config: ServeConfig, *, several: bool) -> ServedRobot:
+def _robot(
+    setup: Setup, config: ServeConfig, observe: Callable[[Controller], Sink] | None, *, several: bool
+) -> ServedRobot:
     path = None
     if config.record is not None:
         path = recording_of(config.record, setup.name) if several else Path(config.record)
     try:
-        return ServedRobot(setup, path, Path(config.dump))
+        return ServedRobot(setup, path, Path(config.dump), observe)
     except ValueError as error:
         raise ConfigError(str(error)) from error
 

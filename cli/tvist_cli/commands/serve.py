@@ -1,19 +1,22 @@
 """`tvist serve`: run a robot."""
 
 import asyncio
-import os
 import time
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.misuse import lower
 from tvist_cli.output import say
-
-if TYPE_CHECKING:
-    from tvist_controller.setup import Setup
+from tvist_cli.serving import (
+    introduction,
+    leave,
+    say_if_compiling,
+    say_recorded,
+    say_who_can_reach,
+    ur_ports,
+)
 
 
 def serve(
@@ -104,14 +107,10 @@ def serve(
         "record": record, "dump": dump, "truth": truth or None, "quiet": quiet,
         "floor": floor, "compensate_sag": compensate_sag,
         "ur": (ur or ur_address is not None or ur_port is not None) or None, "ur_address": ur_address,
-        "ur_ports": None if ur_port is None else dict(map(_ur_port, ur_port)),
+        "ur_ports": ur_ports(ur_port),
     }  # fmt: skip
     began = time.monotonic()
-    from tvist_controller.kinematics.inverse import is_compiled as planning_is_compiled
-    from tvist_plant.flexible_arm import is_compiled
-
-    if not (is_compiled() and planning_is_compiled()):
-        say("compiling the arm's equations; this happens once and takes up to a minute")
+    say_if_compiling()
     from tvist_server.config import ConfigError, from_mapping, read_toml
     from tvist_server.ending import Ending
     from tvist_server.gateways.base import GatewayError
@@ -130,51 +129,17 @@ def serve(
     def ready() -> None:
         took = time.monotonic() - began
         say(
-            f"{_introduction([robot.setup for robot in server.robots], checked.profile_in_force)} "
+            f"{introduction([robot.setup for robot in server.robots], checked.profile_in_force)} "
             f"on {', '.join(checked.listen)}, "
             f"clock {checked.clock}; ready after {took:.1f} s. Press Control+C to stop."
         )
 
-    for address, ports in server.ur:
-        listed = ", ".join(f"{interface} {port}" for interface, port in ports.items())
-        say(f"UR's interfaces are open on {address}: {listed}")
-    whom = "this robot" if len(server.robots) == 1 else "these robots"
-    for endpoint in checked.listen if checked.insecure else ():
-        say(f"anyone who can reach {endpoint} can move {whom}")
+    say_who_can_reach(server, checked)
     asyncio.run(server.run(ready, ending))
     ending.close()
     if server.failure is not None:
         raise Failure(server.failure)
-    recorders = [robot.recorder for robot in server.robots if robot.recorder is not None]
-    for recorder in recorders:
-        if recorder.error is None:
-            note = f", {recorder.dropped} messages dropped" if recorder.dropped else ""
-            say(f"recorded into {recorder.place or f'a file that is no longer {recorder.path}'}{note}")
-    errors = [recorder.error for recorder in recorders if recorder.error is not None]
+    errors = say_recorded(server)
     if errors:
         raise Failure("; ".join(errors))
-    if not server.left:
-        # Zenoh would wait for ten seconds, for a client that has stopped reading. All that is ours is closed.
-        os._exit(0)
-
-
-def _ur_port(text: str) -> tuple[str, int]:
-    """Split INTERFACE=PORT; the configuration checks whether there is such an interface."""
-    interface, equals, port = text.partition("=")
-    if not equals or not (port == "off" or (port.isascii() and port.isdigit() and len(port) < 9)):
-        raise Failure(
-            f"ur-port is {text!r}: must be INTERFACE=PORT such as rtde=31004, or INTERFACE=off", code=2
-        )
-    return interface, 0 if port == "off" else int(port)
-
-
-def _introduction(setups: Sequence["Setup"], profile: str | None) -> str:
-    """Describe what listens: one robot with its settings, or the names of several."""
-    first = setups[0]
-    how = f"shaper {first.shaper}" + ("" if profile is None else f", profile {profile}")
-    if len(setups) == 1:
-        model = first.description.robot.model
-        return f"{first.name} ({model}, {first.payload.mass:g} kg, {how}) listens"
-    names = [setup.name for setup in setups]
-    listed = ", ".join(names) if len(names) < 8 else f"{', '.join(names[:3])} … {names[-1]}"
-    return f"a server of {len(names)} robots ({listed}; {how}) listens"
+    leave(server, 0)

@@ -27,7 +27,8 @@ class ProgramKinematics:
         self._motion = motion
         self._inverse = InverseKinematics(description)
         self._flange = ToolKinematics(description)
-        self._tcp, self._tool = (0.0,) * 6, self._flange
+        self._tcp: tuple[float, ...] = (0.0,) * 6
+        self._tool = self._flange
 
     def _with(self, tcp: Sequence[float] | None) -> ToolKinematics:
         """The kinematics of a tool; of the present one if there is none given."""

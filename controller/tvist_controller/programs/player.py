@@ -133,17 +133,21 @@ class ProgramPlayer:
         if event.kind == "protective_stop" and self._main is not None:
             self._wait()
         elif (event.kind == "safety_stop" and event.category != 2) or (against and self._main is not None):
-            self.end()
+            self.end(event.why or event.kind)
 
-    def end(self) -> None:
-        """End all programs without stopping what moves."""
+    def end(self, why: str) -> None:
+        """End all programs without stopping what moves.
+
+        Args:
+            why: The reason, for people.
+        """
         for running in tuple(self._all):
-            self._close(running)
+            self._close(running, why)
 
-    def stop_moving(self) -> None:
-        """End a program that may move the arm, so that no motion begins after a stop."""
+    def stop_moving(self, why: str) -> None:
+        """End a program that may move the arm, so that no motion begins after a stop; `why` as for `end`."""
         if self.state == "PLAYING" and self._loaded is not None and self._loaded.used & MOVING:
-            self.end()
+            self.end(why)
 
     def _watch(self, tick: int) -> None:
         """Pause or stop the program if a client has fallen silent."""
@@ -151,9 +155,10 @@ class ProgramPlayer:
         if expired is None or self._main is None:
             return
         action, name = expired
-        self._emit("warning", why=f"nobody wrote {name} as often as the program's watchdog asks: {action}")
+        why = f"nobody wrote {name} as often as the program's watchdog asks: {action}"
+        self._emit("warning", why=why)
         if action == "stop":
-            self.end()
+            self.end(why)
             self._motion.stop(None, "a watchdog of the program stopped it")
         elif self.state == "PLAYING":
             self._hold()
@@ -169,10 +174,11 @@ class ProgramPlayer:
         if running.script.used & MOVING and self._motion.activity in {Activity.GUIDED, Activity.MOVING}:
             self._motion.stop(None, "the program has ended")
 
-    def _close(self, running: _Running) -> None:
+    def _close(self, running: _Running, why: str | None = None) -> None:
         self._all.remove(running)
         running.machine.end()
-        self._emit("program_stopped", program=running.name, secondary=running.script.secondary or None)
+        secondary = running.script.secondary or None
+        self._emit("program_stopped", program=running.name, why=why, secondary=secondary)
         if running is self._main:
             self._main, self.state, self.line = None, "STOPPED", 0
             self._watchdogs.clear()
@@ -242,8 +248,9 @@ class ProgramPlayer:
         self._hold()
 
     def _stop(self, _: Call[ProgramStop]) -> None:
-        self.end()
-        self._motion.stop(None, "the program was stopped")
+        why = "the program was stopped"
+        self.end(why)
+        self._motion.stop(None, why)
 
     def _hold(self) -> None:
         """Pause the program. A planned motion pauses on its path, a guided one is stopped."""
@@ -270,7 +277,7 @@ class ProgramPlayer:
     def _replace(self, why: str) -> None:
         """End the program that is running, and stop the arm."""
         if self._main is not None:
-            self._close(self._main)
+            self._close(self._main, why)
             self._motion.stop(None, why)
 
     def _start(self, script: Script) -> None:

@@ -6,9 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.recordings import Floats, Recording
+from tvist_plant.plant import GRAVITY
 
-GRAVITY = 9.81
-"""Gravity of the simulated world [m/s²]."""
 BAND = (3.0, 60.0)
 """Frequency range of an arm's vibrations [Hz]."""
 SENSOR = "actual_tool_accelerometer"

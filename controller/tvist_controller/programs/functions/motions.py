@@ -195,6 +195,11 @@ class MotionFunctions:
         return self._access.motion.cycle.reference
 
     @property
+    def _here(self) -> list[float]:
+        found: list[float] = self._reference.tolist()
+        return found
+
+    @property
     def _shaped(self) -> bool:
         return not self._access.motion.cycle.unshaped
 
@@ -239,10 +244,10 @@ class MotionFunctions:
         """Posture from which the next move begins."""
         end = self._arm.end
         if end is None:
-            return self._reference.tolist()
+            return self._here
         if isinstance(end, JointSegment):
             return end.q
-        return self._kinematics.posture(end.pose, self._reference.tolist())
+        return self._kinematics.posture(end.pose, self._here)
 
     def _within(self, value: float, name: str, most: float) -> float:
         """A velocity or acceleration of the joints that the arm is capable of and that moves it."""

@@ -54,7 +54,7 @@ class _Target(NamedTuple):
 
 def _target(state: State) -> _Target:
     """The reference before shaping at the tick of the shaped one, as UR's interfaces report it."""
-    if getattr(state, "unshaped_q", None) is None:
+    if state.unshaped_q is None or state.unshaped_qd is None or state.unshaped_qdd is None:
         return _Target(state.target_q, state.target_qd, state.target_qdd)
     return _Target(state.unshaped_q, state.unshaped_qd, state.unshaped_qdd)
 

@@ -1,0 +1,221 @@
+"""`tvist run`: run a program in URScript on a robot of its own."""
+
+import asyncio
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from tvist_cli.failure import Failure, interrupted, told
+from tvist_cli.misuse import lower
+from tvist_cli.output import print_json, say
+from tvist_cli.program_output import Tell
+from tvist_cli.scripts import named, placed, read_script
+from tvist_cli.serving import introduction, leave, say_if_compiling, say_recorded, say_who_can_reach
+
+if TYPE_CHECKING:
+    from tvist_lab.programs.watch import ProgramWatch
+    from tvist_server.config import ServeConfig
+    from tvist_server.server import Server
+
+
+def run(
+    file: str,
+    *,
+    lockstep: bool = False,
+    robot: str | None = None,
+    profile: str | None = None,
+    payload: float | None = None,
+    shaper: str | None = None,
+    shape_servo: bool = False,
+    start: str | None = None,
+    seed: int | None = None,
+    inputs: Annotated[list[str] | None, Parameter(name="--input")] = None,
+    timeout: float | None = None,
+    record: Path | None = None,
+    truth: bool = False,
+    listen: list[str] | None = None,
+    ur: bool = False,
+    config: str | None = None,
+    json: bool = False,
+) -> None:
+    """Run a program in URScript on a robot of its own, print its messages as they come, and end with an exit code.
+
+    Exit code 0: the program ended by itself. Exit code 1: it does not compile, which is printed as FILE:LINE:COLUMN: text;
+    or an error, a protective stop, a safety stop, a client or --timeout ended it. Exit code 2: the command line is
+    wrong, or the file cannot be read.
+
+    The program runs in real time, on a robot that other programs can reach as if tvist serve ran it. Popups do not
+    hold it up: they are printed and closed.
+
+    Args:
+        file: Program to run; - reads the standard input.
+        lockstep: Run as fast as this machine computes, without network; the arm moves exactly as in real time. A program
+            that waits for a client then waits for ever: see --input and --timeout.
+        robot: Name of a robot that comes with the package, or path of a robot file [ur5e].
+        profile: Set of defaults, see tvist serve: ursim, which is like UR's simulator, or real, which has a payload,
+            noise, a floor, sag and shaper zv [ursim].
+        payload: Mass of the disc on the flange in kg, both carried and declared to the controller [0 with the profile
+            ursim, that of the robot file with real].
+        shaper: Any shaper that tvist shapers lists, or FILE.py:NAME [none with the profile ursim, zv with real].
+        shape_servo: Shape servoj, speedj and speedl too, where they begin at rest.
+        start: Pose to start in: a name from the robot file, such as Q1, Q2 or Q3, or joint angles in rad separated by
+            commas [the posture of URSim].
+        seed: Seed of sensor noise and gear errors [0].
+        inputs: Input to set before the start as NAME=VALUE, repeatable. NAME is digital_input_N, input_bit_register_N,
+            input_int_register_N or input_double_register_N.
+        timeout: End the run after this time in s as the robot counts it, with exit code 1 [the program may run for
+            ever].
+        record: MCAP file to record into, for tvist analyze, tvist view and tvist replay.
+        truth: Record also what a real robot cannot measure, such as the arm's deflection.
+        listen: Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447].
+        ur: Open UR's own interfaces as well, so that their clients can watch the robot and write its registers.
+        config: TOML file with any options of tvist serve for one robot; options on the command line take precedence.
+        json: Print one JSON object at the end instead of messages.
+    """
+    if timeout is not None and timeout <= 0.0:
+        raise Failure(f"timeout is {timeout:g}: must be more than 0", code=2)
+    text = read_script(file)
+    _check(file, text, json=json)
+    given: dict[str, Any] = {
+        "robot": robot, "profile": lower(profile), "payload": payload, "shaper": lower(shaper),
+        "shape_servo": shape_servo or None, "start": start, "seed": seed,
+        "record": None if record is None else str(record), "truth": truth or None, "listen": listen, "ur": ur or None,
+    }  # fmt: skip
+    checked = _configuration(given, config, lockstep=lockstep)
+    say_if_compiling()
+    job = _Job(file, text, inputs or (), timeout, Tell(quiet=json))
+    watch, errors, server = job.in_lockstep(checked) if lockstep else job.in_real_time(checked)
+    job.tell(watch)
+    job.tell.clear()
+    if json:
+        from tvist_lab.programs.report import as_dict
+
+        print_json(
+            {"file": named(file), "lockstep": lockstep, "recording": record and str(record), **as_dict(watch)}
+        )
+    failure = _failure(file, watch, errors)
+    if failure is None and not json:
+        from tvist_lab.programs.report import summary
+
+        say(summary(watch))
+    sys.stdout.flush()
+    if server is not None and not server.left:
+        if failure is not None:
+            say(f"tvist: {failure}")
+        leave(server, 0 if failure is None else failure.code)
+    if failure is not None:
+        raise failure
+
+
+def _check(file: str, text: str, *, json: bool) -> None:
+    """Say what is wrong with a program before anything is started for it."""
+    from tvist_controller.programs.checking import check_program
+
+    findings = check_program(text)
+    for finding in findings:
+        say(placed(file, finding))
+    errors = [finding for finding in findings if finding.level == "error"]
+    if not errors:
+        return
+    if json:
+        first = {"line": errors[0].line, "column": errors[0].column, "text": errors[0].text}
+        print_json({"file": named(file), "ok": False, "exit_reason": "compile_error", "error": first})
+    raise Failure(
+        f"{named(file)} cannot run: it has {len(errors)} {'error' if len(errors) == 1 else 'errors'}"
+    )
+
+
+def _configuration(given: dict[str, Any], config: str | None, *, lockstep: bool) -> "ServeConfig":
+    """The robot's configuration: that of `tvist serve` for one robot, with the profile `ursim`."""
+    from tvist_server.config import ConfigError, from_mapping, read_toml
+
+    if lockstep:
+        for name in ("listen", "ur"):
+            if given[name] is not None:
+                raise Failure(
+                    f"--lockstep and --{name} exclude each other: in lockstep there is no network", code=2
+                )
+    source = "configuration" if config is None else f"configuration {config}"
+    with told(ConfigError, code=2):
+        content = {} if config is None else read_toml(config)
+        for key, instead in (("robots", "tvist run has one robot"), ("clock", "tvist run has --lockstep")):
+            if key in content:
+                raise ConfigError(f"{source}: leave {key} out, since {instead}")
+        content = {"profile": "ursim", **content, "clock": "free" if lockstep else "realtime"}
+        content |= {key: value for key, value in given.items() if value is not None}
+        return from_mapping(content, source)
+
+
+class _Job:
+    """A program to run, and whom to tell."""
+
+    def __init__(
+        self, file: str, text: str, inputs: Sequence[str], timeout: float | None, tell: Tell
+    ) -> None:
+        self.file, self.text, self.inputs, self.timeout, self.tell = file, text, inputs, timeout, tell
+
+    def in_lockstep(self, config: "ServeConfig") -> "tuple[ProgramWatch, list[str], None]":
+        """Run it in this process; return what was observed, and errors that have ended the recording."""
+        from tvist_lab.programs.in_lockstep import run_in_lockstep
+        from tvist_lab.programs.start import InputError
+        from tvist_server.config import ConfigError
+        from tvist_server.recording import RecorderError
+
+        errors: list[str] = []
+        with told(ConfigError, InputError, code=2):
+            setup = config.setup()
+            with told(RecorderError):
+                watch = run_in_lockstep(
+                    setup,
+                    self.text,
+                    self.inputs,
+                    record=None if config.record is None else Path(config.record),
+                    timeout=self.timeout,
+                    attend=self.tell,
+                    on_record_error=errors.append,
+                )
+        if config.record is not None and not errors:
+            say(f"recorded into {config.record}")
+        return watch, errors, None
+
+    def in_real_time(self, config: "ServeConfig") -> "tuple[ProgramWatch, list[str], Server]":
+        """Serve a robot that runs it; return what was observed, errors that have ended the recording, and the server."""
+        from tvist_lab.programs.in_real_time import ProgramServer
+        from tvist_lab.programs.start import InputError
+        from tvist_server.config import ConfigError
+        from tvist_server.ending import Ending
+        from tvist_server.gateways.base import GatewayError
+        from tvist_server.recording import RecorderError
+
+        ending = Ending()
+        with told(ConfigError, InputError, code=2), told(GatewayError, RecorderError), ending.at_once():
+            served = ProgramServer(config, self.text, self.inputs, ending, self.timeout)
+        server = served.server
+
+        def ready() -> None:
+            setups = [robot.setup for robot in server.robots]
+            told_of = introduction(setups, config.profile_in_force)
+            say(f"{told_of} on {', '.join(config.listen)} while {named(self.file)} runs")
+
+        say_who_can_reach(server, config)
+        asyncio.run(served.run(ready, self.tell))
+        ending.close()
+        self.tell.clear()
+        return served.watch, say_recorded(server), server
+
+
+def _failure(file: str, watch: "ProgramWatch", errors: list[str]) -> Failure | None:
+    """Why the run has failed; None if it has not."""
+    after = f"after {watch.seconds:.3f} s of robot time"
+    match watch.reason:
+        case "finished":
+            return Failure("; ".join(errors)) if errors else None
+        case "runtime_error" if watch.error is not None:
+            say(f"{named(file)}:{watch.error.line}:{watch.error.column}: {watch.error.text}")
+            return Failure(f"{named(file)} ended with an error {after}")
+        case "signal" if watch.why is not None and watch.why.startswith("SIGINT"):
+            return interrupted(f"{named(file)} had run for {watch.seconds:.1f} s of robot time")
+    return Failure(f"{named(file)} failed {after}: {watch.why}")

@@ -1,0 +1,77 @@
+"""What the commands that serve a robot have in common."""
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from tvist_cli.failure import Failure
+from tvist_cli.output import say
+
+if TYPE_CHECKING:
+    from tvist_controller.setup import Setup
+    from tvist_server.config import ServeConfig
+    from tvist_server.server import Server
+
+
+def say_if_compiling() -> None:
+    """Say that the start takes longer if nothing is in numba's cache yet."""
+    from tvist_controller.kinematics.inverse import is_compiled as planning_is_compiled
+    from tvist_plant.flexible_arm import is_compiled
+
+    if not (is_compiled() and planning_is_compiled()):
+        say("compiling the arm's equations; this happens once and takes up to a minute")
+
+
+def ur_ports(given: Sequence[str] | None) -> dict[str, int] | None:
+    """Split INTERFACE=PORT of each; the configuration checks whether there are such interfaces."""
+    return None if given is None else dict(map(_ur_port, given))
+
+
+def _ur_port(text: str) -> tuple[str, int]:
+    interface, equals, port = text.partition("=")
+    if not equals or not (port == "off" or (port.isascii() and port.isdigit() and len(port) < 9)):
+        raise Failure(
+            f"ur-port is {text!r}: must be INTERFACE=PORT such as rtde=31004, or INTERFACE=off", code=2
+        )
+    return interface, 0 if port == "off" else int(port)
+
+
+def introduction(setups: Sequence["Setup"], profile: str | None) -> str:
+    """Describe what listens: one robot with its settings, or the names of several."""
+    first = setups[0]
+    how = f"shaper {first.shaper}" + ("" if profile is None else f", profile {profile}")
+    if len(setups) == 1:
+        model = first.description.robot.model
+        return f"{first.name} ({model}, {first.payload.mass:g} kg, {how}) listens"
+    names = [setup.name for setup in setups]
+    listed = ", ".join(names) if len(names) < 8 else f"{', '.join(names[:3])} … {names[-1]}"
+    return f"a server of {len(names)} robots ({listed}; {how}) listens"
+
+
+def say_who_can_reach(server: "Server", config: "ServeConfig") -> None:
+    """Say where UR's interfaces are open, and where anyone can move the robots."""
+    for address, ports in server.ur:
+        listed = ", ".join(f"{interface} {port}" for interface, port in ports.items())
+        say(f"UR's interfaces are open on {address}: {listed}")
+    whom = "this robot" if len(server.robots) == 1 else "these robots"
+    for endpoint in config.listen if config.insecure else ():
+        say(f"anyone who can reach {endpoint} can move {whom}")
+
+
+def say_recorded(server: "Server") -> list[str]:
+    """Say where each robot was recorded; return the errors that have ended recordings."""
+    recorders = [robot.recorder for robot in server.robots if robot.recorder is not None]
+    for recorder in recorders:
+        if recorder.error is None:
+            note = f", {recorder.dropped} messages dropped" if recorder.dropped else ""
+            say(f"recorded into {recorder.place or f'a file that is no longer {recorder.path}'}{note}")
+    return [recorder.error for recorder in recorders if recorder.error is not None]
+
+
+def leave(server: "Server", code: int) -> None:
+    """End the process with an exit code if the network would keep it; all that is ours is closed.
+
+    Zenoh would wait for ten seconds, for a client that has stopped reading.
+    """
+    if not server.left:
+        os._exit(code)

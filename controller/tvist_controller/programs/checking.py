@@ -1,0 +1,51 @@
+"""What is wrong with a program, without a robot."""
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from tvist_controller.programs.functions.unsimulated import SUBJECTS
+from tvist_controller.programs.library import SIGNATURES
+from tvist_urscript import ScriptError, check
+
+_SIMULATED = {name: one for name, one in SIGNATURES.items() if name not in SUBJECTS}
+_UNKNOWN = re.compile(r"compile_error_name_not_found:(\w+):")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A place in a program that needs attention."""
+
+    line: int
+    """Line of the text, from 1."""
+    column: int
+    """Column of the first character of the token at fault, from 1."""
+    level: Literal["error", "warning"]
+    """An error keeps the program from starting; a warning ends it when the place is reached."""
+    text: str
+    """What is wrong."""
+
+
+def check_program(text: str) -> list[Finding]:
+    """Return what is wrong with a program, in the order of its text; empty if nothing is.
+
+    Errors are those of the compiler: syntax, unknown names, calls that do not fit their functions. Warnings are the calls
+    of functions that this controller does not simulate.
+
+    Args:
+        text: The program: a `def` or `sec` with its `end`, or statements.
+    """
+    findings = [_error(error) for error in check(text, SIGNATURES)]
+    # Without these functions, the same check finds the places where they are called.
+    known = {(finding.line, finding.column) for finding in findings}
+    for error in check(text, _SIMULATED):
+        unknown = _UNKNOWN.fullmatch(error.text)
+        if unknown is not None and unknown[1] in SUBJECTS and (error.line, error.column) not in known:
+            name = unknown[1]
+            text_of_it = f"{name}: this controller does not simulate {SUBJECTS[name][1]}"
+            findings.append(Finding(error.line, error.column, "warning", text_of_it))
+    return sorted(findings, key=lambda finding: (finding.line, finding.column))
+
+
+def _error(error: ScriptError) -> Finding:
+    return Finding(error.line, error.column, "error", error.text)

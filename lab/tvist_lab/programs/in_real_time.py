@@ -1,0 +1,82 @@
+"""A program in real time, on a served robot that clients can reach."""
+
+import asyncio
+from collections.abc import Callable, Sequence
+
+from tvist_controller.api import Controller
+from tvist_lab.programs.start import LEASE, start
+from tvist_lab.programs.watch import ProgramWatch
+from tvist_protocol.commands import KeepAlive
+from tvist_protocol.programs import ProgramClosePopup
+from tvist_protocol.replies import Reply
+from tvist_server.config import ServeConfig
+from tvist_server.ending import Ending
+from tvist_server.server import Server
+
+ATTEND = 0.05
+"""Time between two calls of the function that tells people about the run [s]."""
+
+
+class ProgramServer:
+    """A served robot that begins with a program, and ends with it.
+
+    Args:
+        config: Configuration of one robot in real time.
+        text: Text of the program.
+        inputs: Inputs to set before, each as NAME=VALUE.
+        ending: Shutdown by signals.
+        timeout: Robot time after which the run ends although the program goes on [s].
+
+    Raises:
+        ConfigError: The configuration is invalid.
+        RecorderError: The recording cannot be written.
+        GatewayError: The server cannot listen on an endpoint.
+        InputError: An input is wrong.
+        RefusedError: The robot refuses the program.
+    """
+
+    def __init__(
+        self, config: ServeConfig, text: str, inputs: Sequence[str], ending: Ending, timeout: float | None
+    ) -> None:
+        self._ending = ending
+
+        def observe(controller: Controller) -> ProgramWatch:
+            self.watch = ProgramWatch(controller, self._close_popup, ending.request, timeout=timeout)
+            return self.watch
+
+        self.server = Server(config, observe)
+        (self._robot,) = self.server.robots
+        try:
+            self._token = start(self._robot.request, text, inputs)
+        except BaseException:
+            self.server.discard()
+            raise
+
+    async def run(self, ready: Callable[[], None], attend: Callable[[ProgramWatch], None]) -> None:
+        """Serve until the program has ended and the arm is at rest, or a signal comes.
+
+        Args:
+            ready: Called once the robot ticks and answers clients.
+            attend: Tells people about the run; called now and then.
+        """
+        loop = asyncio.get_running_loop()
+        serving = asyncio.ensure_future(self.server.run(ready, self._ending))
+        renewed = loop.time()
+        while not serving.done():
+            await asyncio.wait((serving,), timeout=ATTEND)
+            attend(self.watch)
+            if loop.time() - renewed > LEASE / 10.0:
+                renewed = loop.time()
+                self._robot.reception.command(KeepAlive(token=self._token), _nothing)
+        await serving
+        if self.server.failure is not None:
+            self.watch.end("server_failure", self.server.failure)
+        elif self._ending.signal is not None:
+            self.watch.end("signal", f"{self._ending.signal.name} ended the run")
+
+    def _close_popup(self) -> None:
+        self._robot.driven.post(lambda: self._robot.request(ProgramClosePopup()))
+
+
+def _nothing(_: Reply) -> None:
+    """Ignore the reply: if control is lost, the program ends with it."""
