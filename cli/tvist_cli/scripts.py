@@ -14,7 +14,7 @@ STDIN = "-"
 
 def named(file: str) -> str:
     """Return how messages call a file."""
-    return "<stdin>" if file == STDIN else file
+    return "<stdin>" if file.strip() == STDIN else file
 
 
 def read_script(file: str) -> str:
@@ -25,10 +25,12 @@ def read_script(file: str) -> str:
     """
     from tvist_plant.user_file import LARGEST, UserFileError, read_text
 
-    if file == STDIN:
+    if file.strip() == STDIN:
         content = sys.stdin.buffer.read(LARGEST + 1)
         if len(content) > LARGEST:
-            raise Failure(f"the standard input has more than {LARGEST >> 20} MiB: is it the right one?", code=2)
+            raise Failure(
+                f"the standard input has more than {LARGEST >> 20} MiB: is it the right one?", code=2
+            )
         try:
             return content.decode()
         except UnicodeDecodeError as error:

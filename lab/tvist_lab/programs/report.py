@@ -28,9 +28,7 @@ def as_dict(watch: ProgramWatch) -> dict[str, Any]:
         "ok": watch.reason == "finished",
         "exit_reason": watch.reason,
         "why": watch.why,
-        "error": None
-        if error is None
-        else {"line": error.line, "column": error.column, "text": error.text},
+        "error": None if error is None else {"line": error.line, "column": error.column, "text": error.text},
         "seconds": watch.seconds,
         "messages": [_message(said) for said in watch.said if said.kind != "warning"],
         "warnings": [
