@@ -1,12 +1,12 @@
 """Log UR's real-time interface, port 30003, to a CSV file, with only Python's standard library.
 
-    tvist serve --ur
+    tvist serve --ur --profile real
     python 02_realtime_log.py [HOST] [FILE] [SECONDS]        default: 127.0.0.1 realtime.csv, until Control+C
 
 The robot sends a package at every tick, 500 times a second: an int32 with its own length, then doubles, big-endian.
 This is the layout that UR publishes; software before 5.10 ends it after the safety status. Columns have UR's names,
 with a number appended to each of several values: one per joint, or x y z and a rotation vector. Times are in s,
-angles in rad, lengths in m, forces in N, moments in N m, currents in A.
+angles in rad, lengths in m, forces in N, moments in N m, currents in A. Targets are those before the shaper.
 """
 
 import csv

@@ -1,9 +1,9 @@
 """Types for events on their way to the clients."""
 
-from typing import Literal, Protocol, TypedDict, Unpack
+from typing import Protocol, TypedDict, Unpack
 
 from tvist_protocol.replies import Code
-from tvist_protocol.stream import EventKind
+from tvist_protocol.stream import EventKind, PopupKind
 
 
 class Told(TypedDict, total=False):
@@ -24,7 +24,7 @@ class Fields(Told, total=False):
     column: int | None
     program: str | None
     title: str | None
-    level: Literal["message", "warning", "error"] | None
+    level: PopupKind | None
     blocking: bool | None
     secondary: bool | None
 

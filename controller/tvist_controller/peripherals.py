@@ -184,10 +184,14 @@ class Peripherals:
             self._bits[bank][word] = after = before | mask if value else before & ~mask
             self.changed |= after != before
             return
-        numbers: list[int] | list[float] = self._ints[bank] if bank in self._ints else self._doubles[bank]
-        if numbers[place] != value:
-            numbers[place] = value  # type: ignore[call-overload]  the bank has numbers of this type
-            self.changed = True
+        if bank in self._ints:
+            integers, integer = self._ints[bank], int(value)
+            self.changed |= integers[place] != integer
+            integers[place] = integer
+        else:
+            doubles = self._doubles[bank]
+            self.changed |= doubles[place] != value
+            doubles[place] = float(value)
 
     def written(self, bank: Bank, place: int) -> int:
         """Return the first control period after a client last wrote a register; 0 if none ever did."""

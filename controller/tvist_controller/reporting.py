@@ -1,5 +1,7 @@
 """Conversion of a tick's signals into messages for clients."""
 
+from msgspec.structs import replace
+
 from tvist_controller.control.kinematics import ForwardKinematics, rotation_vector
 from tvist_controller.cycle import Sample
 from tvist_plant.description import RobotDescription
@@ -39,9 +41,9 @@ class Reporter:
         missed_ticks: int,
     ) -> State:
         """Return the state of a tick."""
-        target, measured = sample.target, sample.measured
+        target, measured, unshaped = sample.target, sample.measured, sample.unshaped
         pose, tool_speed = self._kinematics.tool(measured.q, measured.qd)
-        return State(
+        state = State(
             tick=tick,
             timestamp=tick * PERIOD,
             robot_mode=robot_mode.value,
@@ -65,6 +67,14 @@ class Reporter:
             shaper_delay=tvist.delay,
             missed_ticks=missed_ticks,
             shaper_clipped=tvist.clipped,
+        )
+        if unshaped is None:
+            return state
+        return replace(
+            state,
+            unshaped_q=unshaped.q.tolist(),
+            unshaped_qd=unshaped.qd.tolist(),
+            unshaped_qdd=unshaped.qdd.tolist(),
         )
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:

@@ -35,6 +35,9 @@ STATE_COLUMNS = (
     "shaper_delay",
     "missed_ticks",
     "shaper_clipped",
+    "unshaped_q",
+    "unshaped_qd",
+    "unshaped_qdd",
 )
 """Fields of a `state`, each of which becomes a column of the same name."""
 TRUTH_PREFIX = "truth_"
@@ -55,7 +58,8 @@ class Recording:
 
     columns: Mapping[str, Floats]
     """Name to values, shape (T,) or (T, k), in the units of the messages (SI, rad); NaN if a field was null or
-    shorter than in other rows. Columns `truth_*` contain what a real robot cannot measure.
+    shorter than in other rows. Columns `unshaped_*` have the target's values where their fields were null. Columns
+    `truth_*` contain what a real robot cannot measure.
     """
     events: tuple[Any, ...] = ()
     """Events in the order of their ticks; each has `tick`, `kind`, `id`, `code`, `why`."""
@@ -101,7 +105,7 @@ class Recording:
             raise RecordingError("a recording needs at least one state")
         ticks = sorted(by_tick)
         rows = [by_tick[tick] for tick in ticks]
-        columns = {name: _column([getattr(row, name) for row in rows]) for name in STATE_COLUMNS}
+        columns = {name: _column([_value(row, name) for row in rows]) for name in STATE_COLUMNS}
         true_by_tick = {int(truth.tick): truth for truth in truths}
         if true_by_tick:
             for name in _fields(next(iter(true_by_tick.values()))):
@@ -185,6 +189,12 @@ def _fields(message: Any) -> list[str]:
         for name in names
         if name not in ("tick", "timestamp") and not isinstance(getattr(message, name), str)
     ]
+
+
+def _value(state: Any, name: str) -> Any:
+    """Value of a state's field; before shaping, null stands for the target's."""
+    value = getattr(state, name)
+    return getattr(state, name.replace("unshaped", "target")) if value is None else value
 
 
 def _column(values: list[Any]) -> Floats:

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from msgspec.structs import fields
+
 from tvist_controller.api import Controller, OwnShaper, Presence, RecordedShaper, Setup
 from tvist_lab.mcap_file import RecordingFile
 from tvist_protocol.commands import HandOver, Setpoint, TakeControl
@@ -40,7 +42,7 @@ def replay(setup: Setup, journal: Sequence[Entry], states: Sequence[State]) -> R
         journal: Inputs of the recorded controller.
         states: Its states, from its first tick on; only their number and values are used.
     """
-    controller, presence, done = Controller(setup), Presence(), Replay()
+    controller, presence, done, names = Controller(setup), Presence(), Replay(), known_fields(states)
     entries = iter(journal)
     entry = next(entries, None)
     for recorded in states:
@@ -52,7 +54,7 @@ def replay(setup: Setup, journal: Sequence[Entry], states: Sequence[State]) -> R
         while controller.tick_number < recorded.tick:
             _tick(controller, setup, done)
         if done.first_difference is None:
-            done.first_difference = _difference(recorded, done.states[-1])
+            done.first_difference = _difference(recorded, done.states[-1], names)
     return done
 
 
@@ -162,8 +164,15 @@ def _give(controller: Controller, entry: Entry, presence: Presence) -> None:
             controller.receive(message, session=session)
 
 
-def _difference(recorded: State, replayed: State) -> str | None:
-    for name in recorded.__struct_fields__:
+def known_fields(states: Sequence[State]) -> list[str]:
+    """Return the fields that a recording has: a version that does not know one records none, which is read as None."""
+    optional = [field.name for field in fields(State) if field.default is None]
+    absent = {name for name in optional if all(getattr(state, name) is None for state in states)}
+    return [name for name in State.__struct_fields__ if name not in absent]
+
+
+def _difference(recorded: State, replayed: State, names: Sequence[str]) -> str | None:
+    for name in names:
         before, after = getattr(recorded, name), getattr(replayed, name)
         if before != after:
             return f"tick {recorded.tick}: {name} was {before}, is {after}"

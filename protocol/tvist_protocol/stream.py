@@ -26,6 +26,9 @@ EventKind = Literal[
     "popup",
 ]
 
+PopupKind = Literal["message", "warning", "error"]
+"""How serious a popup is."""
+
 EVENT_MEANINGS: dict[EventKind, str] = {
     "motion_started": "the motion `id` begins at this tick",
     "motion_done": "the shaped reference of motion `id` is at rest (to 1e-7 rad); the arm may still vibrate",
@@ -93,6 +96,12 @@ class State(Struct, frozen=True, kw_only=True, tag_field="type", tag="state", gc
     """Number of control periods since the start that began too late."""
     shaper_clipped: bool = False
     """Whether the shaper cannot meet its specification: it would need a longer delay line, or leaves more vibration."""
+    unshaped_q: list[float] | None = None
+    """Reference before shaping at the tick of `target_q`, a tick before `reference_q`; null: the same [rad]."""
+    unshaped_qd: list[float] | None = None
+    """Velocity of the reference before shaping; null: the same as `target_qd` [rad/s]."""
+    unshaped_qdd: list[float] | None = None
+    """Acceleration of the reference before shaping; null: the same as `target_qdd` [rad/s²]."""
 
 
 class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc=False):
@@ -122,7 +131,7 @@ class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc
     """Name of the program that it concerns."""
     title: str | None = None
     """Title of a popup."""
-    level: Literal["message", "warning", "error"] | None = None
+    level: PopupKind | None = None
     """How serious a popup is."""
     blocking: bool | None = None
     """Whether the program waits until the popup is closed."""

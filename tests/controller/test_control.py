@@ -182,7 +182,7 @@ def test_at_rest_the_command_is_the_position_and_gravity():
 def test_a_reset_forgets_the_wind_up():
     controllers, still = JointControllers(UR5E, H), np.zeros(6)
     controllers.command(Target(Q1, still, still), np.full(6, 50.0), still)
-    controllers.reset(still, still)
+    controllers.reset(still)
     assert not controllers.command(Target(Q1, still, still), still, still).qd.any()
 
 

@@ -1,6 +1,6 @@
 """The paper's experiment, logged as its authors did: through UR's real-time interface, with its published layout.
 
-The log has no reference before shaping, and needs none: without a shaper the target is the reference, a tick later.
+The log's target is the reference before shaping, a tick later. The shaped one is that of the recording.
 """
 
 import asyncio
@@ -29,10 +29,9 @@ from tvist_lab.served import served
 EXAMPLE = Path(__file__).parents[2] / "clients/examples/02_realtime_log.py"
 TICK, BOOTED = 0.002, 40.0
 COLUMNS = {
-    "q_target": "target_q",
-    "qd_target": "target_qd",
-    "qdd_target": "target_qdd",
-    "M_target": "target_moment",
+    "q_target": "unshaped_q",
+    "qd_target": "unshaped_qd",
+    "qdd_target": "unshaped_qdd",
     "q_actual": "actual_q",
     "qd_actual": "actual_qd",
     "tool_vector_actual": "actual_TCP_pose",
@@ -113,7 +112,7 @@ def both(tmp_path_factory):
     folder = tmp_path_factory.mktemp("logged")
     log, recorded = folder / "realtime.csv", folder / "run.mcap"
     host = own_address(1)
-    options = ["--clock", "lockstep", "--ur", "--ur-address", host, "--record", str(recorded)]
+    options = ["--clock", "lockstep", "--profile", "real", "--ur-address", host, "--record", str(recorded)]
     said = asyncio.run(experiment(options, host, str(log)))
     return SimpleNamespace(said=said, log=logged(log), recorded=read(recorded).recording)
 
@@ -135,25 +134,24 @@ def test_the_log_says_what_the_recording_does_to_the_last_bit(both):
 
 def runs_of(log):
     """First and last row of each run: they move, and lie between resets."""
-    jumps = 1 + np.flatnonzero(np.abs(np.diff(log["target_q"], axis=0)).max(axis=1) > JUMP)
+    jumps = 1 + np.flatnonzero(np.abs(np.diff(log["unshaped_q"], axis=0)).max(axis=1) > JUMP)
     ends = [*jumps, len(log["tick"])]
     spans = list(zip([0, *jumps], ends, strict=True))
-    return [(a, b) for a, b in spans if np.ptp(log["target_q"][a:b], axis=0).max() > JUMP]
+    return [(a, b) for a, b in spans if np.ptp(log["unshaped_q"][a:b], axis=0).max() > JUMP]
 
 
-def recordings(log):
-    """Each run with the reference that it had: an unshaped run's target, a tick earlier."""
-    found, pair = [], None
-    for number, (first, past) in enumerate(runs_of(log)):
-        target = log["target_q"][first:past]
-        ahead = np.concatenate([target[1:], target[-1:]])
-        if number % 2 == 0:
-            pair, reference = ahead, ahead
-        else:
-            moves = [int(np.flatnonzero(np.any(q != q[0], axis=1))[0]) for q in (pair, ahead)]
-            reference = pair[np.clip(np.arange(len(ahead)) + moves[0] - moves[1], 0, len(pair) - 1)]
+def recordings(log, recorded):
+    """Each run with its reference, which is the log's target a tick earlier, and the shaped one of the recording."""
+    found = []
+    for first, past in runs_of(log):
+        target = log["unshaped_q"][first:past]
         columns = {name: column[first:past] for name, column in log.items() if name != "time"}
-        columns |= {"timestamp": log["time"][first:past], "reference_q": reference}
+        columns |= {
+            "timestamp": log["time"][first:past],
+            "reference_q": np.concatenate([target[1:], target[-1:]]),
+        }
+        rows = recorded.between(int(columns["tick"][0]), int(columns["tick"][-1]))
+        columns |= {name: rows[name] for name in ("target_q", "target_qd", "target_qdd")}
         found.append(Recording(columns))
     return found
 
@@ -168,7 +166,7 @@ def table(results):
 
 
 def test_table_2_from_the_log_equals_table_2_from_the_recording(both, measured):
-    runs = recordings(both.log)
+    runs = recordings(both.log, both.recorded)
     assert len(runs) == 2 * len(MOTIONS)
     ours, theirs = [], []
     for one in runs:

@@ -28,10 +28,6 @@ HERE = Path(__file__).parent
 FAR = [0.6, -2.9, 0.3, -1.4, 0.2, 0.4]
 TICK, BOOTED = 0.002, 40.0
 OF_STATE = {
-    "getTargetQ": "target_q",
-    "getTargetQd": "target_qd",
-    "getTargetQdd": "target_qdd",
-    "getTargetMoment": "target_moment",
     "getActualQ": "actual_q",
     "getActualQd": "actual_qd",
     "getActualTCPPose": "actual_TCP_pose",
@@ -44,6 +40,10 @@ OF_STATE = {
 }
 """Getters whose values `state` carries."""
 OF_INSTRUMENTS = {
+    "getTargetQ": "target_q",
+    "getTargetQd": "target_qd",
+    "getTargetQdd": "target_qdd",
+    "getTargetMoment": "target_moment",
     "getActualCurrent": "actual_current",
     "getActualDigitalInputBits": "actual_digital_input_bits",
     "getActualDigitalOutputBits": "actual_digital_output_bits",
@@ -162,7 +162,18 @@ def session(tmp_path_factory):
     At half the speed: the client has to read all of a tick before the next one comes.
     """
     path = tmp_path_factory.mktemp("recorded") / "all.mcap"
-    options = ("--ur", "--ur-address", own_address(1), "--record", str(path), "--speed", "0.5")
+    options = (
+        "--profile",
+        "real",
+        "--start",
+        "Q1",
+        "--ur-address",
+        own_address(1),
+        "--record",
+        str(path),
+        "--speed",
+        "0.5",
+    )
     with Served(*options) as served:
         with Wire(served.endpoint) as wire, wire.control() as token:
             wire.listen("io")
@@ -246,7 +257,7 @@ def test_a_getter_tells_what_its_variables_say(pairs, getter):
 @pytest.fixture(scope="module")
 def quiet():
     """A robot for clients that set."""
-    with Served("--ur", "--ur-address", own_address(2), "--quiet") as served:
+    with Served("--ur", "--ur-address", own_address(2)) as served:
         yield served
 
 

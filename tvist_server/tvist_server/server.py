@@ -35,7 +35,7 @@ class Server:
 
     Args:
         config: Configuration of the robots.
-        observe: Makes an observer of a robot's messages, which tells people about the robot instead of the console.
+        observe: Makes an observer of a robot's messages, which then tells people about it instead of the console.
 
     Raises:
         ConfigError: The configuration is invalid.

@@ -9,10 +9,10 @@ from types import CodeType, MappingProxyType
 from tvist_urscript import tree
 from tvist_urscript.errors import ScriptError, syntax_error
 from tvist_urscript.failures import FILE
+from tvist_urscript.functions import Functions
 from tvist_urscript.names import scopes
 from tvist_urscript.parsing import parse
 from tvist_urscript.signatures import Signatures
-from tvist_urscript.statements import Statements
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ def translate(text: str, signatures: Signatures) -> tuple[Script | None, list[Sc
     except ScriptError as error:
         return None, [error]
     found = scopes(program)
-    translator = Statements(known, report)
-    trees = [translator.function(scope) for scope in found]
+    translator = Functions(known, report)
+    trees = [made for scope in found for made in translator.function(scope)]
     if errors:
         return None, [errors[key] for key in sorted(errors)]
     return (

@@ -1,7 +1,9 @@
 """What a Python exception in compiled code means to the author of the script."""
 
 import re
-from types import TracebackType
+from itertools import islice
+from types import CodeType, TracebackType
+from typing import Any
 
 from tvist_urscript.errors import Fault, ScriptError
 
@@ -32,16 +34,29 @@ def failure(error: Exception) -> ScriptError:
     return ScriptError(line, column, _words(error))
 
 
+def position_of(steps: Any) -> tuple[int, int] | None:
+    """Return the position at which a generator waits in compiled code, None where it has not begun or has ended."""
+    found = None
+    while (frame := getattr(steps, "gi_frame", None)) is not None:
+        if frame.f_code.co_filename == FILE and frame.f_lasti >= 0:
+            found = _position(frame.f_code, frame.f_lasti)
+        steps = steps.gi_yieldfrom
+    return found
+
+
 def _places(traceback: TracebackType | None) -> list[tuple[int, int]]:
     places = []
     while traceback is not None:
         code = traceback.tb_frame.f_code
         if code.co_filename == FILE:
-            positions = list(code.co_positions())
-            line, _, column, _ = positions[traceback.tb_lasti // 2]
-            places.append((line or 1, column or 1))
+            places.append(_position(code, traceback.tb_lasti))
         traceback = traceback.tb_next
     return places
+
+
+def _position(code: CodeType, instruction: int) -> tuple[int, int]:
+    line, _, column, _ = next(islice(code.co_positions(), instruction // 2, None))
+    return line or 1, column or 1
 
 
 def _words(error: Exception) -> str:  # noqa: PLR0911  one for each kind of exception

@@ -5,7 +5,7 @@ import math
 from tvist_urscript.arithmetic import MOST_PRODUCTS, matrix
 from tvist_urscript.errors import Fault
 from tvist_urscript.poses import pose_inv
-from tvist_urscript.values import Array, Pose, Value, array, integer, kind, vector
+from tvist_urscript.values import LONGEST, Array, Pose, Value, array, integer, kind, vector
 
 _BITS = 32
 
@@ -65,8 +65,8 @@ def make_list(elements: Value, initial_value: Value) -> Array:
     count = integer(elements, "the length of make_list")
     if count < 0:
         raise Fault("a list cannot have a negative length")
-    if count > 1_000_000:
-        raise Fault(f"a list of {count} elements is too long")
+    if count > LONGEST:
+        raise Fault(f"a list of {count} elements is too long: the limit is {LONGEST}")
     return Array([initial_value] * count)
 
 

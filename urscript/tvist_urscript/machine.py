@@ -7,10 +7,10 @@ from typing import Any
 from tvist_urscript import arithmetic, indexing
 from tvist_urscript.compiler import Script
 from tvist_urscript.errors import Fault, ScriptError
-from tvist_urscript.failures import FILE, TooDeep, failure
+from tvist_urscript.failures import TooDeep, failure, position_of
+from tvist_urscript.functions import DEEPEST_CALLS
 from tvist_urscript.library import PURE
 from tvist_urscript.pieces import HERE, MISSING, SPENT
-from tvist_urscript.statements import DEEPEST_CALLS
 from tvist_urscript.threads import MOST_THREADS, Thread
 from tvist_urscript.values import Array, Pose, Value
 
@@ -84,7 +84,9 @@ class Machine:
     @property
     def line(self) -> int:
         """The present line of the main thread."""
-        self._line = _line_of(self._main) or self._line
+        present = position_of(self._main.steps)
+        if present is not None:
+            self._line = present[0]
         return self._line
 
     def resume(self, budget: int = EVALUATIONS) -> int:
@@ -166,11 +168,11 @@ class Machine:
             return
         thread.spent += 1
         if thread.spent >= PATIENCE:
-            line = _line_of(thread) or 1
+            line, column = position_of(thread.steps) or (1, 1)
             self.end()
             raise ScriptError(
                 line,
-                1,
+                column,
                 f"an endless loop: the thread has computed for {PATIENCE} ticks without waiting for time to pass",
             )
 
@@ -328,17 +330,6 @@ class Machine:
             return function(*arguments)
 
         return charged
-
-
-def _line_of(thread: Thread) -> int:
-    """Return the line at which a thread is, 0 where it has not begun or has ended."""
-    line = 0
-    steps: Any = thread.steps
-    while (frame := getattr(steps, "gi_frame", None)) is not None:
-        if frame.f_code.co_filename == FILE:
-            line = frame.f_lineno
-        steps = steps.gi_yieldfrom
-    return line
 
 
 def _halt() -> None:

@@ -1,4 +1,4 @@
-"""Statements and functions of a script as Python's, with the costs that they take from the budget."""
+"""Statements of a script as Python's, with the costs that they take from the budget."""
 
 import ast
 from itertools import count
@@ -6,12 +6,10 @@ from itertools import count
 from tvist_urscript import tree
 from tvist_urscript.errors import syntax_error
 from tvist_urscript.expressions import MOST_OPERATIONS, Expressions, Report, first
-from tvist_urscript.names import BUILT_IN_ARRAYS, Scope
-from tvist_urscript.pieces import DEPTH, MISSING, Position
+from tvist_urscript.names import BUILT_IN_ARRAYS
+from tvist_urscript.pieces import Position
 from tvist_urscript.signatures import Signatures
 
-DEEPEST_CALLS = 200
-"""Calls of functions inside each other."""
 PIECE = 40
 """Evaluations after which a straight piece of a program looks at the budget."""
 MOST_LOOPS = 15
@@ -24,62 +22,18 @@ Link = tuple[Position, ast.expr, list[ast.stmt]]
 
 
 class Statements(Expressions):
-    """Translates functions."""
+    """Translates statements.
+
+    Attributes:
+        loops: Loops around what is being translated.
+        is_part: It belongs to a part of the main function, which tells by True that the program has returned.
+    """
 
     def __init__(self, signatures: Signatures, report: Report) -> None:
         super().__init__(signatures, report)
         self.loops = 0
+        self.is_part = False
         self.temporary = count()
-
-    def function(self, scope: Scope) -> ast.FunctionDef:
-        """Translate a function of the script, without those inside it."""
-        function = scope.function
-        self.scope, self.globals, self.loops = scope, set(), 0
-        for twice in scope.twice:
-            self.report(twice.line, twice.column, f"{twice.name} is defined twice")
-        at = Position.of(function)
-        parameters = self.parameters(scope)
-        self.cost = 0
-        defaults: list[ast.stmt] = []
-        for name, default in function.parameters:
-            if default is not None:
-                here = Position.of(name)
-                missing = here.compare(here.name(f"v_{name.name}"), ast.Is(), here.name(MISSING))
-                defaults.append(here.branch(missing, [here.assign(f"v_{name.name}", self.value(default))]))
-        too_deep = at.branch(
-            at.compare(at.name(DEPTH), ast.Gt(), at.constant(DEEPEST_CALLS)),
-            [at.statement(at.call("too_deep"))],
-        )
-        body, _ = self.block(function.body, 0)
-        declared: list[ast.stmt] = [ast.Global(sorted(self.globals), **at.given)] if self.globals else []
-        return ast.FunctionDef(
-            scope.code_name,
-            ast.arguments(
-                [], [ast.arg(name, **at.given) for name in [DEPTH, *parameters]], None, [], [], None, []
-            ),
-            [*declared, *at.charge(1, check=True), too_deep, *defaults, *body],
-            [],
-            **at.given,
-        )
-
-    def parameters(self, scope: Scope) -> list[str]:
-        """Check the parameters of a function and return their names in Python."""
-        names: list[str] = []
-        needed = True
-        for name, default in scope.function.parameters:
-            if scope.function.kind == "thread":
-                self.report(
-                    name.line, name.column, f"the thread {scope.function.name} cannot have parameters"
-                )
-            if f"v_{name.name}" in names:
-                self.report(name.line, name.column, f"the parameter {name.name} is named twice")
-            if default is None and not needed:
-                self.report(
-                    name.line, name.column, f"the parameter {name.name} needs a default as the one before it"
-                )
-            needed = needed and default is None
-            names.append(f"v_{name.name}")
-        return names
 
     def block(self, body: list[tree.Statement], since: int, cost: int = 0) -> tuple[list[ast.stmt], int]:
         """Translate statements.
@@ -217,8 +171,11 @@ class Statements(Expressions):
             case tree.Evaluate():
                 return [at.statement(self.value(statement.value))]
             case tree.Return():
-                value = self.value(statement.value) if statement.value is not None else at.constant(None)
-                return [ast.Return(value, **at.given)]
+                value = at.constant(None) if statement.value is None else self.value(statement.value)
+                return [
+                    *([at.statement(value)] if self.is_part else []),
+                    ast.Return(at.constant(True) if self.is_part else value, **at.given),
+                ]
             case tree.Handle(word="kill"):
                 return [at.statement(at.call("kill", self.value(statement.value)))]
             case tree.Handle():

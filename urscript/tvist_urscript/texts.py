@@ -3,7 +3,7 @@
 import re
 
 from tvist_urscript.errors import Fault
-from tvist_urscript.values import Value, integer, kind, short, text, to_str, whole
+from tvist_urscript.values import Value, integer, short, text, to_str, whole
 
 _INTEGER = re.compile(r"\s*[+-]?\d+\s*", re.ASCII)
 _FLOAT = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
@@ -65,4 +65,4 @@ def to_num(string: Value) -> int | float:
 def check(condition: Value) -> None:
     """Do nothing if a condition is true; `assert` in a script."""
     if not condition:
-        raise Fault(f"an assertion has failed: it is {kind(condition)} that counts as false")
+        raise Fault("an assertion has failed")

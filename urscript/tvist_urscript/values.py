@@ -13,6 +13,8 @@ LONGEST = 1000
 """Elements of a list."""
 LARGEST = 4000
 """Elements of a list with those of the lists inside it."""
+DEEPEST = 20
+"""Lists inside each other."""
 LONGEST_TEXT = 1023
 """Bytes of a text in UTF-8."""
 LOWEST, HIGHEST = -(2**31), 2**31 - 1
@@ -25,28 +27,35 @@ class Array:
     Attributes:
         items: Its elements.
         size: Number of its elements, with those of the lists inside it.
+        depth: Lists inside each other, with itself.
 
     Raises:
-        Fault: It has more than LONGEST elements, or more than LARGEST with those inside.
+        Fault: It has more than LONGEST elements, or more than LARGEST with those inside, or is more than DEEPEST deep.
     """
 
-    __slots__ = ("items", "size")
+    __slots__ = ("depth", "items", "size")
+    depth: int
     items: tuple["Value", ...]
     size: int
 
     def __init__(self, items: Iterable["Value"]) -> None:
         self.items = tuple(items)
         size = len(self.items)
+        depth = 0
         if size > LONGEST:
             raise Fault(f"a list of {size} elements is too long: the limit is {LONGEST}")
         for item in self.items:
             if isinstance(item, Array):
                 size += item.size
+                depth = max(depth, item.depth)
         if size > LARGEST:
             raise Fault(
                 f"a list with {size} elements, those of its lists included, is too large: the limit is {LARGEST}"
             )
+        if depth >= DEEPEST:
+            raise Fault(f"lists are nested too deep: the limit is {DEEPEST}")
         self.size = size
+        self.depth = depth + 1
 
     def __len__(self) -> int:
         return len(self.items)

@@ -36,14 +36,13 @@ class JointControllers:
         self._width = drives.friction_feedforward_width
         self._windup = np.zeros(description.joints)
 
-    def reset(self, torque: Floats, gravity: Floats) -> None:
-        """Restart at rest, with the wind-up that belongs to these torques; see `command`."""
-        self._windup = self._lead(torque, gravity)
+    def reset(self, gravity: Floats) -> None:
+        """Restart at rest.
 
-    def _lead(self, torque: Floats, gravity: Floats) -> Floats:
-        """Angle by which the motors lead the reference, shape (n,) [rad]."""
-        lead: Floats = self._compliance * (torque - gravity)
-        return lead if self._yielding is None else lead + self._yielding * gravity
+        Args:
+            gravity: Torque that balances gravity there, shape (n,) [N m].
+        """
+        self._windup = np.zeros_like(gravity) if self._yielding is None else self._yielding * gravity
 
     def command(self, target: Target, torque: Floats, gravity: Floats) -> DriveCommand:
         """Drive command for a target.
@@ -53,7 +52,9 @@ class JointControllers:
             torque: τ* of the rigid arm, shape (n,) [N m].
             gravity: The part of the torque that balances gravity, shape (n,) [N m].
         """
-        windup = self._lead(torque, gravity)
+        windup = self._compliance * (torque - gravity)
+        if self._yielding is not None:
+            windup += self._yielding * gravity
         windup_speed = (windup - self._windup) / self._period
         self._windup = windup
         friction = (

@@ -44,12 +44,17 @@ class ShapedReference:
         """Return the joint positions that a sample stands for, shape (n,) [rad]."""
         return sample if self.posture_of is None else self.posture_of(sample)
 
-    def update(self, sample: Floats) -> Target:
-        """Take the sample of this tick and return the target of the previous tick."""
+    def update(self, sample: Floats, posture: Floats | None = None) -> Target:
+        """Take the sample of this tick and return the target of the previous tick.
+
+        Args:
+            sample: Sample, shape (m,) or (n,) [rad].
+            posture: The joint positions that it stands for, if they are known, shape (n,) [rad].
+        """
         if self.posture_of is None:
             return self.joints.update(sample)
         self.along.update(sample)
-        return self.joints.update(self.posture_of(sample))
+        return self.joints.update(self.posture_of(sample) if posture is None else posture)
 
     def fork(self) -> Self:
         """Return an independent copy of the present state."""

@@ -6,38 +6,47 @@ from tvist_controller.instruments.ratings import BUS_VOLTAGE
 from tvist_controller.instruments.reading import Reading
 
 DEVIATION = 0.05
-"""Difference between measured and target angle that counts as 1 [rad]."""
+"""Difference between measured and shaped angle that counts as 1 [rad]."""
 
 
 class JointValues(Reading):
     """Motion, torque and electricity of the joints."""
 
     @property
-    def target_q(self) -> list[float]:
-        """State: shaped reference [rad]."""
+    def shaped_q(self) -> list[float]:
+        """State: reference after shaping, which the drives follow; a variable that only TVIST has [rad]."""
         return self.state.target_q
 
     @property
-    def target_qd(self) -> list[float]:
-        """State: velocity of the shaped reference [rad/s]."""
+    def shaped_qd(self) -> list[float]:
+        """State: velocity of the reference after shaping; a variable that only TVIST has [rad/s]."""
         return self.state.target_qd
 
     @property
-    def target_qdd(self) -> list[float]:
-        """State: acceleration of the shaped reference [rad/s²]."""
+    def shaped_qdd(self) -> list[float]:
+        """State: acceleration of the reference after shaping; a variable that only TVIST has [rad/s²]."""
         return self.state.target_qdd
 
-    @property
+    @cached_property
     def target_moment(self) -> list[float]:
-        """State: torque that the rigid model with the declared payload needs for the shaped reference [N m]."""
-        return self.state.target_moment
+        """Computed: torque that the rigid model with the declared payload needs for the target motion [N m].
+
+        It is that of the state, which belongs to the shaped reference, plus the difference between the two references.
+        """
+        state, moment = self.state, self.state.target_moment
+        if state.unshaped_q is None:
+            return moment
+        payload, rigid = self.io.payload, self._rigid
+        unshaped = rigid.moment(self.target_q, self.target_qd, self.target_qdd, payload)
+        shaped = rigid.moment(state.target_q, state.target_qd, state.target_qdd, payload)
+        return [m + (u - s) for m, u, s in zip(moment, unshaped, shaped, strict=True)]
 
     @cached_property
     def target_current(self) -> list[float]:
         """Computed: target torque over torque constant; zero while the brakes hold the arm [A]."""
         if not self.driven:
             return [0.0] * len(self._ratings)
-        moment = self.state.target_moment
+        moment = self.target_moment
         return [m / rating.torque_constant for m, rating in zip(moment, self._ratings, strict=True)]
 
     @property
@@ -87,6 +96,6 @@ class JointValues(Reading):
 
     @cached_property
     def joint_position_deviation_ratio(self) -> float:
-        """Computed: largest difference of measured and target angle, divided by 0.05 rad [-]."""
+        """Computed: largest difference of measured and shaped angle, divided by 0.05 rad [-]."""
         state = self.state
         return max(abs(a - t) for a, t in zip(state.actual_q, state.target_q, strict=True)) / DEVIATION

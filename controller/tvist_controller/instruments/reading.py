@@ -57,6 +57,21 @@ class Reading:
         self._ratings = ratings
 
     @property
+    def target_q(self) -> list[float]:
+        """State: reference before shaping, which is what the program or the client asks for [rad]."""
+        return self.state.target_q if self.state.unshaped_q is None else self.state.unshaped_q
+
+    @property
+    def target_qd(self) -> list[float]:
+        """State: velocity of the reference before shaping [rad/s]."""
+        return self.state.target_qd if self.state.unshaped_qd is None else self.state.unshaped_qd
+
+    @property
+    def target_qdd(self) -> list[float]:
+        """State: acceleration of the reference before shaping [rad/s²]."""
+        return self.state.target_qdd if self.state.unshaped_qdd is None else self.state.unshaped_qdd
+
+    @property
     def powered(self) -> bool:
         """Whether the arm has power in the present robot mode."""
         return self.state.robot_mode in POWERED

@@ -116,6 +116,14 @@ class RigidBody:
         momentum = pin.computeCentroidalMomentum(self._model, self._data, np.array(q), np.array(qd))
         return hypot(*momentum.linear.tolist())
 
+    def moment(self, q: list[float], qd: list[float], qdd: list[float], payload: Payload) -> list[float]:
+        """Torques that a motion needs, one for each joint [N m]."""
+        self._load(payload)
+        torque: list[float] = pin.rnea(
+            self._model, self._data, np.array(q), np.array(qd), np.array(qdd)
+        ).tolist()
+        return torque
+
     def base_wrench(self, q: list[float], qd: list[float], qdd: list[float], payload: Payload) -> list[float]:
         """Force [N] and torque [N m] of the arm on its base, base frame; without the base's own weight."""
         self._load(payload)

@@ -53,11 +53,11 @@ class ToolValues(Reading):
     def actual_TCP_acceleration(self) -> list[float]:
         """Computed: the accelerometer's value without gravity, in the base frame and at the TCP [m/s², rad/s²].
 
-        The angular acceleration is that of the target, since no sensor measures it.
+        The angular acceleration is that of the shaped reference, since no sensor measures it.
         """
         linear: list[float] = (self._rotation @ np.array(self.state.actual_tool_accelerometer)).tolist()
         linear[2] -= GRAVITY
-        alpha, offset = self._target.acceleration[3:], self.io.tcp_offset
+        alpha, offset = self._shaped.acceleration[3:], self.io.tcp_offset
         if any(offset[:3]):
             arm: list[float] = (self._rotation @ np.array(offset[:3])).tolist()
             linear = add(linear, carried(self.state.actual_TCP_speed[3:], alpha, arm))
@@ -67,7 +67,7 @@ class ToolValues(Reading):
     def actual_TCP_force(self) -> list[float]:
         """Computed: force at the TCP that explains the measured torques, through the Jacobian [N, N m].
 
-        The torque that the target motion needs (rigid arm with the declared payload, rotors, friction) is subtracted
+        The torque that the shaped motion needs (rigid arm with the declared payload, rotors, friction) is subtracted
         first, and last the force that a program has taken as zero. Near a singularity part of the force cannot be
         measured and is left out. It is zero while the arm is braked.
         """
@@ -156,12 +156,17 @@ class ToolValues(Reading):
 
         The weight of the base itself is not included.
         """
-        state = self.state
-        return self._rigid.base_wrench(state.target_q, state.target_qd, state.target_qdd, self.io.payload)
+        return self._rigid.base_wrench(self.target_q, self.target_qd, self.target_qdd, self.io.payload)
 
     @cached_property
     def _target(self) -> Tool:
+        return self._rigid.tool(self.target_q, self.target_qd, self.target_qdd, self.io.tcp_offset)
+
+    @cached_property
+    def _shaped(self) -> Tool:
         state = self.state
+        if state.unshaped_q is None:
+            return self._target
         return self._rigid.tool(state.target_q, state.target_qd, state.target_qdd, self.io.tcp_offset)
 
     @cached_property

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-from tvist_urscript import Script
-
 from tvist_controller.planning.basis import FilterBasis, MotionBasis, PlanBasis, ScriptBasis, ToolBasis
 from tvist_controller.planning.filter_planner import PlannedFilter
 from tvist_controller.planning.move_planner import PlannedMove
@@ -15,6 +13,7 @@ from tvist_protocol.programs import ProgramLoad, ProgramRun
 from tvist_protocol.replies import Posture, ToolPose
 from tvist_protocol.simulation import SimulationReset
 from tvist_shaping.base import Filter
+from tvist_urscript import Script
 
 MOTIONS = (c.MoveJ, MoveL, MoveC, MovePath)
 """Commands for motions, which are planned on the state at rest."""

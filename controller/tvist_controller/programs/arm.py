@@ -4,8 +4,6 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from tvist_urscript import Fault
-
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.access import Access
@@ -16,6 +14,7 @@ from tvist_protocol.motions import JointSegment, LineSegment, MoveL, MovePath, S
 from tvist_protocol.replies import Accepted
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
+from tvist_urscript import Fault
 
 Turns = Generator[None, None, None]
 """Course of a function that lets time pass: it yields once a tick."""

@@ -1,12 +1,11 @@
 """Programs of one robot, compiled from their text."""
 
-from tvist_urscript import Script, ScriptError, compile_script
-
 from tvist_controller.programs.built_in import built_in
 from tvist_controller.programs.library import MOVING, SIGNATURES
 from tvist_controller.refusal import RefusalError
 from tvist_plant.description import RobotDescription
 from tvist_protocol.programs import ProgramLoad, ProgramRun
+from tvist_urscript import Script, ScriptError, compile_script
 
 
 class ScriptCompiler:

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from tvist_urscript import Fault
 
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
@@ -11,6 +10,7 @@ from tvist_controller.kinematics.tool import ToolKinematics, turn
 from tvist_controller.motion import MotionControl
 from tvist_controller.paths.poses import placement, placement_vector
 from tvist_plant.description import RobotDescription
+from tvist_urscript import Fault
 
 PoseNumbers = tuple[float, float, float, float, float, float]
 
@@ -27,7 +27,8 @@ class ProgramKinematics:
         self._motion = motion
         self._inverse = InverseKinematics(description)
         self._flange = ToolKinematics(description)
-        self._tcp, self._tool = (0.0,) * 6, self._flange
+        self._tcp: tuple[float, ...] = (0.0,) * 6
+        self._tool = self._flange
 
     def _with(self, tcp: Sequence[float] | None) -> ToolKinematics:
         """The kinematics of a tool; of the present one if there is none given."""

@@ -2,8 +2,6 @@
 
 from typing import NamedTuple
 
-from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
-
 from tvist_controller.command_row import Call, Row
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arm import ProgramArm
@@ -25,6 +23,7 @@ from tvist_protocol.programs import (
 )
 from tvist_protocol.stream import Event
 from tvist_protocol.transitions import Activity
+from tvist_urscript import EVALUATIONS, Machine, Script, ScriptError
 
 TOLD_EVERY = 50
 """Ticks between two changes of the line in `io`, which changes with almost every tick."""

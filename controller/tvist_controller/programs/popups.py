@@ -3,6 +3,7 @@
 from tvist_controller.command_row import Call, Row
 from tvist_controller.events import Emit
 from tvist_protocol.programs import ProgramClosePopup
+from tvist_protocol.stream import PopupKind
 
 
 class Popups:
@@ -18,7 +19,7 @@ class Popups:
         """Whether there is a popup that nobody has closed."""
         self.rows = (Row(ProgramClosePopup, self._close, lease="none"),)
 
-    def show(self, text: str, title: str, kind: str, *, blocking: bool) -> None:
+    def show(self, text: str, title: str, kind: PopupKind, *, blocking: bool) -> None:
         """Show a popup.
 
         Args:

@@ -1,5 +1,6 @@
 """`python -m tvist_controller.programs.table`: prints docs/reference/urscript-functions.md."""
 
+from collections.abc import Sequence
 from inspect import getdoc
 from types import ModuleType
 
@@ -49,14 +50,14 @@ def page() -> str:
             for name, one in module.SIGNATURES.items()
         ]
         parts.append(f"## {title}\n\n{_table(('function', '', 'what'), rows)}\n")
-    rows = [
+    missing = [
         (f"`{name}`", what)
         for name, (_, what) in sorted(unsimulated.SUBJECTS.items(), key=lambda row: row[::-1])
     ]
     idle = ", ".join(f"`{name}`" for name in unsimulated.IDLE)
     parts.append(
         "## Not simulated\n\nThese end the program with an error that says so. "
-        f"{idle} succeed, since what they set or end is never going on.\n\n{_table(('function', 'subject'), rows)}\n"
+        f"{idle} succeed, since what they set or end is never going on.\n\n{_table(('function', 'subject'), missing)}\n"
     )
     return "\n".join(parts)
 
@@ -67,7 +68,7 @@ def _what(functions: type, name: str) -> str:
     return " ".join(text.partition("\n\n")[0].split())
 
 
-def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
     lines = [head, ("---",) * len(head), *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 

@@ -3,11 +3,10 @@
 import re
 from dataclasses import dataclass
 
-from tvist_urscript import Fault
-
 from tvist_controller.peripherals import Peripherals
 from tvist_plant.plant import PERIOD
 from tvist_protocol.io import BITS, NUMBERS, Bank
+from tvist_urscript import Fault
 
 _NAME = re.compile(r"input_(int|double|bit)_register_(\d+)|input_bit_registers(\d+)_to_(\d+)")
 

@@ -12,6 +12,7 @@ from tvist_controller.setup import Setup, paper_payload
 from tvist_plant.description import load
 from tvist_protocol import commands as c
 from tvist_protocol.io import Io
+from tvist_protocol.programs import ProgramLoad
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.values import Payload
 from tvist_server.gateways.ur.interfaces import UrInterfaces
@@ -26,7 +27,7 @@ class FakeControl:
     """Stands for the way to the controller.
 
     Commands are recorded in `commands` and answered at once with `reply`; `refuse(code, why)` makes them refused,
-    `wait()` keeps the answers back until `answer()`.
+    `wait()` keeps the answers back until `answer()`. There is no program `nothing.urp`.
     """
 
     peer = "the client 10.0.0.2:50000 of port 30001"
@@ -43,7 +44,9 @@ class FakeControl:
 
     def ask(self, command, then):
         self.commands.append(command)
-        if self._waiting is None:
+        if isinstance(command, ProgramLoad) and command.name == "nothing.urp":
+            then(Refused(code="out_of_range", where="name", why="there is no nothing.urp"))
+        elif self._waiting is None:
             then(self.reply)
         else:
             self._waiting.append(then)
@@ -54,9 +57,9 @@ class FakeControl:
     def wait(self):
         self._waiting = self._waiting or []
 
-    def answer(self, reply=None):
-        """Give every answer that is due; to one that asks again in it, too."""
-        waiting, self._waiting = self._waiting or [], None
+    def answer(self, reply=None, *, keep=False):
+        """Give every answer that is due; to one that asks again in it, too, unless further ones are kept back."""
+        waiting, self._waiting = self._waiting or [], [] if keep else None
         for then in waiting:
             then(reply or self.reply)
 

@@ -73,3 +73,10 @@ async def lines(reader, writer, *sent):
         writer.write(line.encode() + b"\n")
         answers.append((await reader.readline()).decode().strip())
     return answers
+
+
+async def connect_and_greet(desk):
+    """A client of the dashboard that was greeted."""
+    reader, writer = await connect(desk, "dashboard")
+    await reader.readline()
+    return reader, writer

@@ -1,8 +1,5 @@
 """A robot as its interfaces see it, with programs."""
 
-from tests.controller.robots import UR5E
-
-from tvist_controller.programs.built_in import built_in
 from tvist_server.gateways.ur.programs import Programs
 from tvist_server.gateways.ur.robot import NO_MODE
 
@@ -11,7 +8,7 @@ from .decoders import message
 
 def host(robot):
     """The fixture `robot`, with programs and what else the text interfaces share."""
-    robot.programs = Programs(robot, built_in(UR5E))
+    robot.programs = Programs(robot)
     robot.operational_mode = NO_MODE
     return robot
 

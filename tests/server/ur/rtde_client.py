@@ -61,6 +61,8 @@ INPUT_TYPES = {
     **{f"input_int_register_{k}": "INT32" for k in range(48)},
     **{f"input_double_register_{k}": "DOUBLE" for k in range(48)},
 }
+OWN = dict.fromkeys(("shaped_q", "shaped_qd", "shaped_qdd"), "VECTOR6D")
+"""Outputs that no robot of UR's has."""
 
 
 def package(letter, payload=b""):
@@ -106,7 +108,7 @@ def decoded(sample, names, version=2):
         payload = payload[1:]
     values, at = {}, 0
     for name in names:
-        layout = ">" + WORD[OUTPUT_TYPES[name]]
+        layout = ">" + WORD[(OUTPUT_TYPES | OWN)[name]]
         found = struct.unpack_from(layout, payload, at)
         at += struct.calcsize(layout)
         values[name] = found[0] if len(found) == 1 else list(found)

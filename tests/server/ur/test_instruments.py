@@ -2,13 +2,15 @@
 
 import math
 
+import msgspec
 import numpy as np
 import pinocchio as pin
 import pytest
 from tests.controller.robots import UR5E, cut
 from tests.plant.arms import chain
 
-from tvist_controller.instruments.snapshot import Snapshot
+from tvist_controller.control.inverse_dynamics import InverseDynamics
+from tvist_controller.instruments.snapshot import Instruments, Snapshot
 from tvist_controller.setup import body, paper_payload
 from tvist_plant.model import FLANGE, rigid_model
 from tvist_protocol import commands as c
@@ -16,8 +18,11 @@ from tvist_protocol.values import Payload
 
 from .rtde_client import OUTPUT_TYPES
 
+FOLLOWED = ("target_q", "target_qd", "target_qdd")
 ELBOW_UP = (0.3, -1.3, 1.6, -1.9, -1.4, 0.2)
 """A posture far from singular ones."""
+FAR = (0.8, -1.1, 1.3, -1.8, -1.3, 0.2)
+"""Another one."""
 NOTHING = Payload(mass=0.0, com=(0.0, 0.0, 0.0), inertia=(0.0,) * 6)
 OFFSET = [0.03, -0.05, 0.15, 0.2, -0.4, 0.7]
 PERIOD = 0.002
@@ -78,6 +83,68 @@ def test_what_the_state_carries_is_passed_on(ur5e):
         if hasattr(Snapshot, name) and name != "timestamp":
             assert getattr(snapshot, name) == getattr(snapshot.state, name), name
     assert snapshot.timestamp == 40.0 + snapshot.state.timestamp
+
+
+class TestShaping:
+    """What a program asks for, and what the drives follow."""
+
+    TARGETS = ("target_q", "target_qd", "target_qdd", "target_moment")
+
+    def shaped(self, ur5e, io_changes=None):
+        """A robot in the middle of a shaped move, which is far from what was asked for."""
+        robot = ur5e(q=ELBOW_UP, shaper="zv", io_changes=io_changes)
+        robot.send(c.MoveJ, q=FAR)
+        snapshot = robot.tick(150)
+        assert np.abs(np.subtract(snapshot.target_q, snapshot.shaped_q)).max() > 1e-3
+        return snapshot
+
+    def as_if_unshaped(self, snapshot):
+        """The same tick with the target of the program as that of the drives."""
+        state = snapshot.state
+        unshaped = {name: getattr(state, name.replace("target", "unshaped")) for name in self.TARGETS[:3]}
+        rest = {"unshaped_q": None, "unshaped_qd": None, "unshaped_qdd": None}
+        return Instruments(UR5E).snapshot(msgspec.structs.replace(state, **unshaped, **rest), snapshot.io)
+
+    def test_the_target_is_that_of_the_program_and_the_shaped_one_has_names_of_its_own(self, ur5e):
+        snapshot = self.shaped(ur5e)
+        for name in FOLLOWED:
+            assert getattr(snapshot, name.replace("target", "shaped")) == getattr(snapshot.state, name)
+            assert getattr(snapshot, name) == getattr(snapshot.state, name.replace("target", "unshaped"))
+
+    @pytest.mark.parametrize(
+        "name", ["target_TCP_pose", "target_TCP_speed", "target_TCP_acceleration", "target_base_wrench"]
+    )
+    def test_what_is_computed_from_the_target_is_computed_from_the_program_s(self, ur5e, name):
+        snapshot = self.shaped(ur5e, {"tcp_offset": OFFSET})
+        assert getattr(snapshot, name) == getattr(self.as_if_unshaped(snapshot), name)
+
+    def test_the_moment_of_the_target_is_the_rigid_arm_s_for_it(self, ur5e):
+        snapshot = self.shaped(ur5e)
+        dynamics = InverseDynamics(UR5E, body(paper_payload(UR5E)))
+        expected = dynamics.torque(*(np.array(getattr(snapshot, name)) for name in FOLLOWED))
+        assert snapshot.target_moment == pytest.approx(expected, abs=1e-9)
+        assert np.abs(np.subtract(snapshot.target_moment, snapshot.state.target_moment)).max() > 0.1
+
+    @pytest.mark.parametrize(
+        "name",
+        ["actual_TCP_force", "actual_TCP_acceleration", "ft_raw_wrench", "collision_detection_ratio",
+         "joint_position_deviation_ratio", "actual_current"],
+    )  # fmt: skip
+    def test_what_is_measured_is_compared_with_what_the_drives_follow(self, ur5e, name):
+        snapshot = self.shaped(ur5e)
+        plain = dict.fromkeys(("unshaped_q", "unshaped_qd", "unshaped_qdd"))
+        other = Instruments(UR5E).snapshot(msgspec.structs.replace(snapshot.state, **plain), snapshot.io)
+        assert getattr(snapshot, name) == getattr(other, name)
+
+    def test_without_a_shaper_targets_are_those_of_the_state_to_the_last_bit(self, ur5e):
+        robot = ur5e(q=ELBOW_UP, shaper="none")
+        robot.send(c.MoveJ, q=FAR)
+        for _ in range(50):
+            snapshot = robot.tick(7)
+            for name in self.TARGETS:
+                assert getattr(snapshot, name) == getattr(snapshot.state, name)
+                if name in FOLLOWED:
+                    assert getattr(snapshot, name.replace("target", "shaped")) == getattr(snapshot, name)
 
 
 class TestElectricity:

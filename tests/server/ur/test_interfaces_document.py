@@ -29,7 +29,7 @@ def test_every_dashboard_command_has_a_row(command):
 
 
 def test_parts_of_the_robot_state_have_the_lengths_that_are_said(snapshot, robot):
-    ((_, body),) = split(robot_state(robot.description, snapshot, playing=False, paused=False))
+    ((_, body),) = split(robot_state(robot.description, snapshot))
     said = {row[0]: row[1] for row in ROWS if len(row) == 5 and row[0].isdecimal()}
     assert said == {str(number): str(5 + len(part)) for number, part in parts(body)}
 

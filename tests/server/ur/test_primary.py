@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.controller.robots import UR5E, cut
 
 from tvist_protocol import commands as c
-from tvist_protocol.programs import ProgramStop
+from tvist_protocol.programs import ProgramRun, ProgramStop
 from tvist_protocol.replies import Refused
 from tvist_protocol.simulation import SimulationInject
 from tvist_protocol.stream import Event
@@ -30,8 +30,8 @@ def session(robot, control, send, *, read_only=False):
     return PrimarySession(host(robot), control, send, read_only=read_only)
 
 
-def state_of(snapshot, description=UR5E, *, playing=False, paused=False):
-    data = robot_state(description, snapshot, playing=playing, paused=paused)
+def state_of(snapshot, description=UR5E):
+    data = robot_state(description, snapshot)
     ((kind, body),) = split(data)
     assert kind == 16
     return dict(parts(body)), data
@@ -74,10 +74,13 @@ def test_a_robot_without_power_in_a_protective_stop_or_with_a_paused_program_say
     stopped.send(SimulationInject, fault="protective_stop")
     part = state_of(stopped.tick(50))[0][0]
     assert flags(part)[4:] == (True, False, False)
-    resting = ur5e()
-    assert flags(state_of(resting.tick())[0][0])[5:] == (False, False)
-    assert flags(state_of(resting.tick(), playing=True)[0][0])[5:] == (True, False)
-    assert flags(state_of(resting.tick(), paused=True)[0][0])[5:] == (False, True)
+    for program, told_as in (
+        ("STOPPED", (False, False)),
+        ("PLAYING", (True, False)),
+        ("PAUSED", (False, True)),
+    ):
+        resting = ur5e(io_changes={"program": "f", "program_state": program})
+        assert flags(state_of(resting.tick())[0][0])[5:] == told_as
 
 
 def test_joints_have_the_snapshots_values(snapshot):
@@ -308,6 +311,12 @@ SAMPLES = [
     ["sec aside():\n  x = 1\nend\n", "movej([0,0,0,0,0,0], a=1, v=1)\n"],
     ["# about it\n# more\ndef f():\nend # of it\n", 'popup("end")\n'],
     ["digital_out[0]=True\n", "set_payload(0.5, (0,0,0))\n", "end\n", "ended = 1\n", "switch_on = 2\n"],
+    ["def f(\n  a=1,\n  b=2\n):\n  if a == 1 or\n    a == 2:\n    b = a\n  end\nend\n", "halt\n"],
+    [
+        "def f(): if a: b = 1 end\nend\n",
+        "while True: sync() end\n",
+        "if a:\n  b = 1\nelif c:\n  b = 2\nend\n",
+    ],
 ]
 
 
@@ -428,27 +437,44 @@ def test_a_simulated_arm_stays_one(robot, control, sent, text):
 
 
 @pytest.mark.parametrize(
-    "text", ["movej([0,0,0,0,0,0])\n", PROGRAM, "sec f():\nend\n", "power onto\n", "éß\n"]
+    "text", ["movej([0,0,0,0,0,0])\n", PROGRAM, "sec f():\nend\n", "power onto\n", "éß\n", "# a\n\nhalt\n"]
 )
-def test_a_program_is_declined_to_everybody_and_plainly(robot, control, sent, text):
+def test_everything_else_is_a_program_and_goes_to_the_controller_as_it_was_sent(robot, control, sent, text):
     session(robot, control, sent.append).receive(text.encode())
-    (exception,) = told(robot)
-    assert exception.kind == 10
-    assert (exception.values["line"], exception.values["column"]) == (1, 1)
-    assert "not run" in exception.values["text"]
-    assert not control.commands
+    assert control.commands == [ProgramRun(token="the-token", text=text)]
+    assert not sent + robot.told
+
+
+def test_units_are_carried_out_in_their_order_each_when_the_one_before_was_answered(robot, control, sent):
+    interface = session(robot, control, sent.append)
+    control.wait()
+    interface.receive(b"def f():\nend\nstop program\nsec g():\nend\npower off\n")
+    kinds = [ProgramRun, ProgramStop, ProgramRun, c.PowerOff]
+    for number in range(1, 5):
+        assert interface.waiting == 5 - number
+        assert [type(command) for command in control.commands] == kinds[:number]
+        control.answer(keep=True)
+    assert interface.waiting == 0
+
+
+def test_what_is_complete_is_carried_out_even_if_the_connection_ends(robot, control, sent):
+    interface = session(robot, control, sent.append)
+    control.wait()
+    interface.receive(b"set robotmode run\nmovej(q)\n")
+    interface.closed()
+    control.answer()
+    assert [type(command) for command in control.commands] == [c.PowerOn, ProgramRun]
+    assert control.left == 1  # what lasted longer than the connection; the program's own lasts
 
 
 REPORTS = {
     b"power on\n": 'the script "power on" of {} was run',
     b"stop program\n": 'the script "stop program" of {} was run',
     b"set real\n": 'the script "set real" of {} changes nothing: the arm is simulated',
-    PROGRAM.encode(): 'the script "rtde" of {} was not run: URScript programs are not simulated',
-    b"# what it does\n\n  movej(p, a=1) # go\n": (
-        'the script "movej(p, a=1) # go" of {} was not run: URScript programs are not simulated'
-    ),
-    b"x\x1b[2J\x07\xff\n": 'the script "x?[2J?\ufffd" of {} was not run: URScript programs are not simulated',
-    b"y" * 100 + b"\n": f'the script "{"y" * 59}…" of {{}} was not run: URScript programs are not simulated',
+    PROGRAM.encode(): 'the script "rtde" of {} was started',
+    b"# what it does\n\n  movej(p, a=1) # go\n": 'the script "movej(p, a=1) # go" of {} was started',
+    b"x\x1b[2J\x07\xff\n": 'the script "x?[2J?\ufffd" of {} was started',
+    b"y" * 100 + b"\n": f'the script "{"y" * 59}…" of {{}} was started',
     b"# \n" * 400_000: 'the script "#" of {} was refused: it has more than 1048576 bytes',
     b"def f():\n  halt\n": 'the script "f" of {} was not run: the connection ended before its last line feed',
     b"halt": 'the script "halt" of {} was not run: the connection ended before its last line feed',
@@ -462,6 +488,31 @@ def test_what_became_of_a_script_is_one_line_on_the_console(robot, control, sent
     interface.receive(text)
     interface.closed()
     assert robot.reported == [REPORTS[text].format(control.peer)]
+
+
+def test_a_text_that_is_not_valid_is_told_to_everybody_and_on_the_console(robot, control, sent):
+    why = "compile_error_name_not_found:f:"
+    control.refuse("script_error", why=why, where="text:4:3")
+    session(robot, control, sent.append).receive(b"# comments\n# count\ndef g():\n  f()\nend\n")
+    (exception,) = told(robot)
+    assert (exception.kind, exception.values) == (10, {"line": 4, "column": 3, "text": why})
+    assert robot.reported == [f'the script "g" of {control.peer} was refused: line 4, column 3: {why}']
+    assert not sent
+
+
+def test_a_program_that_cannot_run_now_is_a_line_of_the_log_for_who_sent_it(robot, control, sent):
+    control.refuse("wrong_mode", why="the arm has no power")
+    session(robot, control, sent.append).receive(b"movej(q)\n")
+    (line,) = [message(data) for data in sent]
+    assert (line.kind, line.values["text"]) == (0, "movej(q) was refused: the arm has no power")
+    assert not robot.told
+
+
+def test_a_program_without_control_is_told_that_the_interface_is_read_only(robot, control, sent):
+    control.refuse("no_control")
+    session(robot, control, sent.append).receive(b"movej(q)\n")
+    (error,) = [message(data) for data in sent]
+    assert (error.kind, error.values["code"]) == (6, 210)
 
 
 def test_a_refusal_is_told_on_the_console_with_its_reason(robot, control, sent):
@@ -519,6 +570,8 @@ def test_no_bytes_break_a_session(data):
     control = SimpleNamespace(
         peer="x",
         held_by_other=True,
+        lasting=lambda: control,
+        leave=lambda: None,
         ask=lambda _, then: then(Refused(code="malformed", where="", why="")),
         change=lambda _, then: then(Refused(code="no_control", where="", why="")),
     )

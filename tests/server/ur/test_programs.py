@@ -1,10 +1,17 @@
-"""The controller's program at UR's interfaces: paths, key messages, exceptions, and who holds control for it."""
+"""The controller's program at UR's interfaces: paths, key messages, texts, popups, exceptions, and who holds control for it."""
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, ProgramStop
+from tvist_protocol.programs import (
+    ProgramClosePopup,
+    ProgramLoad,
+    ProgramPause,
+    ProgramPlay,
+    ProgramRun,
+    ProgramStop,
+)
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.stream import Event
 
@@ -12,7 +19,7 @@ from .conftest import FakeControl, io
 from .decoders import message
 from .hosts import host, told
 
-STARTED, STOPPED, EXCEPTION = (7, "PROGRAM_XXX_STARTED"), (7, "PROGRAM_XXX_STOPPED"), (10, None)
+STARTED, STOPPED = (7, "PROGRAM_XXX_STARTED"), (7, "PROGRAM_XXX_STOPPED")
 
 
 class Answers:
@@ -38,7 +45,7 @@ def programs(robot):
 def load(programs, path, control):
     heard = []
     programs.load(path, control, heard.append)
-    return heard == [True]
+    return heard == [None]
 
 
 def titles(robot):
@@ -57,34 +64,47 @@ def test_what_is_asked_for_reaches_the_controller_as_a_command(programs, control
     assert answers.heard == [True] * 4
 
 
-def test_clients_are_told_once_that_it_has_started_and_that_it_has_stopped(programs, robot, control, answers):
+def started(name, **fields):
+    return Event(tick=5, kind="program_started", program=name, **fields)
+
+
+def stopped(name, **fields):
+    return Event(tick=6, kind="program_stopped", program=name, **fields)
+
+
+def test_clients_are_told_that_a_program_has_started_and_that_it_has_stopped(programs, robot):
+    for name in ("paper.urp", "there.script", "rtde_control"):
+        programs.event(started(name))
+        programs.event(stopped(name))
+    assert titles(robot) == [STARTED, STOPPED] * 3
+    names = ["paper", "there", "rtde_control"]
+    assert [one.values["text"] for one in told(robot)[::2]] == names
+    assert [one.values["text"] for one in told(robot)[1::2]] == names
+
+
+def test_the_state_is_the_controllers(programs, control, answers):
     load(programs, "paper.urp", control)
-    programs.io(io(program="paper.urp"))
-    programs.play(control, answers)
-    programs.io(io(program="paper.urp", program_state="PLAYING", program_line=1))
-    programs.pause(control, answers)
-    programs.io(io(program="paper.urp", program_state="PAUSED", program_line=1))
-    assert programs.paused
     programs.play(control, answers)
     assert programs.playing
+    programs.pause(control, answers)
+    assert programs.state == "PAUSED"
+    programs.io(io(program="paper.urp", program_state="PLAYING", program_line=1))
+    assert programs.playing
     programs.io(io(program="paper.urp"))
-    assert titles(robot) == [STARTED, STOPPED]
-    assert [one.values["text"] for one in told(robot)] == ["paper", "paper"]
+    assert programs.state == "STOPPED"
 
 
 def test_what_other_clients_load_and_play_is_told_too(programs, robot):
     programs.io(io(program="Q2.urp", program_state="PLAYING", program_line=1))
-    assert (programs.path, programs.playing) == ("/programs/Q2.urp", True)
-    programs.io(io(program="Q2.urp"))
-    assert titles(robot) == [STARTED, STOPPED]
+    assert (programs.path, programs.playing, programs.saved) == ("/programs/Q2.urp", True, True)
+    programs.io(io(program="rtde_control", program_state="PLAYING", program_line=1))
+    assert (programs.path, programs.playing, programs.saved) == ("rtde_control", True, False)
 
 
-def test_one_that_ends_because_another_is_loaded_is_told_to_have_stopped_under_its_own_name(programs, robot):
-    programs.io(io(program="Q2.urp", program_state="PLAYING", program_line=1))
-    programs.io(io(program="Q3.urp"))
-    programs.io(io(program="Q1.urp", program_state="PLAYING", program_line=1))
-    assert titles(robot) == [STARTED, STOPPED, STARTED]
-    assert [one.values["text"] for one in told(robot)] == ["Q2", "Q2", "Q1"]
+def test_a_secondary_program_sends_no_key_messages(programs, robot):
+    programs.event(started("aside", secondary=True))
+    programs.event(stopped("aside", secondary=True))
+    assert not robot.told
 
 
 def test_folders_do_not_matter(programs, control):
@@ -94,9 +114,8 @@ def test_folders_do_not_matter(programs, control):
     assert programs.path == "/ursim/programs/wait_program.urp"
     assert load(programs, "Q1.urp", control)
     assert programs.path == "/programs/Q1.urp"
-    assert not programs.has("/programs/")
-    assert not programs.has("")
-    assert not programs.has("paper")
+    assert not load(programs, "", control)
+    assert not load(programs, "/programs/nothing.urp", control)
     assert programs.name == "Q1.urp"
 
 
@@ -111,14 +130,93 @@ def test_a_file_that_is_not_there_and_a_load_that_is_refused_are_told_apart(robo
 
 
 def test_a_line_that_cannot_be_carried_out_is_a_runtime_exception(programs, robot):
-    programs.io(io(program="paper.urp", program_state="PLAYING", program_line=3))
-    why = "move to Q3 was refused: because"
-    programs.event(Event(tick=5, kind="warning", code="collision", why=why, line=3))
+    why = "movej: no posture reaches the pose"
+    programs.event(Event(tick=5, kind="warning", why=why, line=3, column=5, program="prog"))
     programs.event(Event(tick=5, kind="warning", why="something else"))
-    programs.io(io(program="paper.urp"))
-    assert titles(robot) == [STARTED, EXCEPTION, STOPPED]
-    exception = told(robot)[1].values
-    assert (exception["line"], exception["column"], exception["text"]) == (3, 1, why)
+    (exception,) = told(robot)
+    assert exception.kind == 10
+    assert exception.values == {"line": 3, "column": 5, "text": why}
+
+
+def test_what_programs_write_and_show_is_told_once_to_all_clients(programs, robot):
+    programs.event(Event(tick=5, kind="text", why="half way", program="prog"))
+    shown = {"title": "Robot", "why": "Put the part in", "level": "warning", "blocking": True}
+    programs.event(Event(tick=5, kind="popup", **shown))
+    programs.event(Event(tick=5, kind="popup", **(shown | {"level": "error", "blocking": False})))
+    text, *popups = told(robot)
+    assert (text.kind, text.values["text"]) == (0, "half way")
+    assert [popup.values["flags"] for popup in popups] == [[True, False, True], [False, True, False]]
+    assert {(popup.values["title"], popup.values["text"]) for popup in popups} == {
+        ("Robot", "Put the part in")
+    }
+
+
+def run(programs, control, text="def f():\nend\n", *, secondary=False):
+    heard = []
+    programs.run(text, control, heard.append, secondary=secondary)
+    return heard
+
+
+def test_a_script_is_run_with_the_control_of_its_client_which_lasts_as_long_as_it_runs(programs, control):
+    assert run(programs, control) == [None]
+    assert control.commands == [ProgramRun(token="the-token", text="def f():\nend\n")]
+    programs.io(io(program="f", program_state="PLAYING", program_line=1))
+    assert control.left == 0
+    programs.io(io(program="f"))
+    assert control.left == 1
+
+
+def test_a_script_that_replaces_another_keeps_its_own_control(programs):
+    first, second = FakeControl(), FakeControl()
+    run(programs, first)
+    programs.io(io(program="f", program_state="PLAYING", program_line=1))
+    programs.event(started("f"))
+    run(programs, second)
+    programs.io(io(program="f", program_state="PLAYING", program_line=1))
+    programs.event(stopped("f"))
+    programs.event(started("f"))
+    assert (first.left, second.left) == (1, 0)
+
+
+def test_control_of_a_secondary_script_lasts_until_no_secondary_script_runs(programs):
+    main, first, second = FakeControl(), FakeControl(), FakeControl()
+    run(programs, main)
+    programs.io(io(program="f", program_state="PLAYING", program_line=1))
+    run(programs, first, secondary=True)
+    programs.event(started("aside", secondary=True))
+    run(programs, second, secondary=True)
+    programs.event(stopped("aside", secondary=True))
+    assert (first.left, second.left) == (1, 0)  # the second one begins with the next tick
+    programs.event(started("aside", secondary=True))
+    programs.io(io(program="f"))
+    assert (main.left, second.left) == (1, 0)
+    programs.event(stopped("aside", secondary=True))
+    assert (main.left, first.left, second.left) == (1, 1, 1)
+
+
+def test_a_text_that_is_not_valid_is_a_runtime_exception_at_its_place(programs, robot, control):
+    why = "compile_error_name_not_found:calldoesntexist:"
+    control.refuse("script_error", why=why, where="text:2:3")
+    (refused,) = run(programs, control)
+    assert refused.why == why
+    (exception,) = told(robot)
+    assert exception.values == {"line": 2, "column": 3, "text": why}
+    assert control.left == 1
+
+
+@pytest.mark.parametrize("code", ["no_control", "wrong_mode", "busy"])
+def test_a_script_that_is_refused_for_another_reason_gives_control_back(programs, robot, control, code):
+    control.refuse(code)
+    (refused,) = run(programs, control)
+    assert refused.code == code
+    assert control.left == 1
+    assert not robot.told
+
+
+def test_a_popup_can_be_closed_by_anybody(programs, control, answers):
+    programs.close_popup(control, answers)
+    assert control.commands == [ProgramClosePopup()]
+    assert answers.heard == [True]
 
 
 def test_without_control_nothing_is_asked_for_but_a_stop(programs, control, answers):
@@ -157,24 +255,25 @@ def test_control_is_held_as_long_as_the_program_plays(programs, control, answers
 
 
 STEPS = st.lists(
-    st.sampled_from(["load", "play", "pause", "stop", "ended", "answer", "keep", "refuse", "allow"]),
+    st.sampled_from(["load", "run", "play", "pause", "stop", "ended", "answer", "keep", "refuse", "allow"]),
     max_size=40,
 )
 
 
 @given(STEPS)
-def test_whatever_happens_each_request_is_answered_once_and_starts_and_stops_alternate(steps):
-    packages = []
-
+def test_whatever_happens_each_request_is_answered_once(steps):
     class Bare:
         latest = None
-        tell = staticmethod(packages.append)
+        tell = staticmethod(message)
 
     programs = host(Bare()).programs
     control, answers, asked = FakeControl(), Answers(), 0
     for step in steps:
         if step == "load":
             programs.load("paper.urp", control, lambda _: None)
+        elif step == "run":
+            asked += 1
+            programs.run("def f():\nend\n", control, answers, secondary=False)
         elif step in {"play", "pause", "stop"}:
             asked += 1
             getattr(programs, step)(control, answers)
@@ -190,7 +289,5 @@ def test_whatever_happens_each_request_is_answered_once_and_starts_and_stops_alt
     assert len(answers.heard) == asked
     control.reply = Done()
     programs.stop(control, answers)
-    said = [one.values["title"] for one in map(message, packages) if one.kind == 7]
-    assert said[::2] == ["PROGRAM_XXX_STARTED"] * len(said[::2])
-    assert said[1::2] == ["PROGRAM_XXX_STOPPED"] * len(said[1::2])
-    assert len(said) % 2 == 0
+    assert programs.state == "STOPPED"
+    assert programs._control is None

@@ -101,9 +101,8 @@ def test_what_is_sent_to_it_is_taken_for_a_script(robot, control):
     interface = session(robot, control)
     for piece in (b"def f():\n  movej([0,", b"0,0,0,0,0])\nen", b"d\n"):
         interface.receive(piece)
-    (exception,) = told(robot)
-    assert exception.kind == 10
-    assert (exception.values["line"], exception.values["column"]) == (1, 1)
+    (run,) = control.commands
+    assert run.text == "def f():\n  movej([0,0,0,0,0,0])\nend\n"
     interface.receive(b"power off\n")
     assert control.of(c.PowerOff)
 

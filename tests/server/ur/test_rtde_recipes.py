@@ -49,8 +49,8 @@ def sent_inputs(draw):
     return names, [draw(NUMBERS[client.INPUT_TYPES[name]]) for name in names]
 
 
-def test_the_outputs_and_their_types_are_the_published_ones():
-    assert {name: wire.name for name, wire in OUTPUTS.items()} == client.OUTPUT_TYPES
+def test_the_outputs_and_their_types_are_the_published_ones_and_our_own():
+    assert {name: wire.name for name, wire in OUTPUTS.items()} == client.OUTPUT_TYPES | client.OWN
 
 
 def test_the_inputs_and_their_types_are_the_published_ones():

@@ -1,12 +1,12 @@
 """Functions for messages to people, and for time."""
 
-from tvist_urscript import signature, to_str
-
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, number
 from tvist_controller.programs.arm import ProgramArm, Turns
 from tvist_controller.programs.popups import Popups
 from tvist_plant.plant import PERIOD
+from tvist_protocol.stream import PopupKind
+from tvist_urscript import Value, signature, to_str
 
 LONGEST_SLEEP = 1e6
 """[s]"""
@@ -31,15 +31,17 @@ class MessageFunctions:
     def __init__(self, access: Access, arm: ProgramArm, popups: Popups) -> None:
         self._access, self._arm, self._popups = access, arm, popups
 
-    def textmsg(self, s1: object, s2: object) -> None:
+    def textmsg(self, s1: Value, s2: Value) -> None:
         """Write a line to the log, which clients of the primary interface get."""
         text = f"{to_str(s1)}{to_str(s2)}"
         self._arm.then(lambda: self._access.emit("text", why=text))
 
-    def popup(self, s: object, title: object, warning: object, error: object, blocking: object) -> Turns:
+    def popup(self, s: Value, title: Value, warning: object, error: object, blocking: object) -> Turns:
         """Show a message; with `blocking`, wait until somebody closes it."""
         text, head = to_str(s), to_str(title)
-        kind = "error" if flag("error", error) else "warning" if flag("warning", warning) else "message"
+        kind: PopupKind = (
+            "error" if flag("error", error) else "warning" if flag("warning", warning) else "message"
+        )
         waits = flag("blocking", blocking)
         yield from self._arm.finish()
         self._popups.show(text, head, kind, blocking=waits)

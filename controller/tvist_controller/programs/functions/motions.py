@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
 import numpy as np
-from tvist_urscript import Array, Fault, signature
 
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.programs.access import Access
@@ -15,6 +14,7 @@ from tvist_controller.refusal import SLOWEST, RefusalError, check_joints
 from tvist_controller.trajectory import Guided, JointSpeed, ToolSpeed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment
+from tvist_urscript import Array, Fault, signature
 
 MAX_BLEND: Final = 10.0
 LONGEST: Final = 3600.0
@@ -195,6 +195,11 @@ class MotionFunctions:
         return self._access.motion.cycle.reference
 
     @property
+    def _here(self) -> list[float]:
+        found: list[float] = self._reference.tolist()
+        return found
+
+    @property
     def _shaped(self) -> bool:
         return not self._access.motion.cycle.unshaped
 
@@ -239,10 +244,10 @@ class MotionFunctions:
         """Posture from which the next move begins."""
         end = self._arm.end
         if end is None:
-            return self._reference.tolist()
+            return self._here
         if isinstance(end, JointSegment):
             return end.q
-        return self._kinematics.posture(end.pose, self._reference.tolist())
+        return self._kinematics.posture(end.pose, self._here)
 
     def _within(self, value: float, name: str, most: float) -> float:
         """A velocity or acceleration of the joints that the arm is capable of and that moves it."""

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 
 import numpy as np
-from tvist_urscript import Array, Fault, Pose, signature
 
 from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import a_list, a_pose, is_pose, numbers, pose
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.refusal import RefusalError, check_joints
+from tvist_urscript import Array, Fault, Pose, signature
 
 _INVERSE = "x, qnear=None, maxPositionError=1e-10, maxOrientationError=1e-10, tcp=None"
 SIGNATURES = {

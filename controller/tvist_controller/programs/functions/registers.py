@@ -1,12 +1,11 @@
 """Functions for registers and flags."""
 
-from tvist_urscript import signature
-
 from tvist_controller.peripherals import LEAST, MOST
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, integer, number
 from tvist_controller.programs.arm import ProgramArm
 from tvist_protocol.io import BITS, NUMBERS
+from tvist_urscript import signature
 
 FLAGS = 32
 """Number of flags, which only programs have."""

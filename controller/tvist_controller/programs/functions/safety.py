@@ -1,14 +1,13 @@
 """Functions for protective stops and watchdogs."""
 
-from tvist_urscript import Fault, signature
-
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import positive, shown
-from tvist_controller.programs.arm import ProgramArm, Turns
+from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.watchdogs import Watchdogs
+from tvist_urscript import Fault, signature
 
 SIGNATURES = {
-    "protective_stop": signature("", blocks=True, cost=10),
+    "protective_stop": signature("", cost=10),
     "rtde_set_watchdog": signature('variable_name, min_frequency, action="pause"', cost=5),
 }
 
@@ -25,11 +24,9 @@ class SafetyFunctions:
     def __init__(self, access: Access, arm: ProgramArm, watchdogs: Watchdogs) -> None:
         self._access, self._arm, self._watchdogs = access, arm, watchdogs
 
-    def protective_stop(self) -> Turns:
-        """Make a protective stop, which pauses the program."""
-        yield from self._arm.finish()
+    def protective_stop(self) -> None:
+        """Make a protective stop, which pauses the program at the next statement that lets time pass."""
         self._access.motion.protect("the program asked for a protective stop")
-        yield
 
     def rtde_set_watchdog(self, variable_name: object, min_frequency: object, action: object) -> None:
         """Pause or stop the program when a client writes an input of RTDE less often than a frequency [Hz]."""

@@ -1,7 +1,5 @@
 """Functions that set the tool, the payload and gravity, and the force at the tool to zero."""
 
-from tvist_urscript import Fault, signature
-
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import number, numbers, pose
@@ -9,6 +7,7 @@ from tvist_controller.programs.arm import DELAY, OWN_TOKEN, ProgramArm, Turns
 from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import SetPayload
 from tvist_protocol.io import SetTcp
+from tvist_urscript import Fault, signature
 
 GRAVITY = 9.82
 """Gravity that programs declare, within `TOLERANCE`; the simulated arm stands upright and knows no other [m/s^2]."""

@@ -4,7 +4,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from tvist_urscript import Array, Pose, signature
 
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import a_list, a_pose, integer
@@ -13,6 +12,7 @@ from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import JointSegment
 from tvist_protocol.stream import State
+from tvist_urscript import Array, Pose, signature
 
 _PLAIN = (
     "get_steptime",
@@ -54,7 +54,7 @@ class _Target(NamedTuple):
 
 def _target(state: State) -> _Target:
     """The reference before shaping at the tick of the shaped one, as UR's interfaces report it."""
-    if getattr(state, "unshaped_q", None) is None:
+    if state.unshaped_q is None or state.unshaped_qd is None or state.unshaped_qdd is None:
         return _Target(state.target_q, state.target_qd, state.target_qdd)
     return _Target(state.unshaped_q, state.unshaped_qd, state.unshaped_qdd)
 

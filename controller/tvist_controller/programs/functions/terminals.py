@@ -1,11 +1,10 @@
 """Functions for digital and analogue inputs and outputs."""
 
-from tvist_urscript import Array, Fault, signature
-
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, integer, number, shown
 from tvist_controller.programs.arm import OWN_TOKEN, ProgramArm
 from tvist_protocol.io import SetIo
+from tvist_urscript import Array, Fault, signature
 
 STANDARD, CONFIGURABLE, TOOL = range(8), range(8, 16), range(16, 18)
 """Bits of the digital terminals."""

@@ -3,9 +3,8 @@
 The functions that only set or end what these would begin succeed, since nothing of that kind is going on.
 """
 
-from tvist_urscript import Fault, Signature, signature
-
 from tvist_controller.programs.arguments import number
+from tvist_urscript import Fault, Signature, signature
 
 SUBJECTS = {
     "force_mode": ("task_frame, selection_vector, wrench, type, limits", "force control"),

@@ -216,7 +216,7 @@ class UrInterfaces(Gateway):
 
     def _tell(self, message: bytes) -> None:
         for connection in tuple(self._connections):
-            if isinstance(connection.session, PrimarySession):
+            if isinstance(connection.session, PrimarySession) and connection.session.informed:
                 connection.tell(message)
 
     def _lease(self, host: str) -> HostLease:
@@ -252,7 +252,13 @@ def _session(interface: InterfaceName, robot: UrRobot, control: ConnectionContro
         case "realtime" | "realtime_read_only":
             return RealtimeSession(robot, control, send, read_only=interface == "realtime_read_only")
         case _:
-            return PrimarySession(robot, control, send, read_only=interface.endswith("read_only"))
+            return PrimarySession(
+                robot,
+                control,
+                send,
+                read_only=interface.endswith("read_only"),
+                informed=interface.startswith("primary"),
+            )
 
 
 def _listen(address: str, port: int, interface: InterfaceName) -> socket.socket:

@@ -17,23 +17,37 @@ EVERY: Final = 50
 
 
 class PrimarySession(PortSession):
-    """Sends a client the robot's state and messages, and takes its commands. The secondary interface is the same.
+    """Sends a client the robot's state and messages, and takes its commands.
+
+    The secondary interface is the same without messages, as on UR's controllers: some of its clients expect nothing but
+    the state.
 
     Args:
         robot: The robot.
         control: Access to its controller.
         send: Sends data to the client.
         read_only: Whether what the client sends is declined.
+        informed: Whether the client gets messages.
     """
 
     def __init__(
-        self, robot: UrRobot, control: ControllerAccess, send: Send, *, read_only: bool = False
+        self,
+        robot: UrRobot,
+        control: ControllerAccess,
+        send: Send,
+        *,
+        read_only: bool = False,
+        informed: bool = True,
     ) -> None:
         self._robot = robot
         self._send = send
         self._read_only = read_only
+        self.informed = informed
+        """Whether the client gets messages."""
         self._intake = Intake()
-        self._orders = Orders(robot, control, send)
+        self._orders = Orders(robot, control, self._tell)
+        self._errors: list[bytes] = []
+        """Error codes of this tick, which follow the state with what caused them."""
         self._due = 0
         """Tick of the next robot state."""
         self._safety_mode: int | None = None
@@ -53,13 +67,24 @@ class PrimarySession(PortSession):
             else:
                 self._orders.carry_out(unit)
 
+    def _tell(self, message: bytes) -> None:
+        if self.informed:
+            self._send(message)
+
     def sample(self, snapshot: Snapshot) -> bytes:
-        """Return the robot state ten times a second, preceded by messages about changes."""
+        """Return the robot state ten times a second, and at once when the safety mode changes.
+
+        A client that reacts to an error code at once then knows the state that it belongs to.
+        """
         mode = snapshot.safety_mode
         if mode != self._safety_mode:
             if self._safety_mode is not None:
-                self._send(messages.safety_mode(messages.stamp(snapshot), mode))
+                self._tell(messages.safety_mode(messages.stamp(snapshot), mode))
+                self._send(robot_state(self._robot.description, snapshot))
             self._safety_mode = mode
+        for error in self._errors:
+            self._tell(error)
+        self._errors.clear()
         tick = snapshot.state.tick
         if tick < self._due:
             return b""
@@ -87,6 +112,8 @@ class PrimarySession(PortSession):
         stamp = messages.stamp(self._robot.latest)
         why = event.why or ""
         if event.kind == "protective_stop":
-            self._send(messages.error_code(stamp, messages.PROTECTIVE_STOP, 0, ErrorLevel.WARNING, why))
+            self._errors.append(
+                messages.error_code(stamp, messages.PROTECTIVE_STOP, 0, ErrorLevel.WARNING, why)
+            )
         elif event.kind == "safety_stop" or (event.kind == "warning" and event.line is None):
-            self._send(messages.text(stamp, why))
+            self._tell(messages.text(stamp, why))

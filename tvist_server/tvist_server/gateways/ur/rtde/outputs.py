@@ -17,7 +17,7 @@ NAMED: dict[Wire, str] = {
         actual_current_window actual_current_as_torque joint_control_output actual_TCP_pose actual_TCP_speed
         actual_TCP_force target_TCP_pose target_TCP_speed tcp_offset actual_TCP_acceleration target_TCP_acceleration
         joint_temperatures actual_joint_voltage ft_raw_wrench wrench_calc_from_currents payload_inertia
-        target_base_acceleration target_base_wrench""",
+        target_base_acceleration target_base_wrench shaped_q shaped_qd shaped_qdd""",
     Wire.VECTOR3D: "actual_tool_accelerometer elbow_position elbow_velocity payload_cog target_gravity",
     Wire.VECTOR6INT32: "joint_mode",
     Wire.DOUBLE: """

@@ -1,0 +1,75 @@
+"""Whatever text is sent: an error with a position or a run, no other exception, and no tick beyond its budget."""
+
+import pytest
+
+from tvist_urscript import Machine, ScriptError, compile_script
+from tvist_urscript.dry_functions import Memory
+from tvist_urscript.expressions import MOST_OPERATIONS
+from tvist_urscript.machine import OVERDRAFT
+
+from .programs import spoilt, valid
+
+QUICK, CI, ALL = 100, 2_000, 100_000
+GROUP = 50
+BUDGET, TICKS = 300, 60
+# A statement, and what it may exceed the budget by when it works on lists.
+BEYOND = MOST_OPERATIONS + 2 * OVERDRAFT
+
+
+def groups(first, last):
+    return range(first // GROUP, last // GROUP)
+
+
+@pytest.mark.parametrize("group", groups(0, QUICK))
+def test_any_text_is_an_error_or_a_run(group):
+    all_of(group)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("group", groups(QUICK, CI))
+def test_so_are_many_more(group):
+    all_of(group)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("part", range(100))
+def test_so_are_all_hundred_thousand(part):
+    for group in groups(CI, ALL):
+        if group % 100 == part:
+            all_of(group)
+
+
+def all_of(group):
+    for seed in range(group * GROUP, (group + 1) * GROUP):
+        assert runs_or_fails(valid(seed)) != "compile", seed
+        runs_or_fails(spoilt(seed))
+
+
+def runs_or_fails(text):
+    table = Memory().functions()
+    try:
+        script = compile_script(text, {name: entry[0] for name, entry in table.items()})
+    except ScriptError as error:
+        stands_in(error, text)
+        return "compile"
+    machine = Machine(script, {name: entry[1] for name, entry in table.items()})
+    try:
+        for _ in range(TICKS):
+            left = machine.resume(BUDGET)
+            assert 0 <= left <= BUDGET
+            assert machine.left >= -BEYOND
+            if not machine.running:
+                return "ended"
+        machine.end()
+    except ScriptError as error:
+        stands_in(error, text)
+        assert not machine.running
+        return "failed"
+    return "runs"
+
+
+def stands_in(error, text):
+    lines = text.split("\n")
+    assert 1 <= error.line <= len(lines)
+    assert 1 <= error.column <= len(lines[error.line - 1]) + 1
+    assert error.text

@@ -1,0 +1,131 @@
+"""Functions of a script as Python's generator functions."""
+
+import ast
+
+from tvist_urscript import tree
+from tvist_urscript.names import Scope
+from tvist_urscript.pieces import DEPTH, MISSING, Position
+from tvist_urscript.statements import Statements
+
+DEEPEST_CALLS = 200
+"""Calls of functions inside each other."""
+MOST_STATEMENTS = 4000
+"""Statements of one function: while Python compiles it, no other thread of the process runs."""
+PART = 200
+"""Statements of one part of a long main function."""
+
+
+class Functions(Statements):
+    """Translates functions."""
+
+    def function(self, scope: Scope) -> list[ast.FunctionDef]:
+        """Translate a function of the script, without those inside it.
+
+        A long main function becomes several: its variables are global, so its statements can stand in any function.
+        """
+        function = scope.function
+        self.scope = scope
+        for twice in scope.twice:
+            self.report(twice.line, twice.column, f"{twice.name} is defined twice")
+        if scope.outer is not None or _length(function.body) <= PART:
+            return [self.definition(scope.code_name, function, function.body)]
+        at = Position.of(function)
+        self.is_part = True
+        parts = [
+            self.definition(f"{scope.code_name}_{number}", function, body)
+            for number, body in enumerate(_parts(function.body))
+        ]
+        self.is_part = False
+        calls: list[ast.stmt] = [
+            at.branch(
+                at.waiting(at.call(part.name, at.name(DEPTH))), [ast.Return(at.constant(None), **at.given)]
+            )
+            for part in parts
+        ]
+        return [*parts, _definition(at, scope.code_name, [], calls)]
+
+    def definition(self, name: str, function: tree.Function, body: list[tree.Statement]) -> ast.FunctionDef:
+        """Translate a function, or a part of the main function, to a function of Python."""
+        at = Position.of(function)
+        if (length := _length(body)) > MOST_STATEMENTS:
+            self.report(
+                function.line,
+                function.column,
+                f"{length} statements of {function.name} are too many in one function: the limit is {MOST_STATEMENTS}",
+            )
+            return _definition(at, name, [], [])
+        self.globals, self.loops = set(), 0
+        parameters = self.parameters(function)
+        defaults: list[ast.stmt] = []
+        for parameter, default in function.parameters:
+            if default is not None:
+                here, variable = Position.of(parameter), f"v_{parameter.name}"
+                missing = here.compare(here.name(variable), ast.Is(), here.name(MISSING))
+                defaults.append(here.branch(missing, [here.assign(variable, self.value(default))]))
+        too_deep = at.branch(
+            at.compare(at.name(DEPTH), ast.Gt(), at.constant(DEEPEST_CALLS)),
+            [at.statement(at.call("too_deep"))],
+        )
+        statements, _ = self.block(body, 0)
+        declared: list[ast.stmt] = [ast.Global(sorted(self.globals), **at.given)] if self.globals else []
+        cost = 1 + len(defaults)
+        return _definition(
+            at, name, parameters, [*declared, *at.charge(cost, check=True), too_deep, *defaults, *statements]
+        )
+
+    def parameters(self, function: tree.Function) -> list[str]:
+        """Check the parameters of a function and return their names in Python."""
+        names: list[str] = []
+        needed = True
+        for name, default in function.parameters:
+            if function.kind == "thread":
+                self.report(name.line, name.column, f"the thread {function.name} cannot have parameters")
+            if f"v_{name.name}" in names:
+                self.report(name.line, name.column, f"the parameter {name.name} is named twice")
+            if default is None and not needed:
+                self.report(
+                    name.line, name.column, f"the parameter {name.name} needs a default as the one before it"
+                )
+            needed = needed and default is None
+            names.append(f"v_{name.name}")
+        return names
+
+
+def _definition(at: Position, name: str, parameters: list[str], body: list[ast.stmt]) -> ast.FunctionDef:
+    arguments = [ast.arg(parameter, **at.given) for parameter in (DEPTH, *parameters)]
+    return ast.FunctionDef(
+        name,
+        ast.arguments([], arguments, None, [], [], None, []),
+        body or [ast.Pass(**at.given)],
+        [],
+        **at.given,
+    )
+
+
+def _length(body: list[tree.Statement]) -> int:
+    """Return the number of statements, with those inside of others but without functions."""
+    total = 0
+    waiting = [body]
+    while waiting:
+        for statement in waiting.pop():
+            total += not isinstance(statement, tree.Function)
+            if isinstance(statement, tree.While):
+                waiting.append(statement.body)
+            elif isinstance(statement, tree.If):
+                waiting += [branch for _, branch in statement.branches]
+                waiting.append(statement.otherwise)
+                total += len(statement.branches)
+    return total
+
+
+def _parts(body: list[tree.Statement]) -> list[list[tree.Statement]]:
+    parts: list[list[tree.Statement]] = [[]]
+    length = 0
+    for statement in body:
+        own = _length([statement])
+        if length + own > PART and parts[-1]:
+            parts.append([])
+            length = 0
+        parts[-1].append(statement)
+        length += own
+    return parts
