@@ -10,6 +10,7 @@ from tvist_controller.programs.library import SIGNATURES
 from tvist_urscript import PURE, ScriptError, check
 
 _SIMULATED = {name: one for name, one in SIGNATURES.items() if name not in SUBJECTS}
+_NAMES = {name.lower(): name for name in (*SIGNATURES, *PURE)}
 _UNKNOWN = re.compile(r"compile_error_name_not_found:(\w+):")
 
 
@@ -51,6 +52,6 @@ def check_program(text: str) -> list[Finding]:
 def _error(error: ScriptError) -> Finding:
     """The compiler's error, with the function whose name is nearest to an unknown one."""
     unknown = _UNKNOWN.fullmatch(error.text)
-    near = [] if unknown is None else get_close_matches(unknown[1], [*SIGNATURES, *PURE], n=1, cutoff=0.75)
-    said = f"{error.text} did you mean {near[0]}?" if near else error.text
+    near = [] if unknown is None else get_close_matches(unknown[1].lower(), _NAMES, n=1, cutoff=0.75)
+    said = f"{error.text} did you mean {_NAMES[near[0]]}?" if near else error.text
     return Finding(error.line, error.column, "error", said)
