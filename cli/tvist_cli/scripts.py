@@ -36,11 +36,11 @@ def read_script(file: str) -> str:
         except UnicodeDecodeError as error:
             why = f"the standard input is not text in UTF-8 ({error.reason} at byte {error.start})"
             raise Failure(why, code=2) from error
-    try:
-        with told(OSError, code=2):
+    with told(OSError, code=2):
+        try:
             return read_text(file, "program")
-    except UserFileError as error:
-        raise Failure(str(error), code=2) from error
+        except UserFileError as error:
+            raise Failure(str(error), code=2) from error
 
 
 def placed(file: str, finding: "Finding") -> str:
