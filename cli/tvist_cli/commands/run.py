@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def run(
-    file: str,
+    file: Path,
     *,
     lockstep: bool = False,
     robot: str | None = None,
@@ -113,7 +113,7 @@ def run(
         raise failure
 
 
-def _check(file: str, text: str, *, json: bool) -> None:
+def _check(file: Path, text: str, *, json: bool) -> None:
     """Say what is wrong with a program before anything is started for it."""
     from tvist_controller.programs.checking import check_program
 
@@ -156,7 +156,7 @@ class _Job:
     """A program to run, and whom to tell."""
 
     def __init__(
-        self, file: str, text: str, inputs: Sequence[str], timeout: float | None, tell: Tell
+        self, file: Path, text: str, inputs: Sequence[str], timeout: float | None, tell: Tell
     ) -> None:
         self.file, self.text, self.inputs, self.timeout, self.tell = file, text, inputs, timeout, tell
 
@@ -210,7 +210,7 @@ class _Job:
         return served.watch, say_recorded(server), server
 
 
-def _failure(file: str, watch: "ProgramWatch", errors: list[str]) -> Failure | None:
+def _failure(file: Path, watch: "ProgramWatch", errors: list[str]) -> Failure | None:
     """Why the run has failed; None if it has not."""
     after = f"after {watch.seconds:.3f} s of robot time"
     match watch.reason:
