@@ -26,8 +26,8 @@ RECORDED = {0: 47, 1: 251, 4: 101, 5: 225, 9: 53, 3: 75, 2: 37, 6: 445, 7: 61, 8
 """Parts of a recorded robot state in their order, with their lengths."""
 
 
-def session(robot, control, send, *, read_only=False):
-    return PrimarySession(host(robot), control, send, read_only=read_only)
+def session(robot, control, send, **options):
+    return PrimarySession(host(robot), control, send, **options)
 
 
 def state_of(snapshot, description=UR5E):
@@ -246,14 +246,28 @@ def test_a_client_that_comes_in_a_protective_stop_is_told_of_its_end_alone(robot
     assert [message(data).values["mode"] for data in sent if data[4] == 20] == [1]
 
 
-def test_a_protective_stop_is_error_209_of_argument_0_as_a_warning(robot, control, sent):
-    interface = session(robot, control, sent.append)
+def test_a_protective_stop_is_error_209_of_argument_0_as_a_warning_after_the_state(
+    robot, control, sent, snapshot
+):
+    interface, ticks = session(robot, control, sent.append), Ticks(snapshot)
+    interface.sample(ticks.at(6))
+    sent.clear()
     interface.event(Event(tick=7, kind="protective_stop", code="limit_torque", why="too much"))
-    (error,) = [message(data) for data in sent]
+    interface.sample(ticks.at(7, safety_mode=3))
+    assert [data[4] for data in sent] == [20, 16, 20]
+    error = message(sent[-1])
     assert error.kind == 6
     assert (error.values["code"], error.values["argument"], error.values["level"]) == (209, 0, 2)
     assert error.values["text"] == "too much"
-    assert error.time == round(robot.latest.timestamp * 1e6)
+
+
+def test_clients_of_the_secondary_interface_get_the_state_and_no_messages(robot, control, sent, snapshot):
+    interface, ticks = session(robot, control, sent.append, informed=False), Ticks(snapshot)
+    interface.sample(ticks.at(6))
+    interface.event(Event(tick=7, kind="protective_stop", code="limit_torque", why="too much"))
+    interface.event(Event(tick=7, kind="warning", why="mind the gap"))
+    assert interface.sample(ticks.at(7, safety_mode=3)) == b""
+    assert [data[4] for data in sent] == [16, 16]
 
 
 def test_warnings_are_lines_of_the_log_and_other_events_are_not_told(robot, control, sent):
