@@ -14,10 +14,11 @@ from tvist_protocol.channels import tag
 from tvist_protocol.codec import encode
 from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
 from tvist_protocol.motions import MoveL
-from tvist_protocol.programs import ProgramStop
+from tvist_protocol.programs import ProgramLoad, ProgramStop
 from tvist_protocol.replies import Accepted, Done, Posture, Refused, ToolPose
 from tvist_protocol.values import Payload
 from tvist_server.plan_ahead import MAX_WAITING, PlanAhead
+from tvist_server.program_folder import ProgramFolder
 from tvist_server.reception import Reception
 
 WAIT = 20.0
@@ -39,12 +40,12 @@ class Sink:
 class Served:
     """A robot whose controller's thread is the test's own: jobs run when it says."""
 
-    def __init__(self, **changes):
+    def __init__(self, complete=None, **changes):
         start = setup(clock="realtime", **changes)
         self.sink = Sink()
         self.host = Host(Controller(start), self.sink)
         self.jobs, self.came = deque(), threading.Condition()
-        self.ahead = PlanAhead(self.host, Planner(start), self.post)
+        self.ahead = PlanAhead(self.host, Planner(start), self.post, complete)
         self.ahead.start()
         self.reception = Reception(self.host, self.post, self.ahead.submit, lambda call: call())
         self.replies = []
@@ -113,6 +114,23 @@ def test_what_was_planned_beside_is_what_the_controller_would_have_done(served):
         served.tick(40)
         alone.tick(40)
     assert [state.target_q for state in served.sink.states] == [state.target_q for state in alone.states]
+
+
+def test_a_program_of_the_folder_is_loaded_and_journaled_with_its_text(tmp_path):
+    (tmp_path / "wait.script").write_text("sync()\n")
+    (tmp_path / "bad.urp").write_bytes(b"\xff")
+    served = Served(ProgramFolder(tmp_path).complete)
+    replies = [
+        served.ask(ProgramLoad(name=name)) for name in ("wait.urp", "bad.urp", "nothing.urp", "Q1.urp")
+    ]
+    served.ahead.close()
+    assert [type(reply) for reply in replies] == [Done, Refused, Refused, Done]
+    assert [reply.where for reply in replies[1:3]] == ["name", "name"]
+    loads = [entry.message for entry in served.sink.entries if entry.message["type"] == tag(ProgramLoad)]
+    assert [(load["name"], load.get("text")) for load in loads] == [
+        ("wait.urp", "sync()\n"),
+        ("Q1.urp", None),
+    ]
 
 
 def test_a_motion_is_planned_anew_where_what_it_was_planned_on_has_changed(served):

@@ -4,6 +4,7 @@ import dataclasses
 import ipaddress
 import tempfile
 import tomllib
+from pathlib import Path
 from typing import Annotated, TypeVar
 
 from msgspec import Meta, Struct
@@ -21,6 +22,7 @@ from tvist_protocol.values import RobotName, Seed
 from tvist_server.fleet import members
 from tvist_server.initial import read_state, shaped_by
 from tvist_server.profiles import PLAIN, PROFILES, Profile, ProfileName
+from tvist_server.program_folder import ProgramFolder
 from tvist_server.ur_ports import InterfaceName, UrPorts
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -89,6 +91,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Keep the arm clear of the floor of the robot file; false: there is no floor."""
     compensate_sag: bool | None = None
     """Let the drives lead by the twist of the gears under gravity, so that the arm rests on its target."""
+    programs: str | None = None
+    """Folder with programs that clients load by their names; a robot may have a folder of its name in it."""
     ur: bool = False
     """Open UR's own interfaces, too."""
     ur_address: str = "127.0.0.1"
@@ -118,6 +122,21 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             dataclasses.replace(starts[member.robot], name=member.name, seed=self.seed + index)
             for index, member in enumerate(found)
         ]
+
+    def program_folder(self, name: str) -> ProgramFolder | None:
+        """Return the folder with a robot's programs; None if there is none.
+
+        Args:
+            name: Name of the robot.
+
+        Raises:
+            ConfigError: `programs` is not a folder.
+        """
+        if self.programs is None:
+            return None
+        if not Path(self.programs).is_dir():
+            raise ConfigError(f"programs is {self.programs!r}: must be a folder that exists")
+        return ProgramFolder.of(Path(self.programs), name)
 
     def interfaces(self, number: int) -> tuple[str, dict[InterfaceName, int]]:
         """Return the address of a robot's UR interfaces, and the port of each.

@@ -65,10 +65,18 @@ class PlanAhead:
         host: The controller.
         planner: Makes plans; used by this thread only.
         post: Queues a job for the controller's thread.
+        complete: Adds what a command names but does not contain, such as a file, or refuses it; used by this thread
+            only.
     """
 
-    def __init__(self, host: Host, planner: Planner, post: Callable[[Callable[[], None]], None]) -> None:
-        self._host, self._planner, self._post = host, planner, post
+    def __init__(
+        self,
+        host: Host,
+        planner: Planner,
+        post: Callable[[Callable[[], None]], None],
+        complete: Callable[[Admitted], Admitted | Refused] | None = None,
+    ) -> None:
+        self._host, self._planner, self._post, self._complete = host, planner, post, complete
         self._lock = threading.Lock()
         self._count, self._commands = 0, 0
         self._closing = False
@@ -124,10 +132,16 @@ class PlanAhead:
                 self._commands -= not isinstance(waiting.admitted.command, QUESTIONS)
 
     def _hand_over(self, waiting: _Waiting) -> None:
-        command = waiting.admitted.command
         if self._closing:
             self._post(lambda: waiting.answer(_BUSY))
             return
+        if self._complete is not None:
+            completed = self._complete(waiting.admitted)
+            if isinstance(completed, Refused):
+                self._post(lambda: waiting.answer(completed))
+                return
+            waiting = waiting._replace(admitted=completed)
+        command = waiting.admitted.command
         if isinstance(command, QUESTIONS):
             self._reply(command, waiting.answer)
             return

@@ -32,12 +32,19 @@ class Reception(Desk):
         post: Queues a job for the controller's thread.
         carry_out: Carries out commands that were admitted.
         hand_on: Queues calls that answer clients, in the controller's thread.
+        complete_info: Adds to an encoded `info` what the controller does not know, in the thread that answers clients.
     """
 
     def __init__(
-        self, host: Host, post: Post, carry_out: CarryOut, hand_on: Callable[[Callable[[], None]], None]
+        self,
+        host: Host,
+        post: Post,
+        carry_out: CarryOut,
+        hand_on: Callable[[Callable[[], None]], None],
+        complete_info: Callable[[bytes], bytes] | None = None,
     ) -> None:
         self._host, self._post, self._carry_out, self._hand_on = host, post, carry_out, hand_on
+        self._complete_info = complete_info
         self._lock = threading.Lock()
         self._presence = Presence()
         self.commands_refused = 0
@@ -59,8 +66,8 @@ class Reception(Desk):
         """Answer with a description of the robot."""
 
         def tell() -> None:
-            data = self._host.info()
-            self._hand_on(lambda: answer(data))
+            data, complete = self._host.info(), self._complete_info
+            self._hand_on(lambda: answer(data if complete is None else complete(data)))
 
         self._post(tell)
 

@@ -12,13 +12,14 @@ from tvist_controller.setup import Setup
 from tvist_controller.sink import Sink
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command
-from tvist_protocol.replies import Reply
+from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import Telemetry
 from tvist_server.clock import Clock, Mailbox
 from tvist_server.gateways.base import Answer, Gateway
 from tvist_server.lateness import Punctuality
 from tvist_server.plan_ahead import PlanAhead
 from tvist_server.plans_of_programs import PlansOfPrograms
+from tvist_server.program_folder import ProgramFolder
 from tvist_server.publisher import Publisher
 from tvist_server.reception import Reception
 from tvist_server.recording.black_box import BlackBox
@@ -33,6 +34,7 @@ class ServedRobot:
         record: File to record into.
         dump: Folder for the last second before a failure.
         observe: Makes a further sink of the controller's messages.
+        programs: Folder with programs that clients load by their names.
 
     Raises:
         ValueError: The setup is invalid.
@@ -45,8 +47,10 @@ class ServedRobot:
         record: Path | None,
         dump: Path,
         observe: Callable[[Controller], Sink] | None = None,
+        programs: ProgramFolder | None = None,
     ) -> None:
         self.setup = setup
+        self._complete = None if programs is None else programs.complete
         lockstep = setup.clock != "realtime"
         # When a client advances time, nothing is late, and plans are made when they are needed.
         self._plans = None if lockstep else PlansOfPrograms(_planner(setup))
@@ -69,9 +73,17 @@ class ServedRobot:
         self._host = Host(self.controller, *sinks, black_box, self._publisher)
         self.driven = Mailbox(self._host)
         """The robot as seen by the clock."""
-        self._plan_ahead = None if lockstep else PlanAhead(self._host, _planner(setup), self.driven.post)
+        self._plan_ahead = (
+            None if lockstep else PlanAhead(self._host, _planner(setup), self.driven.post, self._complete)
+        )
         carry_out = self._carry_out if self._plan_ahead is None else self._plan_ahead.submit
-        self.reception = Reception(self._host, self.driven.post, carry_out, self._publisher.answer)
+        self.reception = Reception(
+            self._host,
+            self.driven.post,
+            carry_out,
+            self._publisher.answer,
+            None if programs is None else programs.listed,
+        )
         """Desk that gateways pass messages to."""
         self._gateways: Sequence[Gateway] = ()
 
@@ -106,7 +118,14 @@ class ServedRobot:
         def attend() -> bool:
             return self.driven.attend(client)
 
-        self.driven.post(lambda: answer(self._host.carry_out(admitted, attend=attend)), client)
+        def carry_out() -> None:
+            completed = admitted if self._complete is None else self._complete(admitted)
+            if isinstance(completed, Refused):
+                answer(completed)
+            else:
+                answer(self._host.carry_out(completed, attend=attend))
+
+        self.driven.post(carry_out, client)
 
     # ------------------------------------------------------------------ figures and shutdown
 

@@ -182,8 +182,9 @@ def _robot(
     path = None
     if config.record is not None:
         path = recording_of(config.record, setup.name) if several else Path(config.record)
+    programs = config.program_folder(setup.name)
     try:
-        return ServedRobot(setup, path, Path(config.dump), observe)
+        return ServedRobot(setup, path, Path(config.dump), observe, programs)
     except ValueError as error:
         raise ConfigError(str(error)) from error
 

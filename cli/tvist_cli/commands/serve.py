@@ -45,6 +45,7 @@ def serve(
     quiet: Annotated[bool | None, Parameter(negative="--no-quiet")] = None,
     floor: Annotated[bool | None, Parameter(negative="--no-floor")] = None,
     compensate_sag: Annotated[bool | None, Parameter(negative="--no-compensate-sag")] = None,
+    programs: str | None = None,
     ur: bool = False,
     ur_address: str | None = None,
     ur_port: list[str] | None = None,
@@ -91,6 +92,8 @@ def serve(
         floor: Refuse motions that bring the arm or its payload to the floor of the robot file [on].
         compensate_sag: Let the drives lead by the angle that gravity twists the gears, so that the measured joint
             angles at rest are the target angles [off].
+        programs: Folder with programs in URScript, NAME.script or NAME.urp, that clients load by their names. With
+            several robots, a robot uses the folder of its name in it, if there is one.
         ur: Open UR's own interfaces as well: RTDE, real-time client, dashboard, primary and secondary. The profile is
             then ursim, if you give no other.
         ur_address: IP address on which UR's interfaces listen; each further robot uses the next address [127.0.0.1].
@@ -105,7 +108,7 @@ def serve(
         "calibration": calibration, "clock": lower(clock), "speed": speed,
         "realtime_priority": realtime_priority or None, "start": start, "state": state, "seed": seed,
         "record": record, "dump": dump, "truth": truth or None, "quiet": quiet,
-        "floor": floor, "compensate_sag": compensate_sag,
+        "floor": floor, "compensate_sag": compensate_sag, "programs": programs,
         "ur": (ur or ur_address is not None or ur_port is not None) or None, "ur_address": ur_address,
         "ur_ports": ur_ports(ur_port),
     }  # fmt: skip

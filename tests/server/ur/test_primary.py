@@ -272,6 +272,7 @@ def test_clients_of_the_secondary_interface_get_the_state_and_no_messages(robot,
 
 def test_warnings_are_lines_of_the_log_and_other_events_are_not_told(robot, control, sent):
     interface = session(robot, control, sent.append)
+    interface.event(Event(tick=7, kind="warning", why="for all clients, once", line=3, column=5))
     interface.event(Event(tick=7, kind="motion_started", id=1))
     interface.event(Event(tick=7, kind="warning", why="mind the gap"))
     (line,) = [message(data) for data in sent]

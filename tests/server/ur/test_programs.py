@@ -1,4 +1,4 @@
-"""The controller's program at UR's interfaces: paths, key messages, texts, popups, exceptions, and who holds control for it."""
+"""The controller's program at UR's interfaces: paths, what it tells clients, and who holds control for it."""
 
 import pytest
 from hypothesis import given

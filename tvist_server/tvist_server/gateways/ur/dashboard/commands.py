@@ -129,8 +129,10 @@ def _load(request: Request) -> None:
             loaded = f"Loading program: {path}"
             request.at_rest(lambda well: request.answer(loaded if well else failed))
             return
-        request.robot.report(f"the program {path} was not loaded for {request.control.peer}: {refused.why}")
-        request.answer(f"File not found: {path}" if refused.where == "name" else failed)
+        place = refused.where.replace("text:", "line ").replace(":", ", column ")
+        why = f"{place}: {refused.why}" if refused.code == "script_error" else refused.why
+        request.robot.report(f'the program "{path}" of {request.control.peer} was not loaded: {why}')
+        request.answer(f"File not found: {path}" if refused.code == "out_of_range" else failed)
 
     if request.control.held_by_other:
         request.answer(failed)

@@ -1,0 +1,127 @@
+"""The folder of programs: which file a name finds, what it has to contain, and what the robot gets of it."""
+
+import gzip
+
+import msgspec
+import pytest
+from tests.controller.robots import Robot
+
+from tvist_controller.admission import Admitted
+from tvist_controller.host import Host
+from tvist_plant.user_file import UserFileError
+from tvist_protocol.codec import decode_info
+from tvist_protocol.programs import MAX_SCRIPT, ProgramLoad, ProgramStop
+from tvist_protocol.replies import Done, Refused
+from tvist_server.config import ConfigError, from_mapping
+from tvist_server.program_folder import ProgramFolder
+
+TEXT = "def pick():\n  sync()\nend\n"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "pick.script").write_text(TEXT)
+    (tmp_path / "place.urp").write_text("textmsg(1)\n")
+    (tmp_path / "notes.txt").write_text("nothing")
+    return ProgramFolder(tmp_path)
+
+
+def admitted(command):
+    return Admitted(command, msgspec.to_builtins(command))
+
+
+def test_a_name_finds_its_file_and_the_name_of_a_saved_program_its_script(folder):
+    assert folder.names() == ["pick.script", "place.urp"]
+    assert folder.read("pick.script") == folder.read("pick.urp") == folder.read("/programs/pick.urp") == TEXT
+    assert folder.read("place.urp") == "textmsg(1)\n"
+    for name in ("place.script", "pick", "notes.txt", "nothing.urp", "..", "/"):
+        assert folder.read(name) is None
+
+
+def test_a_file_is_looked_up_when_it_is_loaded(folder):
+    (folder.path / "pick.script").write_text("sync()\n")
+    assert folder.read("pick.urp") == "sync()\n"
+    (folder.path / "pick.script").unlink()
+    assert folder.read("pick.urp") is None
+
+
+def polyscope(*nodes):
+    inner = "<children>" + "".join(nodes) + "</children>"
+    return (
+        f"<?xml version='1.0'?><URProgram><children><MainProgram>{inner}</MainProgram></children></URProgram>"
+    )
+
+
+SCRIPT_NODE = "<Script type='File'><cachedContents>textmsg(&quot;a &lt; b&quot;)</cachedContents></Script>"
+
+
+@pytest.mark.parametrize("pack", [str.encode, lambda text: gzip.compress(text.encode())])
+def test_a_program_of_polyscope_that_is_one_script_is_that_script(folder, pack):
+    (folder.path / "saved-1.urp").write_bytes(pack(polyscope(SCRIPT_NODE)))
+    assert folder.read("saved-1.urp") == 'def saved_1():\ntextmsg("a < b")\nend\n'
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        (gzip.compress(polyscope("<Move/>", SCRIPT_NODE).encode()), "has the nodes Move, Script"),
+        (polyscope().encode(), "has the nodes none"),
+        (polyscope("<Script/>").encode(), "without text"),
+        (b"<!DOCTYPE a>" + polyscope(SCRIPT_NODE).encode(), "has the nodes none"),
+        (b"<a", "not valid XML"),
+        (b"\x1f\x8bxx", "cannot be unpacked"),
+        (gzip.compress(bytes(5 << 20)), "more than 4 MiB"),
+        (b"\xff\xfe", "not text in UTF-8"),
+        (b" \n", "at least one"),
+        (b"x" * (MAX_SCRIPT + 1), f"at most {MAX_SCRIPT}"),
+    ],
+)
+def test_a_file_that_cannot_be_played_is_refused_with_the_reason(folder, content, why):
+    (folder.path / "bad.urp").write_bytes(content)
+    with pytest.raises(UserFileError, match=why):
+        folder.read("bad.urp")
+    refused = folder.complete(admitted(ProgramLoad(name="bad.urp")))
+    assert isinstance(refused, Refused)
+    assert refused.where == "name"
+
+
+def test_what_is_no_file_is_refused(folder):
+    (folder.path / "folder.urp").mkdir()
+    with pytest.raises(UserFileError, match="is a directory"):
+        folder.read("folder.urp")
+
+
+def test_a_load_gets_the_text_of_the_file_and_other_commands_stay_as_they_are(folder):
+    completed = folder.complete(admitted(ProgramLoad(name="pick.urp")))
+    assert completed.command == ProgramLoad(name="pick.urp", text=TEXT)
+    assert completed.content["text"] == TEXT
+    for command in (ProgramStop(), ProgramLoad(name="pick.urp", text="sync()"), ProgramLoad(name="Q1.urp")):
+        assert folder.complete(admitted(command)).command is command
+
+
+def test_the_files_are_programs_of_the_robot_s_description(folder):
+    host = Host(Robot().controller)
+    programs = decode_info(folder.listed(host.info())).programs
+    assert {"pick.script", "place.urp", "Q1.urp"} <= set(programs)
+    folder.path = folder.path / "nowhere"
+    assert decode_info(folder.listed(host.info())).programs == decode_info(host.info()).programs
+
+
+def test_the_robot_takes_the_program_of_the_folder(folder):
+    robot = Robot()
+    completed = folder.complete(admitted(ProgramLoad(name="pick.urp")))
+    assert isinstance(robot.controller.receive(completed.command), Done)
+    assert robot.controller.programs.name == "pick.urp"
+
+
+def test_a_robot_has_the_folder_of_its_name_if_there_is_one(folder):
+    (folder.path / "ur5e-1").mkdir()
+    assert ProgramFolder.of(folder.path, "ur5e-1").path == folder.path / "ur5e-1"
+    assert ProgramFolder.of(folder.path, "ur5e-2").path == folder.path
+
+
+def test_a_folder_that_does_not_exist_is_an_error_of_the_configuration(tmp_path):
+    nowhere = from_mapping({"programs": str(tmp_path / "nowhere")}, "tvist.toml")
+    with pytest.raises(ConfigError, match=r"programs is .*nowhere.*: must be a folder"):
+        nowhere.program_folder("ur5e")
+    assert from_mapping({}, "tvist.toml").program_folder("ur5e") is None

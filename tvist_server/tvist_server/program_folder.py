@@ -1,0 +1,146 @@
+"""Folder with programs that clients load by their names."""
+
+import zlib
+from pathlib import Path, PurePosixPath
+from typing import Final
+from xml.etree import ElementTree as ET
+
+import msgspec
+
+from tvist_controller.admission import Admitted
+from tvist_plant.user_file import LARGEST, UserFileError, read_bytes
+from tvist_protocol.codec import decode_info, encode
+from tvist_protocol.programs import MAX_SCRIPT, ProgramLoad
+from tvist_protocol.replies import Refused
+
+SCRIPT, URP = ".script", ".urp"
+"""Endings of the files. A script is text in URScript; a .urp file is the same, or a file that PolyScope has saved."""
+_GZIP: Final = b"\x1f\x8b"
+_XML: Final = b"<"
+
+
+class ProgramFolder:
+    """The programs in a folder, which is looked at whenever a client loads one or asks for their names.
+
+    Args:
+        path: Path of the folder.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @classmethod
+    def of(cls, path: Path, robot: str) -> "ProgramFolder":
+        """Return the folder of one robot: the one of its name in another folder if there is such, else that folder."""
+        own = path / robot
+        return cls(own if own.is_dir() else path)
+
+    def names(self) -> list[str]:
+        """Names of the files; without a folder there are none."""
+        try:
+            return sorted(entry.name for entry in self.path.iterdir() if entry.suffix in {SCRIPT, URP})
+        except OSError:
+            return []
+
+    def read(self, name: str) -> str | None:
+        """Return the text of a program; None if there is no such file.
+
+        Args:
+            name: Name of the file; folders before it are ignored. `X.urp` also finds `X.script`.
+
+        Raises:
+            UserFileError: The file is not a program that the controller can run.
+        """
+        file = PurePosixPath(name).name
+        candidates = [file, file.removesuffix(URP) + SCRIPT] if file.endswith(URP) else [file]
+        for candidate in candidates:
+            path = self.path / candidate
+            if path.suffix not in {SCRIPT, URP}:
+                continue
+            try:
+                data = read_bytes(path, "program")
+            except FileNotFoundError:
+                continue
+            except OSError as error:
+                raise UserFileError(f"program {path}: {error.strerror}") from error
+            return _checked(path, _text(path, data))
+        return None
+
+    def complete(self, admitted: Admitted) -> Admitted | Refused:
+        """Add the text to a command that loads a program of the folder; any other command remains as it is.
+
+        The robot and its journal thus get the program as it was when it was loaded.
+        """
+        command = admitted.command
+        if not isinstance(command, ProgramLoad) or command.text is not None:
+            return admitted
+        try:
+            text = self.read(command.name)
+        except UserFileError as error:
+            return Refused(code="out_of_range", where="name", why=str(error))
+        if text is None:
+            return admitted
+        command = msgspec.structs.replace(command, text=text)
+        return admitted._replace(command=command, content=msgspec.to_builtins(command))
+
+    def listed(self, info: bytes) -> bytes:
+        """Add the files to the programs in an encoded `info`."""
+        content = decode_info(info)
+        programs = sorted({*content.programs, *self.names()})
+        return encode(msgspec.structs.replace(content, programs=programs))
+
+
+def _text(path: Path, data: bytes) -> str:
+    """Text of a program file.
+
+    Raises:
+        UserFileError: It is neither text nor a simple program of PolyScope.
+    """
+    if data.startswith(_GZIP):
+        unpack = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)
+        try:
+            data = unpack.decompress(data, LARGEST)
+        except zlib.error as error:
+            raise UserFileError(f"program {path} is packed, and cannot be unpacked: {error}") from error
+        if unpack.unconsumed_tail:
+            raise UserFileError(f"program {path} has more than {LARGEST >> 20} MiB when it is unpacked")
+    if data.lstrip().startswith(_XML):
+        return _of_polyscope(path, data)
+    try:
+        return data.decode()
+    except UnicodeDecodeError as error:
+        raise UserFileError(f"program {path} is not text in UTF-8: byte {error.start}") from error
+
+
+def _of_polyscope(path: Path, data: bytes) -> str:
+    """Text of a program of PolyScope that consists of one script.
+
+    Raises:
+        UserFileError: It has other nodes, or it is not XML.
+    """
+    nodes: list[ET.Element] = []
+    if b"<!DOCTYPE" not in data:  # its entities could expand without end
+        try:
+            nodes = ET.fromstring(data).findall("./children/MainProgram/children/*")  # noqa: S314  see above
+        except ET.ParseError as error:
+            raise UserFileError(f"program {path} is not valid XML: {error}") from error
+    if [node.tag.lower() for node in nodes] != ["script"]:
+        found = ", ".join(node.tag for node in nodes) or "none"
+        raise UserFileError(
+            f"program {path} is PolyScope's and has the nodes {found}: "
+            "only a program of one Script node can be played; save it as a script"
+        )
+    parts = [nodes[0].findtext(tag) for tag in ("cachedContents", "text")]
+    text = next((part for part in parts if part), nodes[0].text or "")
+    if not text.strip():
+        raise UserFileError(f"program {path} has a Script node without text: save the script itself")
+    name = "".join(letter if letter.isalnum() and letter.isascii() else "_" for letter in path.stem)
+    return f"def {name or 'program'}():\n{text}\nend\n"
+
+
+def _checked(path: Path, text: str) -> str:
+    if not text.strip() or len(text) > MAX_SCRIPT:
+        raise UserFileError(
+            f"program {path} has {len(text)} characters: a program has at least one and at most {MAX_SCRIPT}"
+        )
+    return text
