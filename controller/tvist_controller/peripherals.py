@@ -49,6 +49,10 @@ class LoadedProgram(Protocol):
     def line(self) -> int:
         """Current line, as in `Io`."""
 
+    @property
+    def watched(self) -> list[str]:
+        """Input registers that the program watches, as in `Io`."""
+
 
 class Peripherals:
     """Everything connected to the control box except the arm. Initially everything is off or zero.
@@ -260,6 +264,7 @@ class Peripherals:
             program=program.name,
             program_state=program.state,
             program_line=program.line,
+            watched=program.watched,
             tool_output_voltage=self._tool_voltage,
             tcp_force_zero=self.wrench_zero,
             actual_TCP_force=wrench,

@@ -59,6 +59,9 @@ class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
     """State of the loaded program."""
     program_line: int = 0
     """Line that is being carried out, or will be when the program continues, counted from 1; 0 if there is none."""
+    watched: list[str] = []
+    """RTDE's names of the input registers that the program watches: it counts how often they are written, even with the
+    same value."""
     tool_output_voltage: int = 0
     """Supply voltage of the tool [V]."""
     tcp_force_zero: list[float] | None = None

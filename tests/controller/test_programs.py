@@ -325,8 +325,10 @@ def test_a_watchdog_pauses_or_stops_the_program_when_its_register_is_not_written
         robot.tick(40)
         robot.send(SetRegisters, bank="input_int", first=0, values=(1,))
         assert playing(robot)
+        assert robot.controller.io().watched == ["input_int_register_0"]
     robot.tick(60)
     assert robot.controller.programs.state == state
+    assert robot.controller.io().watched == []
     robot.until_rest()
 
 

@@ -87,6 +87,11 @@ class ProgramPlayer:
         return sorted(self._built_in | set(self._kept))
 
     @property
+    def watched(self) -> list[str]:
+        """Names of the input registers that the program watches."""
+        return self._watchdogs.names
+
+    @property
     def progress(self) -> tuple[str | None, ProgramState, int]:
         """Fields of the program in `io`: its name, its state and its line."""
         return self.name, self.state, self.line

@@ -46,14 +46,21 @@ class Watchdogs:
             Fault: There is no such register.
         """
         bank, place = _register(name)
+        self._peripherals.changed = True
         if action == "ignore":
             self._all.pop(name, None)
             return
         ticks = max(round(1.0 / (frequency * PERIOD)), 1)
         self._all[name] = _Watchdog(name, bank, place, ticks, action, self._tick)
 
+    @property
+    def names(self) -> list[str]:
+        """Names of the inputs that are watched."""
+        return list(self._all)
+
     def clear(self) -> None:
         """Watch nothing any more, since the program has ended."""
+        self._peripherals.changed |= bool(self._all)
         self._all.clear()
 
     def expired(self, tick: int) -> tuple[str, str] | None:
@@ -62,6 +69,7 @@ class Watchdogs:
         for watchdog in self._all.values():
             written = max(self._peripherals.written(watchdog.bank, watchdog.place), watchdog.since)
             if tick - written > watchdog.ticks:
+                self._peripherals.changed = True
                 del self._all[watchdog.name]
                 return watchdog.action, watchdog.name
         return None

@@ -306,6 +306,20 @@ class TestRegisters:
         (command,) = one.put(1, ints[:1], 5)
         assert command.values == (5,)
 
+    def test_what_a_program_watches_is_sent_every_time(self, one, robot):
+        names = [ints[0], doubles[3], "input_bit_registers0_to_31"]
+        one.with_inputs(names)
+        one.put(1, names, 5, 1.5, 1)
+        seen = {"input_int_register": [5] + [0] * 47, "input_bit_register": [1, 0, 0, 0]}
+        seen["input_double_register"] = [0.0, 0.0, 0.0, 1.5] + [0.0] * 44
+        shown(robot, **seen)
+        assert one.put(1, names, 5, 1.5, 1) == []
+        shown(robot, watched=[ints[0]], **seen)
+        assert [command.values for command in one.put(1, names, 5, 1.5, 1)] == [(5,)]
+        shown(robot, watched=["input_bit_registers0_to_31"], **seen)
+        (command,) = one.put(1, names, 5, 1.5, 1)
+        assert (command.bank, command.first, len(command.values)) == ("input_bit", 0, 32)
+
     def test_registers_apart_are_commands_apart(self, one):
         names = [ints[0], ints[1], ints[7], doubles[0], "input_bit_register_64"]
         one.with_inputs(names)

@@ -78,10 +78,12 @@ class InputWriter:
     def _set_registers(self, values: dict[str, Value]) -> None:
         """Registers need no control."""
         io = self._io
+        watched = () if io is None else io.watched  # the program's watchdogs count every write
         news: dict[Hashable, object] = {
             name: value
             for name, value in values.items()
-            if self._ledger.is_news(name, value, None if io is None else _present(io, name))
+            if name in watched
+            or self._ledger.is_news(name, value, None if io is None else _present(io, name))
         }
         if not news:
             return
