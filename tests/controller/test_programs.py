@@ -8,8 +8,9 @@ from tvist_controller.paths.poses import placement_vector
 from tvist_protocol import commands as c
 from tvist_protocol.io import SetRegisters
 from tvist_protocol.motions import MoveL
-from tvist_protocol.programs import ProgramClosePopup, ProgramPause, ProgramPlay, ProgramRun
+from tvist_protocol.programs import ProgramClosePopup, ProgramPause, ProgramPlay, ProgramRun, ProgramStop
 from tvist_protocol.replies import Done
+from tvist_protocol.simulation import SimulationInject
 
 from .robots import UR5E, Robot
 from .scripts import URSIM, a_robot, failure, finish, playing, run, said, script, start
@@ -17,6 +18,11 @@ from .scripts import URSIM, a_robot, failure, finish, playing, run, said, script
 KINEMATICS = ToolKinematics(UR5E)
 HERE = placement_vector(*KINEMATICS.pose(np.array(URSIM)))
 NEAR = [angle + 0.2 for angle in URSIM]
+
+
+def ended(robot):
+    """Why each program has ended, None for those that ended by themselves."""
+    return [event.why for event in robot.events if event.kind == "program_stopped"]
 
 
 def pose(dx=0.0, dy=0.0, dz=0.0):
@@ -443,3 +449,30 @@ def test_equal_programs_and_inputs_give_equal_bits():
             robot.tick(7)
         runs.append((finish(robot).states, robot.controller.io()))
     assert runs[0] == runs[1]
+
+
+def test_the_end_of_a_program_says_why_unless_it_is_its_own():
+    robot = a_robot()
+    run(robot, "sleep(0.1)")
+    assert ended(robot) == [None]
+    start(robot, "sleep(10)", name="first")
+    run(robot, "sleep(0.1)")
+    assert ended(robot)[1:] == ["another program was started", None]
+    for stop in (lambda: robot.send(ProgramStop), lambda: robot.send(c.PowerOff)):
+        start(robot, "sleep(10)")
+        robot.tick(5)
+        stop()
+        robot.tick()
+    assert ended(robot)[3:] == ["the program was stopped", "power_off was commanded"]
+    assert failure(robot) is None
+
+
+def test_the_end_of_a_program_names_the_safety_stop():
+    robot = a_robot()
+    start(robot, f"movej({NEAR})")
+    robot.tick(50)
+    robot.send(SimulationInject, fault="emergency_stop")
+    robot.tick()
+    (why,) = ended(robot)
+    (stop,) = [event for event in robot.events if event.kind == "safety_stop"]
+    assert why == stop.why
