@@ -8,13 +8,14 @@ from tvist_urscript.arithmetic import NUMBERS
 from tvist_urscript.errors import name_not_found
 from tvist_urscript.names import BUILT_IN_ARRAYS, Scope
 from tvist_urscript.pieces import DEPTH, MISSING, Position
-from tvist_urscript.signatures import REQUIRED, Signatures
+from tvist_urscript.signatures import REQUIRED, Parameter, Signatures
 from tvist_urscript.values import LONGEST, Array, Pose
 
 MOST_OPERATIONS = 1000
 """Evaluations of one statement; beyond them nothing could interrupt it in time."""
 
 ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "remainder"}
+SCALING, SUMS = "*/", "+-"
 ORDER: dict[str, type[ast.cmpop]] = {"<": ast.Lt, ">": ast.Gt, "<=": ast.LtE, ">=": ast.GtE}
 EQUALITY: dict[str, tuple[type[ast.cmpop], str]] = {
     "==": (ast.Eq, "is_equal"),
@@ -106,7 +107,9 @@ class Expressions:
         self.cost += 1
         left, right = self.value(node.left), self.value(node.right)
         if node.operator in ARITHMETIC:
-            self.works = True
+            has_constant = isinstance(node.left, tree.Constant) or isinstance(node.right, tree.Constant)
+            if node.operator in SCALING or (node.operator in SUMS and not has_constant):
+                self.works = True
             return at.call(ARITHMETIC[node.operator], left, right)
         if node.operator in ORDER:
             return at.compare(left, ORDER[node.operator](), right)
@@ -136,6 +139,12 @@ class Expressions:
         """Return a name for a value that compiled functions use."""
         name = f"c{len(self.constants)}"
         self.constants[name] = value
+        return name
+
+    def default(self, function: str, parameter: Parameter) -> str:
+        """Return a name for the default of a built-in function's parameter."""
+        name = f"d_{function}_{parameter.name}"
+        self.constants[name] = parameter.default
         return name
 
     def index(self, node: tree.Index) -> ast.expr:
@@ -218,7 +227,7 @@ class Expressions:
         self.cost += signature.cost - 1
         self.works = self.works or signature.linear
         known = [
-            (parameter.name, None if parameter.default is REQUIRED else self.keep(parameter.default))
+            (parameter.name, None if parameter.default is REQUIRED else self.default(node.name, parameter))
             for parameter in signature.parameters
         ]
         call = at.call(f"b_{node.name}", *self.arguments(node, known))
