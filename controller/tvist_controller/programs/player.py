@@ -175,8 +175,9 @@ class ProgramPlayer:
         """Handle the end of a program; the arm comes to rest with it."""
         if running not in self._all:
             return
+        moves = running is self._main and (self.arm.moves or self.arm.guides)
         self._close(running)
-        if running.script.used & MOVING and self._motion.activity in {Activity.GUIDED, Activity.MOVING}:
+        if moves:
             self._motion.stop(None, "the program has ended")
 
     def _close(self, running: _Running, why: str | None = None) -> None:
