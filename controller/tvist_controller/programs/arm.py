@@ -108,8 +108,11 @@ class ProgramArm:
         yield from self._come_to_rest()
         while path.legs:
             self.waypoint = path.legs[-1]
+            yield from self._wait_for_unlock()
             self._check_ready()
             plan = yield from self._planned(path.legs)
+            if self._motion.activity.protective:
+                continue
             if isinstance(plan.found, RefusalError):
                 self._refused(plan.found, path.legs)
                 yield  # in a protective stop the program is paused here, and tries again when it is resumed
@@ -162,6 +165,11 @@ class ProgramArm:
             effect()
         effects.clear()
 
+    def _wait_for_unlock(self) -> Turns:
+        """Wait in a protective stop that another thread has just caused; the program is paused then."""
+        while self._motion.activity.protective:
+            yield
+
     def _check_ready(self) -> None:
         try:
             self._motion.check("move_j")
@@ -178,9 +186,11 @@ class ProgramArm:
     def _come_to_rest(self) -> Turns:
         """Stop what still moves."""
         motion = self._motion
+        if motion.activity is Activity.STREAMING:
+            raise Fault("a client streams set-points to the arm, so the program cannot move it")
         if motion.activity in {Activity.GUIDED, Activity.MOVING, Activity.PAUSED}:
             self.brake(lambda: self._access.guidance.stop_joints(BRAKING))
-        while motion.activity.moving:
+        while motion.activity.moving and not motion.activity.protective:
             yield
 
     # ------------------------------------------------------------------ guided motions
@@ -197,12 +207,15 @@ class ProgramArm:
         """
         yield from self.finish()
         with self._moving():
+            yield from self._wait_for_unlock()
             self.steer(start)
             yield from wait()
 
     def steer(self, start: Callable[[bool], int]) -> None:
-        """Begin or change a guided motion within a call of `guide`; see there."""
+        """Begin or change a guided motion within a call of `guide`; see there. In a protective stop nothing happens."""
         motion = self._motion
+        if motion.activity.protective:
+            return
         shaped = self._access.shape_guided and (
             motion.activity is Activity.REST
             or (motion.activity is Activity.GUIDED and not motion.cycle.unshaped)
