@@ -133,7 +133,7 @@ class ProgramArm:
         """Start a planned motion; return where its blends begin, see `PlannedMove.marks`."""
         try:
             reply = self._access.send(_command(legs), plan)
-        except RefusalError as refusal:  # a client has moved the arm meanwhile
+        except RefusalError as refusal:
             raise Fault(refusal.reply.why) from refusal
         assert isinstance(reply, Accepted)
         assert isinstance(plan.found, PlannedMove)
@@ -148,6 +148,8 @@ class ProgramArm:
         ordered = access.order(command)
         for _ in range(DELAY + DELAY_PER_PART * (len(legs) - 1)):
             yield
+        yield from self._come_to_rest()  # a client may have moved the arm meanwhile
+        self._check_ready()
         plan = ordered()
         return plan if plan.holds(access.basis()) else access.plan(command)
 
@@ -176,11 +178,11 @@ class ProgramArm:
         self._motion.protect(f"the program's move was refused: {reply.why}", reply.code)
 
     def _come_to_rest(self) -> Turns:
-        """Stop what still moves."""
+        """Stop what still moves. In a protective stop of this tick the program is paused here."""
         motion = self._motion
         if motion.activity in {Activity.GUIDED, Activity.MOVING, Activity.PAUSED}:
             self.brake(lambda: self._access.guidance.stop_joints(BRAKING))
-        while motion.activity.moving:
+        while motion.activity.moving or motion.activity.protective:
             yield
 
     # ------------------------------------------------------------------ guided motions
@@ -197,6 +199,8 @@ class ProgramArm:
         """
         yield from self.finish()
         with self._moving():
+            while self._motion.activity.protective:  # of this tick: the program is paused here
+                yield
             self.steer(start)
             yield from wait()
 
