@@ -92,3 +92,32 @@ def test_a_protective_stop_of_one_thread_pauses_the_servoc_of_another():
     assert robot.send(ProgramPlay) == Done()
     finish(robot)
     assert said(robot) == ["1"]
+
+
+GUIDED = (
+    f"servoj({NEAR}, t=0.2)",
+    f"servoc(p{[x, y + 0.1, z, *turn]}, a=1.0, v=0.1)",
+    "speedj([0.1, 0, 0, 0, 0, 0], 1, 0.2)",
+    "speedl([0, 0.1, 0, 0, 0, 0], 1, 0.2)",
+)
+
+
+@pytest.mark.parametrize("move", GUIDED)
+def test_a_guided_motion_waits_until_the_program_before_has_come_to_rest(move):
+    robot = a_robot()
+    start(robot, "speedj([0.5, 0, 0, 0, 0, 0], 2, 9)")
+    robot.tick(200)
+    start(robot, move, "textmsg(1)")
+    finish(robot)
+    assert failure(robot) is None
+    assert said(robot) == ["1"]
+
+
+@pytest.mark.parametrize("move", GUIDED)
+def test_a_guided_motion_waits_for_the_stop_of_a_thread_that_has_ended(move):
+    robot = a_robot()
+    start(robot, "thread turn():", "  speedj([0.5, 0, 0, 0, 0, 0], 2, 0.2)", "end", "join run turn()", "sync()",
+          move, "textmsg(1)")  # fmt: skip
+    finish(robot)
+    assert failure(robot) is None
+    assert said(robot) == ["1"]

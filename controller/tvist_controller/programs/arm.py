@@ -13,7 +13,7 @@ from tvist_protocol.commands import MoveJ
 from tvist_protocol.motions import JointSegment, LineSegment, MoveL, MovePath, Segment
 from tvist_protocol.replies import Accepted
 from tvist_protocol.stream import Event
-from tvist_protocol.transitions import Activity
+from tvist_protocol.transitions import Activity, after
 from tvist_urscript import Fault
 
 Turns = Generator[None, None, None]
@@ -199,10 +199,16 @@ class ProgramArm:
         """
         yield from self.finish()
         with self._moving():
-            while self._motion.activity.protective:  # of this tick: the program is paused here
+            while self.stopping:
                 yield
             self.steer(start)
             yield from wait()
+
+    @property
+    def stopping(self) -> bool:
+        """Whether a guided motion has to wait: for a stop under way, or in a protective stop of this tick."""
+        activity = self._motion.activity
+        return (activity.moving or activity.protective) and after(activity, "speed_j") is None
 
     def steer(self, start: Callable[[bool], int]) -> None:
         """Begin or change a guided motion within a call of `guide`; see there."""
