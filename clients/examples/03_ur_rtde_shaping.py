@@ -74,7 +74,9 @@ def vibration(file: Path) -> tuple[list[float], list[float]]:
     """Times after the end of the commanded motion [s], and the tool's acceleration without gravity then [m/s²]."""
     with file.open(encoding="utf-8", newline="") as lines:
         rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(lines)]
-    moving = [row["timestamp"] for row in rows if any(abs(row[f"target_qd_{joint}"]) > 1e-6 for joint in range(6))]
+    moving = [
+        row["timestamp"] for row in rows if any(abs(row[f"target_qd_{joint}"]) > 1e-6 for joint in range(6))
+    ]
     times, shaking = [], []
     for row in rows:
         time = row["timestamp"] - moving[-1]
@@ -82,7 +84,9 @@ def vibration(file: Path) -> tuple[list[float], list[float]]:
             measured = [row[f"actual_tool_accelerometer_{axis}"] for axis in range(3)]
             up = upwards([row[f"actual_TCP_pose_{axis}"] for axis in range(3, 6)])
             times.append(time)
-            shaking.append(math.hypot(*(one - GRAVITY * other for one, other in zip(measured, up, strict=True))))
+            shaking.append(
+                math.hypot(*(one - GRAVITY * other for one, other in zip(measured, up, strict=True)))
+            )
     return times, shaking
 
 
@@ -104,10 +108,14 @@ def main() -> None:
             log(shaper, file)
             times, shaking = vibration(file)
             still = max(time for time, one in zip(times, shaking, strict=True) if one > LOUD)
-            print(f"{label}: the tool shook until {1000 * still:.0f} ms after the end of the commanded motion")
+            print(
+                f"{label}: the tool shook until {1000 * still:.0f} ms after the end of the commanded motion"
+            )
             axes.plot(times, shaking, color=colour, label=label, linewidth=1.0)
     axes.axvline(0.0, color="#8A8A8A", linewidth=0.8)
-    axes.set(xlabel="time after the end of the commanded motion [s]", ylabel="acceleration of the tool [m/s²]")
+    axes.set(
+        xlabel="time after the end of the commanded motion [s]", ylabel="acceleration of the tool [m/s²]"
+    )
     axes.set(xlim=(FROM, UNTIL), ylim=(0.0, 2.0))
     axes.legend(frameon=False)
     figure.savefig(FIGURE)
