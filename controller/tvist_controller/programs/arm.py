@@ -108,18 +108,16 @@ class ProgramArm:
         yield from self._come_to_rest()
         while path.legs:
             self.waypoint = path.legs[-1]
+            yield from self._wait_for_unlock()
             self._check_ready()
             plan = yield from self._planned(path.legs)
+            if self._motion.activity.protective:
+                continue
             if isinstance(plan.found, RefusalError):
                 self._refused(plan.found, path.legs)
                 yield  # in a protective stop the program is paused here, and tries again when it is resumed
                 continue
-            command = _command(path.legs)
-            reply = self._access.send(command, plan)
-            assert isinstance(reply, Accepted)
-            assert isinstance(plan.found, PlannedMove)
-            self._number, self._outcome = reply.id, None
-            marks = plan.found.marks
+            marks = self._start(path.legs, plan)
             passed = 0
             while self._outcome is None:
                 yield
@@ -133,6 +131,17 @@ class ProgramArm:
             else:
                 yield from self._come_to_rest()
             del path.legs[:passed], path.effects[:passed]
+
+    def _start(self, legs: list[Segment], plan: Plan) -> tuple[tuple[int, float], ...]:
+        """Start a planned motion; return where its blends begin, see `PlannedMove.marks`."""
+        try:
+            reply = self._access.send(_command(legs), plan)
+        except RefusalError as refusal:  # a client has moved the arm meanwhile
+            raise Fault(refusal.reply.why) from refusal
+        assert isinstance(reply, Accepted)
+        assert isinstance(plan.found, PlannedMove)
+        self._number, self._outcome = reply.id, None
+        return plan.found.marks
 
     def _planned(self, legs: list[Segment]) -> Generator[None, None, Plan]:
         """The plan of a move. Lines and paths begin a fixed time after it is ordered."""
@@ -156,6 +165,11 @@ class ProgramArm:
             effect()
         effects.clear()
 
+    def _wait_for_unlock(self) -> Turns:
+        """Wait in a protective stop that another thread has just caused; the program is paused then."""
+        while self._motion.activity.protective:
+            yield
+
     def _check_ready(self) -> None:
         try:
             self._motion.check("move_j")
@@ -172,9 +186,11 @@ class ProgramArm:
     def _come_to_rest(self) -> Turns:
         """Stop what still moves."""
         motion = self._motion
+        if motion.activity is Activity.STREAMING:
+            raise Fault("a client streams set-points to the arm, so the program cannot move it")
         if motion.activity in {Activity.GUIDED, Activity.MOVING, Activity.PAUSED}:
             self.brake(lambda: self._access.guidance.stop_joints(BRAKING))
-        while motion.activity.moving:
+        while motion.activity.moving and not motion.activity.protective:
             yield
 
     # ------------------------------------------------------------------ guided motions
@@ -191,19 +207,26 @@ class ProgramArm:
         """
         yield from self.finish()
         with self._moving():
-            motion = self._motion
-            shaped = self._access.shape_guided and (
-                motion.activity is Activity.REST
-                or (motion.activity is Activity.GUIDED and not motion.cycle.unshaped)
-            )
-            self._number, self._outcome, self._own = None, None, True
-            try:
-                self._guided, self._driver = start(shaped), self._thread()
-            except RefusalError as refusal:
-                raise Fault(refusal.reply.why) from refusal
-            finally:
-                self._own = False
+            yield from self._wait_for_unlock()
+            self.steer(start)
             yield from wait()
+
+    def steer(self, start: Callable[[bool], int]) -> None:
+        """Begin or change a guided motion within a call of `guide`; see there. In a protective stop nothing happens."""
+        motion = self._motion
+        if motion.activity.protective:
+            return
+        shaped = self._access.shape_guided and (
+            motion.activity is Activity.REST
+            or (motion.activity is Activity.GUIDED and not motion.cycle.unshaped)
+        )
+        self._number, self._outcome, self._own = None, None, True
+        try:
+            self._guided, self._driver = start(shaped), self._thread()
+        except RefusalError as refusal:
+            raise Fault(refusal.reply.why) from refusal
+        finally:
+            self._own = False
 
     def in_motion(self, seconds: float) -> Iterator[None]:
         """Let a time pass that is the motion's own: it lasts longer at a lower speed [s]. At least a tick passes."""
