@@ -3,8 +3,13 @@
 import os
 import signal
 import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from tvist_server.ending import ending_signals
+
+if TYPE_CHECKING:
+    import cyclopts
 
 COMMANDS = {
     "serve": "Run a robot on the network.",
@@ -29,6 +34,7 @@ COMMANDS = {
     "search": "Search for cases in which a robot breaks its promises.",
     "bench": "Measure how fast tvist runs on this machine.",
     "keys": "Create TLS certificates for a robot and its clients.",
+    "completion": "Print the script by which a shell completes commands and options.",
 }
 """The commands with their one-line help, in the order in which a new user meets them."""
 
@@ -49,23 +55,18 @@ def _default(value: object) -> str | None:
     return "on" if value is True else f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _run() -> None:
-    if sys.argv[1:2] == ["serve"]:
-        # Nothing is served yet, so a signal can end the process at once. As the first process of a container,
-        # it has no default action for signals.
-        for number in ending_signals():
-            if number != signal.SIGINT:
-                signal.signal(number, lambda *_: os._exit(0))
-    # The matrices are small: threads for them would only slow down each other and the control loop.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+def application(called: Sequence[str] = ()) -> "cyclopts.App":
+    """Return the program's commands and options, as the parser knows them.
+
+    Args:
+        called: The command that was called, if any: its own help is its docstring, while the list of all commands has
+            their short ones.
+    """
     from importlib.metadata import version
 
-    try:
-        import cyclopts
-    except ImportError:
-        sys.exit("tvist: the command line needs the server's packages: pip install 'tvist[lab]'")
-    from tvist_cli.failure import Failure, told
-    from tvist_cli.misuse import check_whole, finite, readable, sentence
+    import cyclopts
+
+    from tvist_cli.misuse import check_whole, finite
 
     app = cyclopts.App(
         name="tvist",
@@ -77,11 +78,32 @@ def _run() -> None:
     )
     for place, (name, what) in enumerate(COMMANDS.items()):
         module = name.replace("-", "_")
-        # Its own help is its docstring, the list of all commands has the short one.
-        whole = sys.argv[1:2] == [name]
         app.command(
-            f"tvist_cli.commands.{module}:{module}", name=name, help=None if whole else what, sort_key=place
+            f"tvist_cli.commands.{module}:{module}",
+            name=name,
+            help=None if name in called else what,
+            sort_key=place,
         )
+    return app
+
+
+def _run() -> None:
+    if sys.argv[1:2] == ["serve"]:
+        # Nothing is served yet, so a signal can end the process at once. As the first process of a container,
+        # it has no default action for signals.
+        for number in ending_signals():
+            if number != signal.SIGINT:
+                signal.signal(number, lambda *_: os._exit(0))
+    # The matrices are small: threads for them would only slow down each other and the control loop.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    try:
+        import cyclopts
+    except ImportError:
+        sys.exit("tvist: the command line needs the server's packages: pip install 'tvist[lab]'")
+    from tvist_cli.failure import Failure, told
+    from tvist_cli.misuse import readable, sentence
+
+    app = application(sys.argv[1:2])
     try:
         with told(OSError):  # a folder for figures that is none, mostly
             app(readable(sys.argv[1:]), exit_on_error=False, print_error=False)

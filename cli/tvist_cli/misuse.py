@@ -26,8 +26,11 @@ _KINDS: dict[object, str] = {int: "a whole number", float: "a number", bool: "tr
 
 
 def readable(arguments: Iterable[str]) -> list[str]:
-    """Put a blank before every list of angles that begins with a minus, so that it is not taken for an option."""
-    return [f" {argument}" if _ANGLES.fullmatch(argument) else argument for argument in arguments]
+    """Put a blank before what begins with a minus but is no option: lists of angles, and `-` for the standard input."""
+    return [
+        f" {argument}" if argument == "-" or _ANGLES.fullmatch(argument) else argument
+        for argument in arguments
+    ]
 
 
 def lower(name: str | None) -> str | None:

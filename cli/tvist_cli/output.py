@@ -19,9 +19,9 @@ from tvist_cli.failure import interrupted
 
 WIDTH = 120
 """Number of columns when the output is not a terminal."""
-out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH)
+out = Console(highlight=False, emoji=False, width=None if sys.stdout.isatty() else WIDTH)
 """Results."""
-err = Console(stderr=True, highlight=False, width=None if sys.stderr.isatty() else WIDTH)
+err = Console(stderr=True, highlight=False, emoji=False, width=None if sys.stderr.isatty() else WIDTH)
 """Progress and messages, on stderr so that they do not mix with `--json`."""
 
 

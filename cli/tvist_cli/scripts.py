@@ -1,6 +1,7 @@
 """Reading of programs in URScript, and what is wrong with them."""
 
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tvist_cli.failure import Failure, told
@@ -12,12 +13,12 @@ STDIN = "-"
 """Name that stands for the standard input."""
 
 
-def named(file: str) -> str:
+def named(file: Path) -> str:
     """Return how messages call a file."""
-    return "<stdin>" if file == STDIN else file
+    return "<stdin>" if _is_stdin(file) else str(file)
 
 
-def read_script(file: str) -> str:
+def read_script(file: Path) -> str:
     """Read a program; `-` reads the standard input.
 
     Raises:
@@ -25,7 +26,7 @@ def read_script(file: str) -> str:
     """
     from tvist_plant.user_file import LARGEST, UserFileError, read_text
 
-    if file == STDIN:
+    if _is_stdin(file):
         content = sys.stdin.buffer.read(LARGEST + 1)
         if len(content) > LARGEST:
             raise Failure(
@@ -36,14 +37,19 @@ def read_script(file: str) -> str:
         except UnicodeDecodeError as error:
             why = f"the standard input is not text in UTF-8 ({error.reason} at byte {error.start})"
             raise Failure(why, code=2) from error
-    try:
-        with told(OSError, code=2):
+    with told(OSError, code=2):
+        try:
             return read_text(file, "program")
-    except UserFileError as error:
-        raise Failure(str(error), code=2) from error
+        except UserFileError as error:
+            raise Failure(str(error), code=2) from error
 
 
-def placed(file: str, finding: "Finding") -> str:
+def placed(file: Path, finding: "Finding") -> str:
     """Return a finding as FILE:LINE:COLUMN: text, which editors understand."""
     kind = "" if finding.level == "error" else f"{finding.level}: "
     return f"{named(file)}:{finding.line}:{finding.column}: {kind}{finding.text}"
+
+
+def _is_stdin(file: Path) -> bool:
+    """Whether a file is the standard input; a blank before the name keeps it from being taken for an option."""
+    return str(file).strip() == STDIN

@@ -5,11 +5,11 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from tvist_protocol.client_message import ClientMessage
-from tvist_protocol.values import Token
+from tvist_protocol.values import PROGRAM_NAME_PATTERN, Token
 
 ProgramState = Literal["STOPPED", "PLAYING", "PAUSED"]
 """State of the loaded program."""
-ProgramName = Annotated[str, Meta(min_length=1, max_length=256)]
+ProgramName = Annotated[str, Meta(pattern=PROGRAM_NAME_PATTERN)]
 
 
 MAX_SCRIPT = 1 << 20

@@ -21,7 +21,11 @@ wildcard matches a chunk that begins with `@`, so the server would not notice wh
 SESSION_PATTERN = r"^[0-9a-f]{1,32}$(?!\n)"
 """Zenoh's id of a session."""
 
+PROGRAM_NAME_PATTERN = r"^[^\x00-\x1f\x7f]{1,256}$(?!\n)"
+"""Pattern of a program's name."""
+
 PATTERN_MEANINGS: dict[str, str] = {
+    PROGRAM_NAME_PATTERN: "1 to 256 characters other than control characters",
     ROBOT_NAME_PATTERN: "1 to 64 of a-z 0-9 _ -, the first a letter or a digit",
     SESSION_PATTERN: "1 to 32 of 0-9 a-f, Zenoh's id of a session",
     CLIENT_NAME_PATTERN: "1 to 64 printable ASCII characters other than / * ? # $, the first not @",

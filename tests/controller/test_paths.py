@@ -308,7 +308,7 @@ def test_a_change_of_the_tool_is_part_of_the_plan():
     robot = begun()
     controller = robot.controller
     line = MoveL(token=robot.token, pose=away((0.05, 0.05, 0.0), tcp=TOOL))
-    stale = controller._planner.plan(line, controller.basis)
+    stale = controller._commands.plan(line)
     assert stale.holds(controller.basis)
     robot.send(SetTcp, offset=TOOL)
     assert not stale.holds(controller.basis)

@@ -3,10 +3,7 @@
 import json
 import math
 import struct
-import subprocess
-import sys
 import time
-from pathlib import Path
 from types import SimpleNamespace
 
 import msgspec
@@ -14,6 +11,7 @@ import pytest
 from tests.conformance.served import PATIENCE, Served
 from tests.conformance.wire import Q1, Wire
 from tests.places import own_address
+from tests.system.ur_object import Client, started
 
 from tvist_controller.instruments.snapshot import Instruments
 from tvist_lab.mcap_file import read
@@ -24,7 +22,6 @@ pytestmark = pytest.mark.realtime
 
 pytest.importorskip("rtde_receive")
 
-HERE = Path(__file__).parent
 FAR = [0.6, -2.9, 0.3, -1.4, 0.2, 0.4]
 TICK, BOOTED = 0.002, 40.0
 OF_STATE = {
@@ -83,44 +80,6 @@ MADE_BY_THE_CLIENT = {
     "isProtectiveStopped": lambda of: bool(of.safety_status_bits >> 2 & 1),
 }
 """Getters whose values the client makes of several."""
-
-
-def started(program, *arguments):
-    """A program of this folder: a process of its own, whose threads keep nobody."""
-    command = [sys.executable, str(HERE / program), *map(str, arguments)]
-    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-
-
-class Client:
-    """An object of ur-rtde: has its methods. What it raises is an AssertionError."""
-
-    def __init__(self, module, kind, host):
-        self.process = started("ur_caller.py", module, kind, host)
-
-    def __enter__(self):
-        try:
-            self._answer()
-        except BaseException:
-            self.__exit__()
-            raise
-        return self
-
-    def __exit__(self, *error):
-        self.process.kill()
-        self.process.communicate()
-
-    def __getattr__(self, method):
-        def call(*arguments):
-            self.process.stdin.write(json.dumps([method, *arguments]) + "\n")
-            self.process.stdin.flush()
-            return self._answer()
-
-        return call
-
-    def _answer(self):
-        said = json.loads(self.process.stdout.readline())
-        assert "raised" not in said, said["raised"]
-        return said["returned"]
 
 
 def until(call, wanted):

@@ -1,6 +1,7 @@
 """Random programs: valid ones from the grammar, and texts that have been spoilt."""
 
 import random
+import re
 
 GLOBALS = ["g0", "g1", "g2", "time", "p"]
 NUMBERS = ["0", "1", "2", "3", "-1", "0.5", "1e-3", "2147483647", "1e300", "7"]
@@ -8,7 +9,8 @@ TEXTS = ['""', '"a"', '"some text"']
 OPERATORS = ["+", "-", "*", "/", "%", "==", "!=", "<", ">", "<=", ">=", "and", "or", "xor"]
 PURE = [
     ("sin", 1), ("sqrt", 1), ("norm", 1), ("floor", 1), ("pow", 2), ("str_cat", 2), ("to_str", 1), ("length", 1),
-    ("pose_trans", 2), ("pose_inv", 1), ("get_list_length", 1), ("make_list", 2), ("integer_to_binary_list", 1), ("str_sub", 2),
+    ("pose_trans", 2), ("pose_inv", 1), ("get_list_length", 1), ("make_list", 2), ("integer_to_binary_list", 1),
+    ("str_sub", 2),
     ("inv", 1), ("transpose", 1), ("size", 1), ("atan2", 2), ("to_num", 1), ("interpolate_pose", 3),
 ]  # fmt: skip
 
@@ -36,8 +38,8 @@ class Writer:
             self.line(
                 f"global {name} = {self.random.choice([*NUMBERS, *TEXTS, '[1, 2, 3]', 'p[1, 2, 3, 0.1, 0.2, 0.3]'])}"
             )
-        self.functions = [(f"f{k}", self.random.randrange(4)) for k in range(self.random.randrange(4))]
-        self.threads = [f"t{k}" for k in range(self.random.randrange(3))]
+        self.functions = [(f"f{k}", self.random.randrange(4)) for k in range(self.random.randrange(3))]
+        self.threads = [f"t{k}" for k in range(self.random.randrange(2))]
         for name, count in self.functions:
             names = [f"a{k}" for k in range(count)]
             parameters = [n if k + 1 < count else f"{n}={self.atom([])}" for k, n in enumerate(names)]
@@ -57,7 +59,7 @@ class Writer:
             self.random.choice(["", " ", "\t", "    "]) + text + self.random.choice(["", "", "  # why"])
         )
 
-    def body(self, names, *, loop, most=4):
+    def body(self, names, *, loop, most=3):
         self.depth += 1
         for _ in range(self.random.randrange(most + 1)):
             self.statement(names, loop)
@@ -72,7 +74,7 @@ class Writer:
         elif pick < 11 and self.depth < 4:
             self.line(f"if {self.expression(names)}:")
             self.body(names, loop=loop)
-            for _ in range(self.random.choice([0, 0, 0, 0, 1, 1, 2, 17])):
+            for _ in range(self.random.choice([0, 0, 0, 0, 0, 0, 1, 1, 1, 2, 2, 17])):
                 self.line(f"elif {self.expression(names)}:")
                 self.body(names, loop=loop, most=2)
             if self.random.random() < 0.5:
@@ -121,7 +123,7 @@ class Writer:
 
     def expression(self, names, depth=0):
         pick = self.random.randrange(12)
-        if depth > 3 or pick < 5:
+        if depth > 2 or pick < 5:
             return self.atom(names)
         if self.sane:
             return self.number(names, depth, pick)
@@ -181,13 +183,19 @@ def spoilt(seed):
     """A program that has lost, doubled or changed some of its text, or is no text at all."""
     dice = random.Random(seed)
     text = valid(seed)
-    kind = dice.randrange(6)
+    kind = dice.randrange(8)
     if kind == 0:
         return text[: dice.randrange(len(text))]
     if kind == 1:
         return "".join(
             chr(dice.choice([dice.randrange(256), dice.randrange(32, 127)]))
             for _ in range(dice.randrange(200))
+        )
+    if kind > 5:
+        return re.sub(
+            r"\b\d+\b",
+            lambda found: dice.choice([found[0], found[0], "None", '"a"', "[0]", "-1", "g1"]),
+            text,
         )
     for _ in range(dice.randrange(1, 4)):
         place = dice.randrange(len(text))

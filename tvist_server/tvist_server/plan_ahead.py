@@ -126,7 +126,12 @@ class PlanAhead:
 
     def _run(self) -> None:
         while (waiting := self._queue.get()) is not None:
-            self._hand_over(waiting)
+            try:
+                self._hand_over(waiting)
+            except Exception:
+                log.exception("a command is refused, since its preparation failed")
+                answer = waiting.answer
+                self._post(lambda answer=answer: answer(_FAILED))  # type: ignore[misc]
             with self._lock:
                 self._count -= 1
                 self._commands -= not isinstance(waiting.admitted.command, QUESTIONS)

@@ -61,8 +61,8 @@ class ProgramFolder:
                 data = read_bytes(path, "program")
             except FileNotFoundError:
                 continue
-            except OSError as error:
-                raise UserFileError(f"program {path}: {error.strerror}") from error
+            except (OSError, ValueError) as error:  # a name may have characters that no file's name has
+                raise UserFileError(f"program {str(path)!r} cannot be read: {error}") from error
             return _checked(path, _text(path, data))
         return None
 
@@ -107,7 +107,7 @@ def _text(path: Path, data: bytes) -> str:
     if data.lstrip().startswith(_XML):
         return _of_polyscope(path, data)
     try:
-        return data.decode()
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise UserFileError(f"program {path} is not text in UTF-8: byte {error.start}") from error
 
@@ -122,7 +122,7 @@ def _of_polyscope(path: Path, data: bytes) -> str:
     if b"<!DOCTYPE" not in data:  # its entities could expand without end
         try:
             nodes = ET.fromstring(data).findall("./children/MainProgram/children/*")  # noqa: S314  see above
-        except ET.ParseError as error:
+        except (ET.ParseError, LookupError, ValueError) as error:  # the last two: of an unknown encoding
             raise UserFileError(f"program {path} is not valid XML: {error}") from error
     if [node.tag.lower() for node in nodes] != ["script"]:
         found = ", ".join(node.tag for node in nodes) or "none"

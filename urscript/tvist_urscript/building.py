@@ -6,7 +6,7 @@ from lark import Token, Transformer
 
 from tvist_urscript import tree
 from tvist_urscript.errors import ScriptError, syntax_error
-from tvist_urscript.values import LONGEST_TEXT, whole
+from tvist_urscript.values import LONGEST_TEXT, to_bytes, whole
 
 DEEPEST = 100
 """Levels of expressions inside each other, where a block counts as BLOCK of them."""
@@ -63,14 +63,16 @@ class Builder(Transformer[Token, Any]):
     def assign(self, children: Children) -> tree.Assign:
         *qualifier, target, equal, value = children
         indices: list[tree.Expression] = []
-        inner = target
+        inner, bracket = target, target
         while isinstance(inner, tree.Index):
             indices[:0] = inner.indices
-            inner = inner.value
+            inner, bracket = inner.value, inner
         if not isinstance(inner, tree.Name):
-            raise _syntax(equal, "only a variable or an element of one can be assigned")
+            raise _syntax(
+                inner if qualifier else equal, "only a variable or an element of one can be assigned"
+            )
         if qualifier and indices:
-            raise _syntax(qualifier[0], f"{qualifier[0]} declares a variable, not an element")
+            raise _syntax(bracket, f"{qualifier[0]} declares a variable, not an element")
         node = tree.Assign(
             inner.line,
             inner.column,
@@ -125,7 +127,7 @@ class Builder(Transformer[Token, Any]):
     def text(self, children: Children) -> tree.Constant:
         (token,) = children
         value = str(token)[1:-1]
-        if len(value.encode(errors="surrogatepass")) > LONGEST_TEXT:
+        if len(to_bytes(value)) > LONGEST_TEXT:
             raise _syntax(token, f"a text is too long, the limit is {LONGEST_TEXT} bytes")
         return tree.Constant(token.line, token.column, value)
 
@@ -181,7 +183,7 @@ def _deeper(node: T, *parts: list[Any]) -> T:
     return node
 
 
-def _syntax(token: Token, why: str) -> ScriptError:
+def _syntax(token: Token | tree.Node, why: str) -> ScriptError:
     assert token.line is not None
     assert token.column is not None
     return ScriptError(token.line, token.column, syntax_error(token.line, why))

@@ -9,6 +9,8 @@ from tvist_urscript.errors import ScriptError
 from tvist_urscript.machine import Machine
 from tvist_urscript.values import Value
 
+BUDGET = 20_000
+"""Evaluations of a tick: many more than beside a robot, as nothing else has to run in it."""
 LONGEST_RUN = 100_000
 """Ticks after which a run is given up: 200 s of the robot's time."""
 
@@ -49,7 +51,7 @@ def dry_run(
         machine = Machine(script, {name: entry[1] for name, entry in table.items()})
         while machine.running and run.ticks < longest:
             run.ticks += 1
-            machine.resume()
+            machine.resume(BUDGET)
     except ScriptError as error:
         run.error = error
         return run

@@ -8,13 +8,14 @@ from tvist_urscript.arithmetic import NUMBERS
 from tvist_urscript.errors import name_not_found
 from tvist_urscript.names import BUILT_IN_ARRAYS, Scope
 from tvist_urscript.pieces import DEPTH, MISSING, Position
-from tvist_urscript.signatures import REQUIRED, Signatures
+from tvist_urscript.signatures import REQUIRED, Parameter, Signatures
 from tvist_urscript.values import LONGEST, Array, Pose
 
 MOST_OPERATIONS = 1000
 """Evaluations of one statement; beyond them nothing could interrupt it in time."""
 
 ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "remainder"}
+SCALING, SUMS = "*/", "+-"
 ORDER: dict[str, type[ast.cmpop]] = {"<": ast.Lt, ">": ast.Gt, "<=": ast.LtE, ">=": ast.GtE}
 EQUALITY: dict[str, tuple[type[ast.cmpop], str]] = {
     "==": (ast.Eq, "is_equal"),
@@ -30,6 +31,7 @@ class Expressions:
     Attributes:
         scope: What names mean here.
         cost: Evaluations of what has been translated since it was set to 0.
+        works: What has been translated since it was reset may work on lists, and so take more than that.
         used: Built-in functions that the script calls.
         constants: Lists and default values, by the names that compiled functions have for them.
     """
@@ -39,6 +41,7 @@ class Expressions:
         self.report = report
         self.scope: Scope
         self.cost = 0
+        self.works = False
         self.used: set[str] = set()
         self.constants: dict[str, object] = {}
         self.globals: set[str] = set()
@@ -60,6 +63,7 @@ class Expressions:
                 return self.listing(node)
             case tree.Unary(operator="-"):
                 self.cost += 1
+                self.works = True
                 return Position.of(node).call("negate", self.value(node.value))
             case tree.Unary():
                 return Position.of(node).invert(self.test(node.value))
@@ -103,12 +107,16 @@ class Expressions:
         self.cost += 1
         left, right = self.value(node.left), self.value(node.right)
         if node.operator in ARITHMETIC:
+            has_constant = isinstance(node.left, tree.Constant) or isinstance(node.right, tree.Constant)
+            if node.operator in SCALING or (node.operator in SUMS and not has_constant):
+                self.works = True
             return at.call(ARITHMETIC[node.operator], left, right)
         if node.operator in ORDER:
             return at.compare(left, ORDER[node.operator](), right)
         operator, function = EQUALITY[node.operator]
         if isinstance(node.left, tree.Constant) or isinstance(node.right, tree.Constant):
             return at.compare(left, operator(), right)
+        self.works = True
         return at.call(function, left, right)
 
     def listing(self, node: tree.Listing) -> ast.expr:
@@ -131,6 +139,12 @@ class Expressions:
         """Return a name for a value that compiled functions use."""
         name = f"c{len(self.constants)}"
         self.constants[name] = value
+        return name
+
+    def default(self, function: str, parameter: Parameter) -> str:
+        """Return a name for the default of a built-in function's parameter."""
+        name = f"d_{function}_{parameter.name}"
+        self.constants[name] = parameter.default
         return name
 
     def index(self, node: tree.Index) -> ast.expr:
@@ -211,8 +225,9 @@ class Expressions:
             return at.constant(None)
         self.used.add(node.name)
         self.cost += signature.cost - 1
+        self.works = self.works or signature.linear
         known = [
-            (parameter.name, None if parameter.default is REQUIRED else self.keep(parameter.default))
+            (parameter.name, None if parameter.default is REQUIRED else self.default(node.name, parameter))
             for parameter in signature.parameters
         ]
         call = at.call(f"b_{node.name}", *self.arguments(node, known))
@@ -247,6 +262,7 @@ class Expressions:
                 name = names[place]
             elif name not in names:
                 self.report(argument.line, argument.column, f"{node.name} has no parameter {name}")
+                return []
             if name in given:
                 self.report(argument.line, argument.column, f"{node.name} is given {name} twice")
             given[name] = value

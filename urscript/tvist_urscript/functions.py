@@ -25,6 +25,8 @@ class Functions(Statements):
         """
         function = scope.function
         self.scope = scope
+        if scope.outer is not None and function.kind == "sec":
+            self.report(function.line, function.column, "only a whole program can be a sec")
         for twice in scope.twice:
             self.report(twice.line, twice.column, f"{twice.name} is defined twice")
         if scope.outer is not None or _length(function.body) <= PART:

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from tvist_urscript.arithmetic import Work
 from tvist_urscript.errors import Fault
 from tvist_urscript.values import Array, Pose, Value, integer, kind, number
 
@@ -27,15 +28,18 @@ def element_of_matrix(value: Value, row: Any, column: Any) -> Value:
     return element(element(value, row), column)
 
 
-def replaced(new: Value, indices: tuple[Any, ...], value: Value) -> Array:
+def replaced(new: Value, indices: tuple[Any, ...], value: Value, work: Work) -> Array:
     """Return the list in which the element at these indices is another.
+
+    Copying four elements counts as one evaluation.
 
     Raises:
         Fault: As `element`, or a pose would get an element that is no number.
     """
     whole = _array(value)
     place = _place(indices[0], whole)
-    inner = new if len(indices) == 1 else replaced(new, indices[1:], whole.items[place])
+    inner = new if len(indices) == 1 else replaced(new, indices[1:], whole.items[place], work)
+    work(len(whole.items) // 4)
     items = list(whole.items)
     if type(whole) is Pose:
         items[place] = number(inner, "an element of a pose")
@@ -53,9 +57,9 @@ def _array(value: Value) -> Array:
 def _place(index: Any, value: Array) -> int:
     place = integer(index, "a list index")
     length = len(value.items)
-    what = "pose" if type(value) is Pose else "list"
+    has = f"the {'pose' if type(value) is Pose else 'list'} has {length} element{'' if length == 1 else 's'}"
     if place < 0:
-        raise Fault(f"list index {place} is negative: the {what} has {length} elements")
+        raise Fault(f"list index {place} is negative: {has}")
     if place >= length:
-        raise Fault(f"list index {place} is beyond the end: the {what} has {length} elements")
+        raise Fault(f"list index {place} is beyond the end: {has}")
     return place

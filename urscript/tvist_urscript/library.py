@@ -53,9 +53,35 @@ _TABLE: list[tuple[str, str, Callable[..., Any]]] = [
     ("wrench_trans", "T_from_to, w_from", poses.wrench_trans),
 ]
 
-_LINEAR = {"binary_list_to_integer", "inv", "norm", "normalize", "size", "str_cat", "to_str", "transpose"}
+_LINEAR = {
+    "binary_list_to_integer",
+    "inv",
+    "make_list",
+    "norm",
+    "normalize",
+    "size",
+    "str_cat",
+    "to_str",
+    "transpose",
+}
+_COSTS = {
+    "inv": 100,
+    "integer_to_binary_list": 8,
+    "interpolate_pose": 15,
+    "pose_add": 8,
+    "pose_inv": 8,
+    "pose_sub": 8,
+    "pose_trans": 10,
+    "rotvec2rpy": 6,
+    "rpy2rotvec": 6,
+    "wrench_trans": 10,
+}
+"""Evaluations of functions that take many times as long as an operator."""
 
 PURE: Mapping[str, tuple[Signature, Callable[..., Any]]] = MappingProxyType(
-    {name: (signature(text, linear=name in _LINEAR), function) for name, text, function in _TABLE}
+    {
+        name: (signature(text, cost=_COSTS.get(name, 1), linear=name in _LINEAR), function)
+        for name, text, function in _TABLE
+    }
 )
 """Each with its signature. The machine adds them to the functions of the controller."""

@@ -39,7 +39,7 @@ class Lines:
 
     always_accept = (END,)
 
-    def process(self, tokens: Iterator[Token]) -> Iterator[Token]:
+    def process(self, tokens: Iterator[Token]) -> Iterator[Token]:  # noqa: C901  one pass, as a text is long
         """Drop line breaks that end nothing, and add ends that no line break tells."""
         brackets = 0
         last = END
@@ -56,7 +56,7 @@ class Lines:
                     last = END
                 pending = None
             if kind in _BEGINS and brackets == 0 and last not in (END, "COLON"):
-                yield _end(token)
+                yield Token.new_borrow_pos(END, token, token)
             if kind in _OPENS:
                 brackets += 1
             elif kind in _CLOSES and brackets > 0:
@@ -64,9 +64,13 @@ class Lines:
             yield token
             last = kind
             token_before = token
-        if last != END:
-            yield pending if pending is not None else _end(token_before)
+        if pending is not None:
+            yield pending
+        elif last != END:
+            yield _after(token_before)
 
 
-def _end(at: Token) -> Token:
-    return Token.new_borrow_pos(END, "\n", at)
+def _after(token: Token) -> Token:
+    """An end without a text, where the text ends."""
+    line, column = token.end_line, token.end_column
+    return Token(END, "", token.end_pos, line, column, line, column)

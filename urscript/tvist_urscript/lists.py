@@ -5,7 +5,7 @@ import math
 from tvist_urscript.arithmetic import MOST_PRODUCTS, matrix
 from tvist_urscript.errors import Fault
 from tvist_urscript.poses import pose_inv
-from tvist_urscript.values import LONGEST, Array, Pose, Value, array, integer, kind, vector
+from tvist_urscript.values import LONGEST, Array, Pose, Value, array, integer, kind, to_bytes, vector
 
 _BITS = 32
 
@@ -18,8 +18,8 @@ def get_list_length(value: Value) -> int:
 
 
 def length(value: Value) -> int:
-    """Return the number of elements of a list, or of characters of a text."""
-    return len(value) if type(value) is str else get_list_length(value)
+    """Return the number of elements of a list, or of bytes of a text."""
+    return len(to_bytes(value)) if type(value) is str else get_list_length(value)
 
 
 def size(value: Value) -> Value:

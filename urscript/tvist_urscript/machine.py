@@ -4,15 +4,15 @@ from collections.abc import Callable, Generator, Mapping
 from types import FunctionType
 from typing import Any
 
-from tvist_urscript import arithmetic, indexing
 from tvist_urscript.compiler import Script
 from tvist_urscript.errors import Fault, ScriptError
-from tvist_urscript.failures import TooDeep, failure, position_of
+from tvist_urscript.failures import TooDeep, failure, line_of, position_of
 from tvist_urscript.functions import DEEPEST_CALLS
 from tvist_urscript.library import PURE
+from tvist_urscript.operators import operators
 from tvist_urscript.pieces import HERE, MISSING, SPENT
 from tvist_urscript.threads import MOST_THREADS, Thread
-from tvist_urscript.values import Array, Pose, Value
+from tvist_urscript.values import Array, Value
 
 EVALUATIONS = 500
 """Evaluations of all threads in a tick."""
@@ -84,9 +84,7 @@ class Machine:
     @property
     def line(self) -> int:
         """The present line of the main thread."""
-        present = position_of(self._main.steps)
-        if present is not None:
-            self._line = present[0]
+        self._line = line_of(self._main.steps) or self._line
         return self._line
 
     def resume(self, budget: int = EVALUATIONS) -> int:
@@ -254,53 +252,13 @@ class Machine:
         if not thread.critical and self._holder is thread:
             self._holder = None
 
-    def _is_equal(self, a: Value, b: Value) -> bool:
-        if isinstance(a, Array):
-            self.charge(a.size)
-        return a == b
-
-    def _is_unequal(self, a: Value, b: Value) -> bool:
-        return not self._is_equal(a, b)
-
-    def _replaced(self, new: Value, indices: tuple[Value, ...], value: Value) -> Value:
-        if isinstance(value, Array):
-            self.charge(len(value.items) // 16)
-        return indexing.replaced(new, indices, value)
-
     def _surroundings(self, functions: Mapping[str, Callable[..., Any]]) -> dict[str, Any]:
-        def add(a: Any, b: Any) -> Any:
-            if type(a) is float and type(b) is float:
-                return a + b
-            return arithmetic.add(a, b, self.charge)
-
-        def subtract(a: Any, b: Any) -> Any:
-            if type(a) is float and type(b) is float:
-                return a - b
-            return arithmetic.subtract(a, b, self.charge)
-
-        def multiply(a: Any, b: Any) -> Any:
-            if type(a) is float and type(b) is float:
-                return a * b
-            return arithmetic.multiply(a, b, self.charge)
-
         names: dict[str, Any] = {
             "__builtins__": {},
             HERE: self,
             SPENT: _SPENT,
             MISSING: _MISSING,
-            "add": add,
-            "subtract": subtract,
-            "multiply": multiply,
-            "divide": lambda a, b: arithmetic.divide(a, b, self.charge),
-            "remainder": arithmetic.remainder,
-            "negate": lambda a: arithmetic.negate(a, self.charge),
-            "is_equal": self._is_equal,
-            "is_unequal": self._is_unequal,
-            "element": indexing.element,
-            "element_of_matrix": indexing.element_of_matrix,
-            "replaced": self._replaced,
-            "listed": Array,
-            "posed": Pose,
+            **operators(self.charge),
             "run": self._run,
             "kill": self._kill,
             "join": self._join,
@@ -327,7 +285,10 @@ class Machine:
 
         def charged(*arguments: Any) -> Any:
             self.charge(sum(argument.size for argument in arguments if isinstance(argument, Array)))
-            return function(*arguments)
+            result = function(*arguments)
+            if isinstance(result, Array):
+                self.charge(result.size)
+            return result
 
         return charged
 

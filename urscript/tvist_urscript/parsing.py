@@ -10,7 +10,7 @@ from tvist_urscript import tree
 from tvist_urscript.building import Builder
 from tvist_urscript.errors import ScriptError, syntax_error
 from tvist_urscript.grammar import GRAMMAR
-from tvist_urscript.lines import END, Lines
+from tvist_urscript.lines import Lines
 
 
 @cache
@@ -46,9 +46,9 @@ def _unfit(text: str, error: UnexpectedInput) -> ScriptError:
         character = text[error.pos_in_stream or 0]
         why = 'a text has no closing "' if character == '"' else f"unexpected character {character!r}"
         return ScriptError(error.line, error.column, syntax_error(error.line, why))
-    if isinstance(error, UnexpectedToken) and error.token.type != "$END":
+    if isinstance(error, UnexpectedToken) and str(error.token):  # the end of the text is a token without any
         token: Token = error.token
-        what = "end of the line" if token.type == END else f"'{_shortened(token)}'"
+        what = "end of the line" if str(token) == "\n" else f"'{_shortened(token)}'"
         assert token.line is not None
         assert token.column is not None
         return ScriptError(token.line, token.column, syntax_error(token.line, f"unexpected {what}"))

@@ -21,7 +21,13 @@ from tvist_urscript.values import Array, Pose, Value, number, pose, vector
 
 def _parts(value: Any, what: str) -> tuple[Vector, Quaternion]:
     x, y, z, rx, ry, rz = pose(value, what).numbers
-    return (x, y, z), quaternion((rx, ry, rz))
+    return (x, y, z), _turn((rx, ry, rz), what)
+
+
+def _turn(rotation: Vector, what: str) -> Quaternion:
+    if not math.isfinite(math.hypot(*rotation)):
+        raise Fault(f"{what} has a rotation that is not finite")
+    return quaternion(rotation)
 
 
 def _pose(position: Vector, turn: Quaternion) -> Pose:
@@ -104,11 +110,13 @@ def rpy2rotvec(rpy_vector: Value) -> Array:
 
 def rotvec2rpy(rotation: Value) -> Array:
     """Return roll, pitch and yaw [rad] about fixed axes."""
-    return Array(to_rpy(quaternion(_three(rotation, "rotation_vector"))))
+    return Array(to_rpy(_turn(_three(rotation, "rotation_vector"), "rotation_vector")))
 
 
 def _three(value: Value, what: str) -> Vector:
     numbers = vector(value, what)
     if len(numbers) != 3:
         raise Fault(f"{what} has to be a list of 3 numbers, not of {len(numbers)}")
+    if not all(map(math.isfinite, numbers)):
+        raise Fault(f"{what} has to consist of finite numbers")
     return (numbers[0], numbers[1], numbers[2])

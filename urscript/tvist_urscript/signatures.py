@@ -35,7 +35,8 @@ class Signature:
         blocks: It is a generator function. Each bare `yield` inside it waits for the next tick; what it returns is the
             value of the call.
         cost: Evaluations that a call takes from the budget.
-        linear: Elements of the lists that it is given are taken from the budget as well.
+        linear: Elements of the lists that it takes and gives are taken from the budget as well. The machine sees to it
+            for the functions that it adds itself.
     """
 
     parameters: tuple[Parameter, ...]

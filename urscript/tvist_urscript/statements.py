@@ -60,7 +60,7 @@ class Statements(Expressions):
 
         for statement in body:
             at = Position.of(statement)
-            self.cost = 1
+            self.cost, self.works = 1, False
             match statement:
                 case tree.Function():
                     continue
@@ -68,6 +68,7 @@ class Statements(Expressions):
                     test = self.test(statement.branches[0][0])
                     cost += self.limited(statement)
                     flush(at)
+                    since += PIECE * self.works
                     links, since = self.branches(statement, test, since)
                     result.extend(links)
                 case tree.While():
@@ -80,10 +81,14 @@ class Statements(Expressions):
                 case _:
                     made = self.simple(statement, at)
                     spent = self.limited(statement)
+                    works = self.works
                     if cost + spent > PIECE:
                         flush(at)
                     cost += spent
                     piece.extend(made)
+                    if works:
+                        flush(at)
+                        since += PIECE
         if cost:
             flush(Position.of(body[-1]) if body else Position(1, 1))
         return result, since
@@ -108,7 +113,7 @@ class Statements(Expressions):
             statement.branches[start : start + LINK] for start in range(0, len(statement.branches), LINK)
         ]
         if len(chains) == 1:
-            links, cost, latest = self.links(statement, chains[0], test, since, 0)
+            links, cost, latest, since = self.links(statement, chains[0], test, since, 0)
             otherwise, ends = self.block(statement.otherwise, since, cost)
             return _chained(links, otherwise), max(latest, ends)
         # Python nests each `elif` in the one before, and not deep: a variable tells whether a branch has been taken.
@@ -122,7 +127,7 @@ class Statements(Expressions):
                 test = self.test(chain[0][0])
                 before = at.charge(cost + self.limited(statement), check=True)
                 since = cost = 0
-            links, cost, ends = self.links(statement, chain, test, since, cost)
+            links, cost, ends, since = self.links(statement, chain, test, since, cost)
             latest = max(latest, ends)
             for here, _, body in links:
                 body.insert(0, here.assign(searching, here.constant(False)))
@@ -135,23 +140,25 @@ class Statements(Expressions):
 
     def links(
         self, statement: tree.If, chain: list[Branch], test: ast.expr, since: int, cost: int
-    ) -> tuple[list[Link], int, int]:
+    ) -> tuple[list[Link], int, int, int]:
         """Translate some branches, of which the first condition is translated and paid for.
 
         Returns:
-            For each its position, condition and statements; what to pay where none is taken; `since` at the latest.
+            For each its position, condition and statements; what to pay where none is taken; `since` at the end of the
+            one where it is largest, and where none is taken.
         """
         links: list[Link] = []
         latest = since
         for condition, body in chain:
             if links:
-                self.cost = 1
+                self.cost, self.works = 1, False
                 test = self.test(condition)
                 cost += self.limited(statement)
+                since += PIECE * self.works
             made, ends = self.block(body, since, cost)
             latest = max(latest, ends)
             links.append((Position(*first(condition)), test, made))
-        return links, cost, latest
+        return links, cost, latest, since
 
     def loop(self, statement: tree.While, test: ast.expr, cost: int) -> ast.stmt:
         """Translate a loop; each turn looks at the budget."""
@@ -216,6 +223,7 @@ class Statements(Expressions):
         if indices:
             here = Position(*first(indices[0]))
             self.cost += len(indices)
+            self.works = True
             places = at.tuple([self.value(index) for index in indices])
             value = here.call("replaced", value, places, self.name(statement.target))
             variable = self.scope.variable(name)

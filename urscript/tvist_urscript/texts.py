@@ -1,65 +1,73 @@
-"""The functions of texts. Positions count characters from 0."""
+"""The functions of texts. Positions count bytes of UTF-8 from 0."""
 
 import re
 
 from tvist_urscript.errors import Fault
-from tvist_urscript.values import Value, integer, short, text, to_str, whole
+from tvist_urscript.values import Value, integer, short, text, to_bytes, to_str, to_text, whole
 
 _INTEGER = re.compile(r"\s*[+-]?\d+\s*", re.ASCII)
+_HEXADECIMAL = re.compile(r"\s*[+-]?0[xX][0-9a-fA-F]+\s*", re.ASCII)
 _FLOAT = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 
 
 def str_cat(op1: Value, op2: Value) -> str:
     """Return two values as one text."""
-    return short(to_str(op1) + to_str(op2))
+    whole_text = to_str(op1) + to_str(op2)
+    return short(whole_text if whole_text.isascii() else to_text(to_bytes(whole_text)))
 
 
 def str_len(string: Value) -> int:
-    """Return the number of characters."""
-    return len(text(string, "the argument of str_len"))
+    """Return the number of bytes."""
+    return len(to_bytes(text(string, "the argument of str_len")))
 
 
 def str_empty(string: Value) -> bool:
-    """Whether a text has no character."""
+    """Whether a text has no byte."""
     return not text(string, "the argument of str_empty")
 
 
 def str_at(src: Value, index: Value) -> str:
-    """Return the character at a position."""
-    string, place = text(src, "src of str_at"), integer(index, "the index of str_at")
+    """Return the byte at a position."""
+    string, place = to_bytes(text(src, "src of str_at")), integer(index, "the index of str_at")
     if not 0 <= place < len(string):
-        raise Fault(f"text index {place} is not in the text, which has {len(string)} characters")
-    return string[place]
+        raise _outside(place, string)
+    return to_text(string[place : place + 1])
 
 
 def str_find(src: Value, target: Value, start_from: Value) -> int:
     """Return the position at which a text is found, -1 where it is not."""
-    string, wanted = text(src, "src of str_find"), text(target, "target of str_find")
+    string, wanted = to_bytes(text(src, "src of str_find")), to_bytes(text(target, "target of str_find"))
     start = integer(start_from, "start_from of str_find")
     if not 0 <= start <= len(string):
-        raise Fault(f"text index {start} is not in the text, which has {len(string)} characters")
+        raise _outside(start, string)
     return string.find(wanted, start)
 
 
 def str_sub(src: Value, index: Value, length: Value) -> str:
     """Return a part of a text; the whole rest where the length is negative or too large."""
-    string, start = text(src, "src of str_sub"), integer(index, "the index of str_sub")
+    string, start = to_bytes(text(src, "src of str_sub")), integer(index, "the index of str_sub")
     size = integer(length, "len of str_sub")
     if not 0 <= start <= len(string):
-        raise Fault(f"text index {start} is not in the text, which has {len(string)} characters")
-    return string[start:] if size < 0 else string[start : start + size]
+        raise _outside(start, string)
+    return to_text(string[start:] if size < 0 else string[start : start + size])
 
 
 def to_num(string: Value) -> int | float:
-    """Return the number that a text writes."""
+    """Return the number that a text writes, in decimal or, with 0x before it, hexadecimal digits."""
     if type(string) is int or type(string) is float:
         return string
     written = text(string, "the argument of to_num")
+    if _HEXADECIMAL.fullmatch(written):
+        return whole(int(written, 16))
     if _INTEGER.fullmatch(written):
         return whole(int(written))
     if _FLOAT.fullmatch(written):
         return float(written)
     raise Fault(f'the text "{written[:40]}" is no number')
+
+
+def _outside(place: int, string: bytes) -> Fault:
+    return Fault(f"text index {place} is not in the text, which has {len(string)} bytes")
 
 
 def check(condition: Value) -> None:

@@ -199,10 +199,23 @@ def short(value: str) -> str:
     Raises:
         Fault: It has more than LONGEST_TEXT bytes.
     """
-    size = len(value) if value.isascii() else len(value.encode(errors="surrogatepass"))
+    size = len(value) if value.isascii() else len(to_bytes(value))
     if size > LONGEST_TEXT:
         raise Fault(f"a text of {size} bytes is too long: the limit is {LONGEST_TEXT}")
     return value
+
+
+def to_bytes(value: str) -> bytes:
+    """Return a text in UTF-8; parts of a character, which Python writes as surrogates, are the bytes that they were."""
+    try:
+        return value.encode(errors="surrogateescape")
+    except UnicodeEncodeError:
+        return value.encode(errors="replace")
+
+
+def to_text(value: bytes) -> str:
+    """Return the text that bytes in UTF-8 are; parts of a character become surrogates."""
+    return value.decode(errors="surrogateescape")
 
 
 def to_str(value: Value) -> str:

@@ -1,5 +1,6 @@
 """`tvist check-script`: look for errors in programs without running them."""
 
+from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -9,12 +10,12 @@ from tvist_cli.output import print_json
 from tvist_cli.scripts import named, placed, read_script
 
 
-def check_script(*file: Annotated[str, Parameter(required=True)], json: bool = False) -> None:
+def check_script(*file: Annotated[Path, Parameter(required=True)], json: bool = False) -> None:
     """Look for errors in programs in URScript, without a robot and without running them.
 
-    Each error is a line FILE:LINE:COLUMN: text. Errors are what keeps a program from starting: wrong syntax, unknown names,
-    and calls that do not fit their functions. A function of UR's robots that tvist does not simulate is a warning: the
-    program starts, and ends with an error when it calls that function.
+    Each error is a line FILE:LINE:COLUMN: text. Errors are what keeps a program from starting: wrong syntax, unknown
+    names, and calls that do not fit their functions. A function of UR's robots that tvist does not simulate is a
+    warning: the program starts, and ends with an error when it calls that function.
 
     Exit code 0: there is no error. Exit code 1: there is at least one. Exit code 2: a file cannot be read.
 

@@ -22,12 +22,13 @@ if TYPE_CHECKING:
 
 
 def run(
-    file: str,
+    file: Path,
     *,
     lockstep: bool = False,
     robot: str | None = None,
     profile: str | None = None,
     payload: float | None = None,
+    overload: bool = False,
     shaper: str | None = None,
     shape_servo: bool = False,
     start: str | None = None,
@@ -43,22 +44,23 @@ def run(
 ) -> None:
     """Run a program in URScript on a robot of its own, print its messages as they come, and end with an exit code.
 
-    Exit code 0: the program ended by itself. Exit code 1: it does not compile, which is printed as FILE:LINE:COLUMN: text;
-    or an error, a protective stop, a safety stop, a client or --timeout ended it. Exit code 2: the command line is
-    wrong, or the file cannot be read.
+    Exit code 0: the program ended by itself. Exit code 1: it does not compile, or an error, a protective stop, a safety
+    stop, a client or --timeout ended it; errors in the program are printed as FILE:LINE:COLUMN: text. Exit code 2: the
+    command line is wrong, or the file cannot be read.
 
     The program runs in real time, on a robot that other programs can reach as if tvist serve ran it. Popups do not
     hold it up: they are printed and closed.
 
     Args:
         file: Program to run; - reads the standard input.
-        lockstep: Run as fast as this machine computes, without network; the arm moves exactly as in real time. A program
-            that waits for a client then waits for ever: see --input and --timeout.
+        lockstep: Run as fast as this machine computes, without network; the arm moves exactly as in real time. A
+            program that waits for a client then waits for ever: see --input and --timeout.
         robot: Name of a robot that comes with the package, or path of a robot file [ur5e].
         profile: Set of defaults, see tvist serve: ursim, which is like UR's simulator, or real, which has a payload,
             noise, a floor, sag and shaper zv [ursim].
         payload: Mass of the disc on the flange in kg, both carried and declared to the controller [0 with the profile
             ursim, that of the robot file with real].
+        overload: Start even if the payload exceeds the robot's rating.
         shaper: Any shaper that tvist shapers lists, or FILE.py:NAME [none with the profile ursim, zv with real].
         shape_servo: Shape servoj, speedj and speedl too, where they begin at rest.
         start: Pose to start in: a name from the robot file, such as Q1, Q2 or Q3, or joint angles in rad separated by
@@ -80,9 +82,10 @@ def run(
     text = read_script(file)
     _check(file, text, json=json)
     given: dict[str, Any] = {
-        "robot": robot, "profile": lower(profile), "payload": payload, "shaper": lower(shaper),
-        "shape_servo": shape_servo or None, "start": start, "seed": seed,
-        "record": None if record is None else str(record), "truth": truth or None, "listen": listen, "ur": ur or None,
+        "robot": robot, "profile": lower(profile), "payload": payload, "overload": overload or None,
+        "shaper": lower(shaper), "shape_servo": shape_servo or None, "start": start, "seed": seed,
+        "record": None if record is None else str(record), "truth": truth or None, "listen": listen,
+        "ur": ur or None,
     }  # fmt: skip
     checked = _configuration(given, config, lockstep=lockstep)
     say_if_compiling()
@@ -110,7 +113,7 @@ def run(
         raise failure
 
 
-def _check(file: str, text: str, *, json: bool) -> None:
+def _check(file: Path, text: str, *, json: bool) -> None:
     """Say what is wrong with a program before anything is started for it."""
     from tvist_controller.programs.checking import check_program
 
@@ -153,12 +156,12 @@ class _Job:
     """A program to run, and whom to tell."""
 
     def __init__(
-        self, file: str, text: str, inputs: Sequence[str], timeout: float | None, tell: Tell
+        self, file: Path, text: str, inputs: Sequence[str], timeout: float | None, tell: Tell
     ) -> None:
         self.file, self.text, self.inputs, self.timeout, self.tell = file, text, inputs, timeout, tell
 
     def in_lockstep(self, config: "ServeConfig") -> "tuple[ProgramWatch, list[str], None]":
-        """Run it in this process; return what was observed, and errors that have ended the recording."""
+        """Run it in this process; return what was observed, and errors of the recording."""
         from tvist_lab.programs.in_lockstep import run_in_lockstep
         from tvist_lab.programs.start import InputError
         from tvist_server.config import ConfigError
@@ -182,7 +185,7 @@ class _Job:
         return watch, errors, None
 
     def in_real_time(self, config: "ServeConfig") -> "tuple[ProgramWatch, list[str], Server]":
-        """Serve a robot that runs it; return what was observed, errors that have ended the recording, and the server."""
+        """Serve a robot that runs it; return what was observed, errors of the recording, and the server."""
         from tvist_lab.programs.in_real_time import ProgramServer
         from tvist_lab.programs.start import InputError
         from tvist_server.config import ConfigError
@@ -207,7 +210,7 @@ class _Job:
         return served.watch, say_recorded(server), server
 
 
-def _failure(file: str, watch: "ProgramWatch", errors: list[str]) -> Failure | None:
+def _failure(file: Path, watch: "ProgramWatch", errors: list[str]) -> Failure | None:
     """Why the run has failed; None if it has not."""
     after = f"after {watch.seconds:.3f} s of robot time"
     match watch.reason:

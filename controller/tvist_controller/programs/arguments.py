@@ -101,6 +101,11 @@ def shown(value: Value) -> str:
     return "None" if value is None else f"{value}"[:60]
 
 
+def readable(text: str) -> str:
+    """Return a text for people; parts of characters, which programs can cut out, are replaced."""
+    return text if text.isascii() else text.encode(errors="surrogateescape").decode(errors="replace")
+
+
 def _range(least: float, most: float) -> str:
     if math.isinf(most):
         return "finite" if math.isinf(least) else f"at least {least:g} and finite"

@@ -2,13 +2,15 @@
 
 import re
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Literal
 
 from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_controller.programs.library import SIGNATURES
-from tvist_urscript import ScriptError, check
+from tvist_urscript import PURE, ScriptError, check
 
 _SIMULATED = {name: one for name, one in SIGNATURES.items() if name not in SUBJECTS}
+_NAMES = {name.lower(): name for name in (*SIGNATURES, *PURE)}
 _UNKNOWN = re.compile(r"compile_error_name_not_found:(\w+):")
 
 
@@ -29,8 +31,8 @@ class Finding:
 def check_program(text: str) -> list[Finding]:
     """Return what is wrong with a program, in the order of its text; empty if nothing is.
 
-    Errors are those of the compiler: syntax, unknown names, calls that do not fit their functions. Warnings are the calls
-    of functions that this controller does not simulate.
+    Errors are those of the compiler: syntax, unknown names, calls that do not fit their functions. Warnings are the
+    calls of functions that this controller does not simulate.
 
     Args:
         text: The program: a `def` or `sec` with its `end`, or statements.
@@ -48,4 +50,8 @@ def check_program(text: str) -> list[Finding]:
 
 
 def _error(error: ScriptError) -> Finding:
-    return Finding(error.line, error.column, "error", error.text)
+    """The compiler's error, with the function whose name is nearest to an unknown one."""
+    unknown = _UNKNOWN.fullmatch(error.text)
+    near = [] if unknown is None else get_close_matches(unknown[1].lower(), _NAMES, n=1, cutoff=0.75)
+    said = f"{error.text} did you mean {_NAMES[near[0]]}?" if near else error.text
+    return Finding(error.line, error.column, "error", said)

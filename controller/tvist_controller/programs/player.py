@@ -1,9 +1,10 @@
 """The loaded program and its progress, and the programs that run beside it."""
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from tvist_controller.command_row import Call, Row
 from tvist_controller.programs.access import Access
+from tvist_controller.programs.arguments import readable
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.built_in import built_in
 from tvist_controller.programs.library import MOVING, functions
@@ -35,7 +36,8 @@ MAX_KEPT = 100
 """Number of programs that are kept under their names."""
 
 
-class _Running(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Running:
     name: str
     script: Script
     machine: Machine
@@ -56,7 +58,8 @@ class ProgramPlayer:
     def __init__(self, access: Access, safety: SafetyControl) -> None:
         self._access, self._motion, self._safety, self._emit = access, access.motion, safety, access.emit
         self.arm = ProgramArm(access, self._thread)
-        self._popups, self._watchdogs = Popups(access.emit), Watchdogs(access.peripherals)
+        self._popups = Popups(access.emit, self._machine)
+        self._watchdogs = Watchdogs(access.peripherals)
         self._functions = functions(access, self.arm, self._popups, self._watchdogs)
         self._built_in = frozenset(built_in(access.description))
         self._kept: dict[str, Script] = {}
@@ -68,6 +71,8 @@ class ProgramPlayer:
         self._main: _Running | None = None
         self._all: list[_Running] = []
         """Programs in order of age."""
+        self._starved: set[_Running] = set()
+        """Programs for which nothing of the last tick's evaluations was left."""
         self._now: _Running | None = None
         """The one whose turn it is."""
         self.line = 0
@@ -111,24 +116,38 @@ class ProgramPlayer:
         """
         if not self._all:
             return
-        self._watch(tick)
+        if self.state == "PLAYING":
+            self._watch(tick)
         left = EVALUATIONS
-        # In a safeguard stop nothing may move, so the program waits as its motion does.
-        held = self.state != "PLAYING" or self._motion.safety.safeguard
-        for running in tuple(self._all):
-            if (running is self._main and held) or running not in self._all:
+        # Whoever got nothing of the last tick's evaluations comes first, else the oldest.
+        for running in sorted(self._all, key=lambda one: one not in self._starved):
+            if running not in self._all or (running is self._main and self._held):
                 continue
-            self._now = running
-            try:
-                left = running.machine.resume(left)
-            except ScriptError as error:
-                self._fail(running, error)
-            self._now = None
-            if not running.machine.running:
-                self._finish(running)
+            if left > 0:
+                left = self._resume(running, left)
+                self._starved.discard(running)
+            else:
+                self._starved.add(running)
         self.arm.settle(self._lives)
         if self._main is not None and (self.line == 0 or tick % TOLD_EVERY == 0):
             self.line = self._main.machine.line
+
+    @property
+    def _held(self) -> bool:
+        """Whether the program waits: in a safeguard stop nothing may move, so it waits as its motion does."""
+        return self.state != "PLAYING" or self._motion.safety.safeguard
+
+    def _resume(self, running: _Running, left: int) -> int:
+        """Give a program its turn; return what it leaves of the evaluations."""
+        self._now = running
+        try:
+            left = running.machine.resume(left)
+        except ScriptError as error:
+            self._fail(running, error)
+        self._now = None
+        if not running.machine.running:
+            self._finish(running)
+        return left
 
     def hear(self, event: Event) -> None:
         """Handle an event of the robot."""
@@ -169,26 +188,35 @@ class ProgramPlayer:
             self._hold()
 
     def _fail(self, running: _Running, error: ScriptError) -> None:
-        self._emit("warning", why=error.text, line=error.line, column=error.column, program=running.name)
+        self._emit(
+            "warning", why=readable(error.text), line=error.line, column=error.column, program=running.name
+        )
 
     def _finish(self, running: _Running) -> None:
         """Handle the end of a program; the arm comes to rest with it."""
         if running not in self._all:
             return
+        moves = running is self._main and (self.arm.moves or self.arm.guides)
         self._close(running)
-        if running.script.used & MOVING and self._motion.activity in {Activity.GUIDED, Activity.MOVING}:
+        if moves:
             self._motion.stop(None, "the program has ended")
 
     def _close(self, running: _Running, why: str | None = None) -> None:
         self._all.remove(running)
+        self._starved.discard(running)
         running.machine.end()
+        self._popups.close(running.machine)
         secondary = running.script.secondary or None
         self._emit("program_stopped", program=running.name, why=why, secondary=secondary)
         if running is self._main:
             self._main, self.state, self.line = None, "STOPPED", 0
             self._watchdogs.clear()
-            self._popups.close()
             self.arm.forget()
+
+    def _machine(self) -> object:
+        """The program that runs now."""
+        assert self._now is not None, "only programs call their functions"
+        return self._now.machine
 
     def _thread(self) -> object:
         """What identifies the thread that runs now."""
@@ -223,7 +251,7 @@ class ProgramPlayer:
         script: Script = call.planned()
         self._check_running("program.run")
         if script.secondary:
-            if len(self._all) > MAX_BESIDE:
+            if sum(running is not self._main for running in self._all) >= MAX_BESIDE:
                 why = f"{MAX_BESIDE} secondary programs are running: wait until one of them has ended"
                 raise RefusalError("busy", "", why, MAX_BESIDE)
             self._begin(script, script.name)
@@ -232,7 +260,7 @@ class ProgramPlayer:
         self.name, self._loaded = script.name, script
         self._start(script)
 
-    def _play(self, _: Call[ProgramPlay]) -> None:
+    def _play(self, call: Call[ProgramPlay]) -> None:
         if self._loaded is None:
             raise RefusalError("wrong_mode", "", "no program is loaded: send program.load first")
         if self.state == "PLAYING":
@@ -245,6 +273,7 @@ class ProgramPlayer:
             self._motion.resume()
         else:
             self._motion.check("move_j")
+        self._watchdogs.begin_anew(call.tick)
         self.state = "PLAYING"
 
     def _pause(self, _: Call[ProgramPause]) -> None:
@@ -259,9 +288,9 @@ class ProgramPlayer:
 
     def _hold(self) -> None:
         """Pause the program. A planned motion pauses on its path, a guided one is stopped."""
+        self._safety.stay_paused()
         if self._motion.activity is Activity.MOVING and self.arm.moves:
             self._motion.pause()
-            self._safety.stay_paused()
         elif self._motion.activity is Activity.GUIDED and self.arm.guides:
             self.arm.brake(lambda: self._motion.stop(None, "the program was paused"))
         self._wait()

@@ -1,5 +1,7 @@
 """Messages that programs show to people until somebody closes them."""
 
+from collections.abc import Callable
+
 from tvist_controller.command_row import Call, Row
 from tvist_controller.events import Emit
 from tvist_protocol.programs import ProgramClosePopup
@@ -11,12 +13,12 @@ class Popups:
 
     Args:
         emit: Emits events.
+        owner: Returns what identifies the program that runs now.
     """
 
-    def __init__(self, emit: Emit) -> None:
-        self._emit = emit
-        self.shown = False
-        """Whether there is a popup that nobody has closed."""
+    def __init__(self, emit: Emit, owner: Callable[[], object]) -> None:
+        self._emit, self._owner = emit, owner
+        self._owners: object | None = None
         self.rows = (Row(ProgramClosePopup, self._close, lease="none"),)
 
     def show(self, text: str, title: str, kind: PopupKind, *, blocking: bool) -> None:
@@ -28,12 +30,18 @@ class Popups:
             kind: `message`, `warning` or `error`.
             blocking: Whether the program waits until it is closed.
         """
-        self.shown = True
+        self._owners = self._owner()
         self._emit("popup", why=text, title=title, level=kind, blocking=blocking)
 
-    def close(self) -> None:
-        """Close the popup, if there is one."""
-        self.shown = False
+    @property
+    def shown(self) -> bool:
+        """Whether there is a popup that nobody has closed."""
+        return self._owners is not None
+
+    def close(self, owner: object) -> None:
+        """Close the popup if it is that of a program, which has ended."""
+        if self._owners is owner:
+            self._owners = None
 
     def _close(self, _: Call[ProgramClosePopup]) -> None:
-        self.close()
+        self._owners = None

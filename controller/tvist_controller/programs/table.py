@@ -15,6 +15,7 @@ from tvist_controller.programs.functions import (
     terminals,
     unsimulated,
 )
+from tvist_urscript.signatures import REQUIRED, Signature
 
 HEAD = """# Functions of programs
 
@@ -46,7 +47,7 @@ def page() -> str:
     parts = [HEAD]
     for title, module, functions in SUBJECTS:
         rows = [
-            (f"`{name}({one})`", "waits" if one.blocks else "", _what(functions, name))
+            (f"`{_call(name, one)}`", "waits" if one.blocks else "", _what(functions, name))
             for name, one in module.SIGNATURES.items()
         ]
         parts.append(f"## {title}\n\n{_table(('function', '', 'what'), rows)}\n")
@@ -60,6 +61,19 @@ def page() -> str:
         f"{idle} succeed, since what they set or end is never going on.\n\n{_table(('function', 'subject'), missing)}\n"
     )
     return "\n".join(parts)
+
+
+def _call(name: str, one: Signature) -> str:
+    """A call with its parameters and their defaults."""
+    parameters = [
+        parameter.name if parameter.default is REQUIRED else f"{parameter.name}={_shown(parameter.default)}"
+        for parameter in one.parameters
+    ]
+    return f"{name}({', '.join(parameters)})"
+
+
+def _shown(value: object) -> str:
+    return f'"{value}"' if isinstance(value, str) else str(value)
 
 
 def _what(functions: type, name: str) -> str:

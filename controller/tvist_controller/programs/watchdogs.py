@@ -63,14 +63,17 @@ class Watchdogs:
         self._peripherals.changed |= bool(self._all)
         self._all.clear()
 
+    def begin_anew(self, tick: int) -> None:
+        """Begin anew to wait for writes, since the program is resumed at a tick."""
+        for watchdog in self._all.values():
+            watchdog.since = tick
+
     def expired(self, tick: int) -> tuple[str, str] | None:
         """Return the action of a watchdog whose register was not written in time, and the register's name."""
         self._tick = tick
         for watchdog in self._all.values():
             written = max(self._peripherals.written(watchdog.bank, watchdog.place), watchdog.since)
             if tick - written > watchdog.ticks:
-                self._peripherals.changed = True
-                del self._all[watchdog.name]
                 return watchdog.action, watchdog.name
         return None
 

@@ -75,7 +75,10 @@ class ProgramServer:
             self.watch.end("signal", f"{self._ending.signal.name} ended the run")
 
     def _close_popup(self) -> None:
-        self._robot.driven.post(lambda: self._robot.request(ProgramClosePopup()))
+        def close() -> None:
+            self._robot.request(ProgramClosePopup())
+
+        self._robot.driven.post(close)
 
 
 def _nothing(_: Reply) -> None:

@@ -29,7 +29,7 @@ def as_dict(watch: ProgramWatch) -> dict[str, Any]:
         "exit_reason": watch.reason,
         "why": watch.why,
         "error": None if error is None else {"line": error.line, "column": error.column, "text": error.text},
-        "seconds": watch.seconds,
+        "seconds": round(watch.seconds, 6),
         "messages": [_message(said) for said in watch.said if said.kind != "warning"],
         "warnings": [
             {"timestamp": _time(said.tick), "text": said.text}
@@ -50,7 +50,7 @@ def _move(move: Move) -> dict[str, Any]:
     return {
         "id": move.id,
         "timestamp": _time(move.started),
-        "seconds": None if move.ended is None else (move.ended - move.started) * PERIOD,
+        "seconds": None if move.ended is None else _seconds(move.ended - move.started),
         "stopped": move.stopped,
         "peak_after_stop_m_s2": move.peak,
     }
@@ -58,4 +58,8 @@ def _move(move: Move) -> dict[str, Any]:
 
 def _time(tick: int) -> float:
     """Time of a tick, as `timestamp` in `state` gives it [s]."""
-    return tick * PERIOD
+    return _seconds(tick)
+
+
+def _seconds(ticks: int) -> float:
+    return round(ticks * PERIOD, 6)  # 0.002 is no binary number

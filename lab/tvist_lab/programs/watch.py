@@ -79,7 +79,7 @@ class ProgramWatch(Sink):
 
     Args:
         controller: The robot; the program is the first one that it starts.
-        close_popup: Has the popup closed before the next tick, since the program may wait for that.
+        close_popup: Has the popup closed for which the program waits, before the next tick.
         on_over: Called once, when the run is over.
         timeout: Robot time after which the run ends although the program goes on [s]; None: never.
         alone: Whether there is nobody who could resume a paused program, so that the run ends with a pause.
@@ -147,7 +147,7 @@ class ProgramWatch(Sink):
                 self.name = event.program or ""
             case "text" | "popup" | "warning" if event.line is None:
                 self._say(Said(event.tick, event.kind, event.why or "", event.title, event.level))
-                if event.kind == "popup":
+                if event.blocking:
                     self._close_popup()
             case "warning" if event.program == self.name:
                 self.error = Place(event.line or 0, event.column or 0, event.why or "")

@@ -1,7 +1,7 @@
 """Functions for messages to people, and for time."""
 
 from tvist_controller.programs.access import Access
-from tvist_controller.programs.arguments import flag, number
+from tvist_controller.programs.arguments import flag, number, readable
 from tvist_controller.programs.arm import ProgramArm, Turns
 from tvist_controller.programs.popups import Popups
 from tvist_plant.plant import PERIOD
@@ -12,7 +12,7 @@ LONGEST_SLEEP = 1e6
 """[s]"""
 
 SIGNATURES = {
-    "textmsg": signature('s1, s2=""', cost=5),
+    "textmsg": signature('s1, s2=""', cost=20),
     "popup": signature('s, title="Popup", warning=False, error=False, blocking=False', blocks=True, cost=10),
     "sync": signature("", blocks=True),
     "sleep": signature("t", blocks=True),
@@ -33,12 +33,12 @@ class MessageFunctions:
 
     def textmsg(self, s1: Value, s2: Value) -> None:
         """Write a line to the log, which clients of the primary interface get."""
-        text = f"{to_str(s1)}{to_str(s2)}"
+        text = readable(f"{to_str(s1)}{to_str(s2)}")
         self._arm.then(lambda: self._access.emit("text", why=text))
 
     def popup(self, s: Value, title: Value, warning: object, error: object, blocking: object) -> Turns:
         """Show a message; with `blocking`, wait until somebody closes it."""
-        text, head = to_str(s), to_str(title)
+        text, head = readable(to_str(s)), readable(to_str(title))
         kind: PopupKind = (
             "error" if flag("error", error) else "warning" if flag("warning", warning) else "message"
         )

@@ -149,7 +149,10 @@ class MotionFunctions:
         def wait() -> Iterator[None]:
             yield
             while course()[1] > radius:
-                guidance.move_tool(course()[0], acceleration, angular, shaped=self._shaped)
+                if (
+                    not self._access.motion.activity.protective
+                ):  # else the program is paused from this tick on
+                    self._arm.steer(start)
                 yield
 
         yield from self._arm.guide(start, wait)
@@ -198,10 +201,6 @@ class MotionFunctions:
     def _here(self) -> list[float]:
         found: list[float] = self._reference.tolist()
         return found
-
-    @property
-    def _shaped(self) -> bool:
-        return not self._access.motion.cycle.unshaped
 
     def _wait(self, t: object) -> Callable[[], Iterator[None]]:
         """How a call waits for a time, or if none is given until the velocity is reached."""

@@ -3,7 +3,8 @@
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import number, numbers, pose
-from tvist_controller.programs.arm import DELAY, OWN_TOKEN, ProgramArm, Turns
+from tvist_controller.programs.arm import DELAY, ProgramArm, Turns
+from tvist_controller.programs.moves import OWN_TOKEN
 from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import SetPayload
 from tvist_protocol.io import SetTcp
@@ -20,7 +21,7 @@ SIGNATURES = {
     "set_payload_cog": signature("cog", blocks=True, cost=20),
     "set_target_payload": signature("m, cog, inertia=None, transition_time=0", blocks=True, cost=20),
     "set_gravity": signature("d"),
-    "zero_ftsensor": signature("", cost=10),
+    "zero_ftsensor": signature("", cost=40),
 }
 
 

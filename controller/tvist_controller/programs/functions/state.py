@@ -86,7 +86,8 @@ class StateFunctions:
     def get_actual_joint_positions_history(self, steps: object) -> Array:
         """Return the measured joint positions a number of ticks ago [rad]."""
         past = self._access.steadiness
-        return a_list(past.past(integer("steps", steps, 0, past.known - 1)))
+        ago = integer("steps", steps, 0, max(past.known - 1, 0))
+        return a_list(past.past(ago) if past.known else self._access.latest().actual_q)
 
     def get_actual_joint_speeds(self) -> Array:
         """Return the measured joint velocities [rad/s]."""

@@ -1,0 +1,52 @@
+"""What is wrong with a program is found without running it: every place, with its line and column."""
+
+from tvist_controller.programs.checking import check_program
+from tvist_controller.programs.functions.unsimulated import SUBJECTS
+from tvist_controller.programs.library import SIGNATURES
+
+from .scripts import script
+
+
+def found(*lines):
+    return [(one.line, one.column, one.level) for one in check_program(script(*lines))]
+
+
+def test_a_program_that_can_run_has_nothing_wrong():
+    assert check_program(script("movej([0, 0, 0, 0, 0, 0])", 'textmsg("done")')) == []
+
+
+def test_every_error_is_found_in_the_order_of_the_text():
+    assert found("movj(1)", "x = 1", "movej(y)", 'textmsg("a", b=3)') == [
+        (2, 3, "error"), (4, 9, "error"), (5, 16, "error"),
+    ]  # fmt: skip
+
+
+def test_of_a_text_that_is_no_program_the_first_token_that_does_not_fit_is_found():
+    (finding,) = check_program("def prog():\n  if x\nend\n")
+    assert (finding.line, finding.level) == (2, "error")
+    assert finding.text.startswith("syntax_error_on_line:2:")
+
+
+def test_an_unknown_name_that_is_nearly_a_function_is_told_which():
+    (finding,) = check_program(script("moveJ([0, 0, 0, 0, 0, 0])"))
+    assert finding.text == "compile_error_name_not_found:moveJ: did you mean movej?"
+
+
+def test_functions_that_are_not_simulated_are_warnings_beside_the_errors():
+    assert found("freedrive_mode()", "sleep(1)", "nope()", "end_freedrive_mode()", "freedrive_mode()") == [
+        (2, 3, "warning"), (4, 3, "error"), (6, 3, "warning"),
+    ]  # fmt: skip
+    (finding, *_) = check_program(script("freedrive_mode()"))
+    assert finding.text == "freedrive_mode: this controller does not simulate moving the arm by hand"
+
+
+def test_every_function_that_is_not_simulated_is_warned_of():
+    for name in SUBJECTS:
+        needed = [one.name for one in SIGNATURES[name].parameters][: SIGNATURES[name].required]
+        (finding,) = check_program(script(f"{name}({', '.join('0' for _ in needed)})"))
+        assert (finding.line, finding.level) == (2, "warning")
+        assert finding.text.startswith(f"{name}: ")
+
+
+def test_a_function_of_the_programs_own_hides_one_that_is_not_simulated():
+    assert found("def freedrive_mode():", "end", "freedrive_mode()") == []

@@ -1,0 +1,252 @@
+"""`tvist run` and `tvist check-script`, as a robot programmer's CI starts them."""
+
+import json
+import signal
+import subprocess
+import sys
+
+import pytest
+from msgspec.structs import replace
+from tests.conformance.served import NOISE, PATIENCE, free_endpoint
+from tests.conformance.wire import Wire
+
+from tvist_lab.mcap_file import read
+from tvist_plant.description import load
+
+MOVES = """def moves():
+  textmsg("from ", get_actual_joint_positions())
+  movej([-1.2, -1.5, -2.0, -0.8, 1.6, 0], a=3, v=2)
+  popup("go on?", blocking=True)
+  movel(pose_trans(get_target_tcp_pose(), p[0, 0, 0.05, 0, 0, 0]), a=1, v=0.3)
+  textmsg("done")
+end
+"""
+WAITS = """def waits():
+  textmsg("ready")
+  while read_input_integer_register(24) == 0:
+    sync()
+  end
+  textmsg("got ", read_input_integer_register(24))
+end
+"""
+FAILS = "def fails():\n  sleep(0.1)\n  x = [1, 2]\n  y = x[2]\nend\n"
+WRONG = "def wrong():\n  movej(x)\n  freedrive_mode()\nend\n"
+
+
+def command(*arguments):
+    return [sys.executable, "-m", "tvist_cli", *map(str, arguments)]
+
+
+@pytest.fixture
+def tvist(tmp_path):
+    """Run the program in a folder that has the scripts; its exit code, stdout and stderr."""
+    for text in (MOVES, WAITS, FAILS, WRONG):
+        (tmp_path / f"{text[4 : text.index('(')]}.script").write_text(text, encoding="utf-8")
+
+    def run(*arguments, stdin=""):
+        ended = subprocess.run(
+            command(*arguments), capture_output=True, text=True, timeout=PATIENCE, check=False,
+            cwd=tmp_path, input=stdin,
+        )  # fmt: skip
+        assert not [word for word in NOISE if word in ended.stderr], ended.stderr
+        return ended.returncode, ended.stdout, ended.stderr
+
+    return run
+
+
+@pytest.fixture
+def waiting(tvist, tmp_path):
+    """A program that waits for a register on a robot in real time: its process, and a client of the robot."""
+    endpoint = free_endpoint()
+    process = subprocess.Popen(
+        command("run", "waits.script", "--listen", endpoint),
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
+    )  # fmt: skip
+    try:
+        assert process.stdout.readline() == "ready\n", process.stderr.read()
+        with Wire(endpoint) as wire:
+            yield process, wire
+    finally:
+        process.kill()
+        process.communicate(timeout=PATIENCE)
+
+
+@pytest.mark.quick
+class TestInLockstep:
+    def test_messages_are_on_stdout_and_the_account_is_on_stderr(self, tvist):
+        code, out, err = tvist("run", "moves.script", "--lockstep")
+        first, popup, last = out.splitlines()
+        assert code == 0
+        assert first.startswith("from [-1.59")
+        assert (popup, last) == ("popup: Popup: go on?", "done")
+        assert "moves ran for" in err
+        assert "made 2 moves" in err
+
+    def test_an_error_is_a_line_that_editors_understand_and_exit_code_1(self, tvist):
+        code, out, err = tvist("run", "fails.script", "--lockstep")
+        place, account = err.splitlines()
+        assert (code, out) == (1, "")
+        assert place.startswith("fails.script:4:9: ")
+        assert account == "tvist: fails.script ended with an error after 0.100 s of robot time"
+
+    def test_a_program_that_cannot_be_compiled_is_not_started(self, tvist):
+        code, out, err = tvist("run", "wrong.script", "--lockstep", "--record", "x.mcap", "--json")
+        assert code == 1
+        assert json.loads(out)["exit_reason"] == "compile_error"
+        assert err.splitlines() == [
+            "wrong.script:2:9: compile_error_name_not_found:x:",
+            "wrong.script:3:3: warning: freedrive_mode: this controller does not simulate moving the arm by hand",
+            "tvist: wrong.script cannot run: it has 1 error",
+        ]
+
+    def test_with_json_there_is_one_object_and_the_code_is_the_same(self, tvist):
+        for name, ok in (("moves", True), ("fails", False)):
+            code, out, _ = tvist("run", f"{name}.script", "--lockstep", "--json")
+            (line,) = out.splitlines()
+            told = json.loads(line)
+            assert (told["ok"], code) == (ok, int(not ok))
+            assert told["file"] == f"{name}.script"
+            assert told["lockstep"] is True
+            assert told["seconds"] > 0.0
+
+    def test_the_program_may_come_from_a_pipe(self, tvist):
+        assert tvist("run", "-", "--lockstep", stdin='textmsg("piped")\n')[:2] == (0, "piped\n")
+        code, _, err = tvist("run", "-", "--lockstep", stdin=FAILS)
+        assert code == 1
+        assert err.startswith("<stdin>:4:9: ")
+
+    def test_inputs_and_the_timeout_are_those_of_the_command_line(self, tvist):
+        given = ("--input", "input_int_register_24=7", "--input", "digital_input_3=on")
+        assert tvist("run", "waits.script", "--lockstep", *given)[:2] == (0, "ready\ngot 7\n")
+        code, out, err = tvist("run", "waits.script", "--lockstep", "--timeout", 0.5)
+        assert (code, out) == (1, "ready\n")
+        assert "failed after 0.500 s of robot time: the program was still running" in err
+
+    def test_the_robot_is_that_of_the_options_and_of_the_configuration(self, tvist, tmp_path):
+        (tmp_path / "robot.toml").write_text("start = 'Q2'\nspeed = 3.0\n", encoding="utf-8")
+        program = "textmsg(get_target_joint_positions())\ntextmsg(get_target_payload())\n"
+        options = ("--lockstep", "--config", "robot.toml")
+        _, out, _ = tvist("run", "-", *options, "--payload", 2, stdin=program)
+        q, mass = map(json.loads, out.splitlines())
+        assert (q, mass) == (pytest.approx(load("ur5e").poses["Q2"], abs=1e-6), 2)
+        _, out, _ = tvist("run", "-", *options, "--start", "-0.5,-1,1,0,0,0", stdin=program)
+        q, mass = map(json.loads, out.splitlines())
+        assert (q, mass) == (pytest.approx([-0.5, -1, 1, 0, 0, 0], abs=1e-6), 0)
+
+    @pytest.mark.parametrize(
+        ("arguments", "words"),
+        [
+            (("run", "nope.script"), ["nope.script", "No such file"]),
+            (("run", "."), ["program .", "directory"]),
+            (("run", "moves.script", "--lockstep", "--ur"), ["--lockstep and --ur exclude each other"]),
+            (("run", "moves.script", "--lockstep", "--listen", "tcp/127.0.0.1:1"), ["--listen"]),
+            (("run", "moves.script", "--lockstep", "--timeout", "0"), ["timeout is 0", "more than 0"]),
+            (("run", "moves.script", "--lockstep", "--input", "x=1"), ["input is 'x=1'", "NAME=VALUE"]),
+            (("run", "moves.script", "--lockstep", "--profile", "urs"), ["profile is 'urs'", "'ursim'"]),
+            (("run", "moves.script", "--lockstep", "--payload", "9"), ["9 kg", "--overload"]),
+            (("run", "moves.script", "--lockstep", "--config", "several.toml"), ["robots", "one robot"]),
+            (("run", "moves.script", "--lockstep", "--config", "clock.toml"), ["clock", "--lockstep"]),
+            (("check-script", "moves.script", "nope.script"), ["nope.script", "No such file"]),
+            (("check-script",), ["missing"]),
+        ],
+        ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+    )
+    def test_misuse_is_a_sentence_and_exit_code_2(self, tvist, tmp_path, arguments, words):
+        (tmp_path / "several.toml").write_text("robots = 'ur5e*2'\n", encoding="utf-8")
+        (tmp_path / "clock.toml").write_text("clock = 'lockstep'\n", encoding="utf-8")
+        code, out, err = tvist(*arguments)
+        assert (code, out) == (2, ""), err
+        assert err.startswith("tvist: ")
+        assert err.count("\n") == 1, err
+        assert all(word in err for word in words), err
+
+    @pytest.mark.usefixtures("tvist")
+    def test_control_c_ends_it_with_exit_code_130(self, tmp_path):
+        process = subprocess.Popen(
+            command("run", "waits.script", "--lockstep", "--record", "x.mcap"),
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
+        )  # fmt: skip
+        assert process.stdout.readline() == "ready\n"
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 130
+        assert "interrupted: waits.script had run for" in err
+        assert read(tmp_path / "x.mcap").complete
+
+
+class TestInRealTime:
+    pytestmark = pytest.mark.realtime
+
+    def test_it_moves_the_arm_as_in_lockstep_to_the_last_bit(self, tvist, tmp_path):
+        options = ("--profile", "real", "--seed", 3, "--input", "input_bit_register_64=1")
+        listen = ("--listen", free_endpoint())
+        code, out, err = tvist("run", "moves.script", *options, *listen, "--record", "real.mcap")
+        assert code == 0, err
+        assert "profile real) listens on" in err
+        assert tvist("run", "moves.script", *options, "--lockstep", "--record", "steps.mcap")[:2] == (0, out)
+        live, steps = (read(tmp_path / f"{name}.mcap") for name in ("real", "steps"))
+        assert len(live.states) >= len(steps.states) > 500
+        for one, other in zip(live.states, steps.states, strict=False):
+            assert replace(one, missed_ticks=0) == other
+        assert [(event.tick, event.kind, event.why) for event in live.events] == [
+            (event.tick, event.kind, event.why) for event in steps.events
+        ]
+
+    def test_clients_write_its_registers_and_see_it_end(self, waiting):
+        process, wire = waiting
+        wire.listen("event")
+        answer = wire.command("set_registers", bank="input_int", first=24, values=[5])
+        assert answer["type"] == "done", answer
+        wire.wait("event", lambda event: event["kind"] == "program_stopped")
+        out, err = process.communicate(timeout=PATIENCE)
+        assert (process.returncode, out) == (0, "got 5\n"), err
+        assert "waits ran for" in err
+
+    def test_a_client_that_stops_it_makes_it_fail(self, waiting):
+        process, wire = waiting
+        assert wire.command("program.stop")["type"] == "done"
+        _, err = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 1
+        assert err.splitlines()[-1].endswith("of robot time: the program was stopped")
+
+    def test_control_c_ends_it_with_exit_code_130(self, waiting):
+        process, _ = waiting
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 130
+        assert "interrupted: waits.script had run for" in err
+
+    def test_another_signal_is_no_success(self, waiting):
+        process, _ = waiting
+        process.send_signal(signal.SIGTERM)
+        _, err = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 1
+        assert "SIGTERM ended the run" in err
+
+
+@pytest.mark.quick
+class TestCheckScript:
+    def test_every_error_is_a_line_on_stdout_and_exit_code_1(self, tvist):
+        code, out, err = tvist("check-script", "moves.script", "wrong.script")
+        assert code == 1
+        assert out.splitlines() == [
+            "wrong.script:2:9: compile_error_name_not_found:x:",
+            "wrong.script:3:3: warning: freedrive_mode: this controller does not simulate moving the arm by hand",
+        ]
+        assert err == "tvist: 1 error in 2 programs\n"
+
+    def test_warnings_alone_are_exit_code_0(self, tvist):
+        code, out, err = tvist("check-script", "-", stdin="freedrive_mode()\n")
+        assert (code, err) == (0, "")
+        assert out.startswith("<stdin>:1:1: warning: ")
+        assert tvist("check-script", "moves.script", "fails.script") == (0, "", "")
+
+    def test_with_json_there_is_one_object(self, tvist):
+        code, out, _ = tvist("check-script", "wrong.script", "--json")
+        assert code == 1
+        told = json.loads(out)
+        assert (told["ok"], told["files"], told["errors"]) == (False, 1, 1)
+        assert told["findings"][0] == {
+            "file": "wrong.script", "line": 2, "column": 9, "level": "error",
+            "text": "compile_error_name_not_found:x:",
+        }  # fmt: skip

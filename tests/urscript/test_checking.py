@@ -1,0 +1,112 @@
+"""What a checker tells, and what has limits."""
+
+import doctest
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tvist_urscript import ScriptError, check, compile_script, signature
+
+KNOWN = {"textmsg": signature('a, b=""')}
+
+
+def places(text):
+    return [(error.line, error.column, error.text) for error in check(text, KNOWN)]
+
+
+def test_a_right_script_has_no_errors():
+    assert places("def f():\n  textmsg(1)\nend") == []
+
+
+def test_all_unknown_names_are_told_in_the_order_of_the_text():
+    found = places("def f():\n  x = b + a(c)\n  y(1)\n  textmsg(1, 2, 3)\nend")
+    assert found == [
+        (2, 7, "compile_error_name_not_found:b:"),
+        (2, 11, "compile_error_name_not_found:a:"),
+        (2, 13, "compile_error_name_not_found:c:"),
+        (3, 3, "compile_error_name_not_found:y:"),
+        (4, 17, "textmsg takes at most 2 arguments, but 3 are given"),
+    ]
+
+
+def test_a_text_that_is_no_program_has_one_error():
+    assert [place[:2] for place in places("x = = 1\ny = unknown\nz = = 2")] == [(1, 5)]
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("x = " + "[" * 10_000 + "]" * 10_000, "levels are nested"),
+        ("x = 1\nx = " + "(" * 10_000 + "x" + ")" * 10_000, None),
+        ("x = " + "(" * 10_000, "ends before"),
+        ("x = 1\nx = " + "not " * 10_000 + "x", "levels are nested"),
+        ("x = 1\nx = " + "x + " * 10_000 + "x", "levels are nested"),
+        ("x = 1\nx = " + "x or " * 10_000 + "x", "operations is too long"),
+        ("x = [" + "1, " * 10_000 + "1]", "too long"),
+        ("if True:\n" * 10_000 + "end\n" * 10_000, "levels are nested"),
+        ("while True:\n" * 18 + "end\n" * 18, "loops are nested"),
+        ("def f():\n" * 10_000, "ends before"),
+        ("x = " + "9" * 100_000, "too large"),
+        ('x = "' + "a" * 2_000 + '"', "too long"),
+        ("x = 1\n" * 20_000, None),
+        ("def g():\n def f():\n" + "x = 1\n" * 20_000 + " end\nend", "too many in one function"),
+        ("x = 0\nif x == 1:\n" + "elif x == 2:\n" * 3_000 + "else:\ntextmsg(1)\nend", None),
+        ("\0\1\2", "unexpected character"),
+        ("é = 1", "unexpected character"),
+    ],
+    ids=range(17),
+)
+def test_texts_of_any_shape_have_an_error_or_none(text, why):
+    if why is None:
+        compile_script(text, KNOWN)
+        return
+    with pytest.raises(ScriptError, match=why) as caught:
+        compile_script(text, KNOWN)
+    lines = text.split("\n")
+    assert 1 <= caught.value.line <= len(lines)
+    assert 1 <= caught.value.column <= len(lines[caught.value.line - 1]) + 1
+
+
+def test_no_name_of_python_is_reached():
+    for name in ("print", "machine", "add", "SPENT", "__builtins__", "v_x", "depth"):
+        assert places(f"x = {name}")[0][2] == f"compile_error_name_not_found:{name}:"
+
+
+def test_the_name_of_a_program_is_its_first_word():
+    for text, name, secondary in (
+        ("def f():\nend", "f", False),
+        ("sec g():\nend", "g", True),
+        ("# a comment\n  textmsg(1)", "textmsg", False),
+        ("x = 1", "x", False),
+        ("(1)", "program", False),
+    ):
+        script = compile_script(text, KNOWN)
+        assert (script.name, script.secondary, script.text) == (name, secondary, text)
+
+
+def run(path):
+    return subprocess.run(
+        [sys.executable, "-m", "tvist_urscript", str(path)], capture_output=True, text=True, check=False
+    )
+
+
+def test_a_file_runs_dry(tmp_path):
+    path = tmp_path / "hello.script"
+    path.write_text('def f():\n  textmsg("hello")\n  movej([0, 0, 0, 0, 0, 0])\n  textmsg("there")\nend\n')
+    done = run(path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "hello\nthere\n", "")
+
+
+def test_an_error_of_a_file_has_its_position(tmp_path):
+    path = tmp_path / "wrong.script"
+    path.write_text('def f():\n  textmsg("hello")\n  x = 1 / 0\nend\n')
+    done = run(path)
+    assert (done.returncode, done.stdout) == (1, "hello\n")
+    assert done.stderr == f"{path}: line 3, column 9: division by zero\n"
+
+
+def test_the_readme_is_true():
+    readme = Path(__file__).parents[2] / "urscript" / "README.md"
+    assert doctest.testfile(str(readme), module_relative=False).failed == 0

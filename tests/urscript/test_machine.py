@@ -1,0 +1,320 @@
+"""The machine: ticks, budget, threads, critical sections, and what its user gives it."""
+
+import pytest
+
+from tvist_urscript import (
+    EVALUATIONS,
+    Array,
+    Fault,
+    Machine,
+    Pose,
+    ScriptError,
+    compile_script,
+    signature,
+    to_str,
+)
+from tvist_urscript.machine import OVERDRAFT, PATIENCE
+from tvist_urscript.threads import MOST_THREADS
+
+SIGNATURES = {
+    "say": signature("value"),
+    "sync": signature("", blocks=True),
+    "move": signature("target, speed=1.5", blocks=True),
+    "fail": signature("why"),
+    "costly": signature("", cost=100),
+}
+
+
+class Robot:
+    """Functions for a machine, and what happened to them."""
+
+    def __init__(self, script, **keywords):
+        self.said = []
+        self.closed = []
+        functions = {
+            "say": lambda value: self.said.append(to_str(value)),
+            "sync": self.sync,
+            "move": self.move,
+            "fail": self.fail,
+            "costly": lambda: 0,
+        }
+        self.machine = Machine(
+            compile_script(f"def program(): {script}\nend", SIGNATURES), functions, **keywords
+        )
+
+    def sync(self):
+        yield
+
+    def move(self, target, speed):
+        try:
+            for _ in range(3):
+                yield
+        except GeneratorExit:
+            self.closed.append(target)
+            raise
+        return target * speed
+
+    def fail(self, why):
+        raise Fault(why)
+
+    def ticks(self, number, budget=EVALUATIONS):
+        return [self.machine.resume(budget) for _ in range(number)]
+
+
+def test_a_blocking_function_takes_its_ticks_and_gives_its_value():
+    robot = Robot("x = move(2)\nsay(x)\nx = move(speed=2, target=5)\nsay(x)")
+    robot.ticks(3)
+    assert robot.said == []
+    robot.ticks(1)
+    assert robot.said == ["3"]
+    robot.ticks(3)
+    assert robot.said == ["3", "10"]
+    assert not robot.machine.running
+
+
+def test_a_fault_gets_the_position_of_its_call():
+    robot = Robot('say(1)\n  fail("no way")')
+    with pytest.raises(ScriptError) as caught:
+        robot.ticks(1)
+    assert (caught.value.line, caught.value.column, caught.value.text) == (2, 3, "no way")
+    assert str(caught.value) == "line 2, column 3: no way"
+    assert not robot.machine.running
+
+
+def test_a_fault_after_some_ticks_has_the_position_of_its_call_too():
+    def failing():
+        yield
+        raise Fault("later")
+
+    script = compile_script("x = 1 +\n  wait()", {"wait": signature("", blocks=True)})
+    machine = Machine(script, {"wait": failing})
+    machine.resume()
+    with pytest.raises(ScriptError, match="line 2, column 3: later"):
+        machine.resume()
+
+
+def test_the_end_of_a_machine_reaches_the_functions_that_wait():
+    robot = Robot("thread t():\n move(1)\nend\nrun t()\nmove(2)")
+    robot.ticks(2)
+    robot.machine.end()
+    assert sorted(robot.closed) == [1, 2]
+    assert not robot.machine.running
+    assert robot.ticks(1) == [EVALUATIONS]
+
+
+def test_a_killed_thread_leaves_its_motion():
+    robot = Robot("thread t():\n move(1)\nend\nh = run t()\nsync()\nkill h\nsay(7)\nsync()")
+    robot.ticks(2)
+    assert robot.closed == [1]
+    assert robot.said == ["7"]
+
+
+def test_an_error_of_one_thread_ends_the_others():
+    robot = Robot('thread t():\n sync()\n fail("x")\nend\nrun t()\nmove(2)')
+    robot.ticks(1)
+    with pytest.raises(ScriptError):
+        robot.ticks(1)
+    assert robot.closed == [2]
+
+
+def test_an_exception_of_the_controller_is_not_hidden():
+    def broken(value):
+        raise KeyError(value)
+
+    machine = Machine(compile_script("say(1)", SIGNATURES), {"say": broken})
+    with pytest.raises(KeyError):
+        machine.resume()
+    assert not machine.running
+
+
+def test_a_function_that_is_not_given_is_told_at_once():
+    with pytest.raises(ValueError, match="say"):
+        Machine(compile_script("say(1)", SIGNATURES), {})
+
+
+def test_each_thread_finishes_before_it_ends_but_no_killed_one():
+    finished = []
+
+    def finish():
+        yield
+        finished.append(robot.machine.thread)
+
+    robot = Robot(
+        "thread t():\nend\nthread k():\n sync()\n sync()\n sync()\nend\nrun t()\nh = run k()\n"
+        "sync()\nsync()\nkill h",
+        finish=finish,
+    )
+    robot.ticks(3)
+    assert finished == [1]
+    assert robot.machine.running
+    robot.ticks(1)
+    assert finished == [1, 0]
+    assert not robot.machine.running
+
+
+def test_halt_does_not_finish():
+    def finish():
+        pytest.fail("halt is no regular end")
+        yield
+
+    robot = Robot("halt", finish=finish)
+    robot.ticks(1)
+    assert not robot.machine.running
+
+
+def test_the_number_of_the_running_thread_is_known():
+    numbers = []
+    script = compile_script(
+        "def program():\nthread t():\n note()\n sync()\n note()\nend\nnote()\nrun t()\nrun t()\nsync()\nsync()\nend",
+        {"note": signature(""), "sync": signature("", blocks=True)},
+    )
+
+    def sync():
+        yield
+
+    machine = Machine(script, {"note": lambda: numbers.append(machine.thread), "sync": sync})
+    for _ in range(3):
+        machine.resume()
+    assert numbers == [0, 1, 2, 1, 2]
+
+
+def test_the_line_of_the_main_thread_is_known():
+    robot = Robot("def f():\n  sync()\n  sync()\nend\n\nf()\nsync()")
+    lines = []
+    for _ in range(3):
+        robot.ticks(1)
+        lines.append(robot.machine.line)
+    assert lines == [2, 3, 7]
+
+
+def test_a_script_runs_on_several_machines():
+    script = compile_script("x = 0\nwhile True:\n  x = x + 1\n  say(x)\n  sync()\nend", SIGNATURES)
+    said = [], []
+
+    def sync():
+        yield
+
+    machines = [Machine(script, {"say": own.append, "sync": sync}) for own in said]
+    for count, machine in zip((2, 5), machines, strict=True):
+        for _ in range(count):
+            machine.resume()
+    assert said == ([1, 2], [1, 2, 3, 4, 5])
+
+
+LOOP = "i = 0\nwhile i < 300:\n  i = i + 1\nend\nsay(i)"
+
+
+def test_what_is_left_of_the_budget_is_told():
+    few, more = Robot("x = 1 + 2").ticks(1)[0], Robot("x = 1 + 2 + 3 + 4").ticks(1)[0]
+    assert more == few - 2
+    assert 0 < few < EVALUATIONS
+    assert Robot("costly()").ticks(1)[0] < EVALUATIONS - 100
+
+
+def test_a_thread_without_budget_goes_on_where_it_was():
+    robot = Robot(LOOP)
+    ticks = 0
+    while robot.machine.running:
+        robot.ticks(1)
+        ticks += 1
+    assert robot.said == ["300"]
+    assert 2 < ticks < 10
+
+
+def test_the_same_program_takes_the_same_ticks_with_any_user():
+    one, two = Robot(LOOP), Robot(LOOP)
+    assert one.ticks(5, budget=123) == two.ticks(5, budget=123)
+
+
+def test_who_missed_a_tick_is_first_in_the_next():
+    order = []
+    script = compile_script(
+        "def program():\nthread busy():\n while True:\n  note(1)\n  i = 0\n  while i < 60:\n   i = i + 1\n  end\n"
+        "  sync()\n end\nend\n"
+        "thread late():\n while True:\n  note(2)\n  sync()\n end\nend\nrun busy()\nrun late()\nsync()\n"
+        "while True:\n sync()\nend\nend",
+        {"note": signature("x"), "sync": signature("", blocks=True)},
+    )
+
+    def sync():
+        yield
+
+    machine = Machine(script, {"note": order.append, "sync": sync})
+    machine.resume(100)
+    assert order == [1]
+    machine.resume(100)
+    assert order[:2] == [1, 2]
+
+
+def test_an_endless_loop_is_an_error_after_its_patience():
+    robot = Robot("say(1)\nwhile True:\n  x = 1\nend")
+    robot.ticks(PATIENCE - 1)
+    with pytest.raises(ScriptError, match="endless loop") as caught:
+        robot.ticks(1)
+    assert caught.value.line == 2
+
+
+def test_a_loop_that_waits_may_run_for_ever():
+    robot = Robot("while True:\n  i = 0\n  while i < 300:\n    i = i + 1\n  end\n  sync()\nend")
+    robot.ticks(3 * PATIENCE)
+    assert robot.machine.running
+
+
+def test_an_endless_recursion_of_threads_is_an_error():
+    robot = Robot("thread t():\n run t()\n run t()\n sync()\nend\nrun t()\nwhile True:\n sync()\nend")
+    with pytest.raises(ScriptError, match=f"at most {MOST_THREADS} threads"):
+        robot.ticks(PATIENCE)
+
+
+def test_work_on_long_lists_counts_by_their_length():
+    prepared = "a = make_list(1000, 1)\nb = 0\n"
+    alone = Robot(prepared).ticks(1, budget=10_000)[0]
+    for work in ("b = a + a", "b = a * 2", "b = norm(a)", "b = a == [1]", "b = -a"):
+        robot = Robot(prepared + work)
+        robot.ticks(1, budget=10_000)
+        assert robot.machine.left <= alone - 900, work
+
+
+def test_many_statements_that_work_on_lists_take_their_ticks():
+    robot = Robot("a = make_list(1000, 1)\n" + "a = a + a\n" * 30 + "say(a[0])")
+    ticks = 0
+    while robot.machine.running:
+        robot.ticks(1)
+        assert robot.machine.left >= -1200
+        ticks += 1
+    assert ticks >= 15
+
+
+def test_one_statement_cannot_work_on_lists_for_long():
+    robot = Robot("a = make_list(1000, 1)\na = " + " + ".join(["a"] * 90))
+    with pytest.raises(ScriptError, match="too many list elements"):
+        robot.ticks(3)
+    assert robot.machine.left >= -2 * OVERDRAFT
+
+
+def test_a_spent_thread_keeps_its_critical_section_and_a_waiting_one_gives_it_up():
+    robot = Robot(
+        "thread t():\n enter_critical\n say(2)\n exit_critical\nend\nenter_critical\nrun t()\ni = 0\n"
+        "while i < 100:\n i = i + 1\nend\nsay(1)\nsync()\nsay(3)\nexit_critical"
+    )
+    robot.ticks(20, budget=100)
+    assert robot.said == ["1", "2", "3"]
+
+
+def test_values_of_functions_can_be_lists_and_poses():
+    script = compile_script(
+        "a = read()\na[0] = 5\nsay(a)\nsay(read())", {**SIGNATURES, "read": signature("")}
+    )
+    said = []
+    Machine(script, {"say": lambda v: said.append(to_str(v)), "read": lambda: Pose(range(6))}).resume()
+    assert said == ["p[5, 1, 2, 3, 4, 5]", "p[0, 1, 2, 3, 4, 5]"]
+
+
+def test_a_signature_says_what_a_manual_says():
+    known = signature('q, a=1.4, v=[1, 2], name="x", feature=p[0, 0, 0, 0, 0, 0], on=True')
+    assert [parameter.name for parameter in known.parameters] == ["q", "a", "v", "name", "feature", "on"]
+    assert known.required == 1
+    assert known.parameters[2].default == Array([1, 2])
+    assert known.parameters[4].default == Pose([0] * 6)
+    with pytest.raises(ValueError, match="no list of parameters"):
+        signature("q a")
