@@ -22,7 +22,7 @@ async def ur_interfaces(seconds: float, tell: Callable[[str], None]) -> dict[str
         tell: Called with a description of each measurement before it starts.
     """
     port = str(free_port())
-    options = ["--ur-address", ADDRESS]
+    options = ["--profile", "real", "--ur-address", ADDRESS]
     for interface in UrPorts().open():
         options += ["--ur-port", f"{interface}={port if interface == 'rtde' else 'off'}"]
     async with served(options) as server:
