@@ -244,9 +244,12 @@ class Controller:
 
         It is computed on request.
         """
-        felt = self._wrench.of(self.latest, self.peripherals.tcp_offset)
+        felt = self._felt()
         zero = self.peripherals.wrench_zero
         return felt if zero is None else [one - other for one, other in zip(felt, zero, strict=True)]
+
+    def _felt(self) -> list[float]:
+        return self._wrench.of(self.latest, self.peripherals.tcp_offset)
 
     def changed_io(self) -> Io | None:
         """Return inputs, outputs and registers before a tick, if they changed since the last call; else None."""
@@ -256,8 +259,7 @@ class Controller:
         )  # change in ticks, by events and commands
         if not (self._io_changed or peripherals.changed) and program == self._told_program:
             return None
-        self._io_changed = peripherals.changed = False
-        self._told_program = program
+        self._io_changed, peripherals.changed, self._told_program = False, False, program
         return self.io(wrench=False)
 
     def truth(self) -> Truth:
@@ -288,8 +290,6 @@ class Controller:
         self.programs.end(why)
         self.motion.interrupt(why)
 
-    # ------------------------------------------------------------------ programs
-
     def _access(self, guidance: Guidance, order: Order) -> Access:
         """What programs may use of the robot."""
         return Access(
@@ -306,7 +306,7 @@ class Controller:
             declared=lambda: self.declared,
             torques=lambda: self._wrench.felt(self.latest).tolist(),
             wrench=self.wrench,
-            zero_wrench=self._zero_wrench,
+            zero_wrench=lambda: self.peripherals.zero_wrench(self._felt()),
             shape_guided=self.setup.shape_servo,
         )
 
@@ -315,10 +315,6 @@ class Controller:
         reply = self._commands.carry_out(command, self.tick_number + 1, self.now, plan)
         self._io_changed |= self._commands.row(command).changes_io
         return reply
-
-    def _zero_wrench(self) -> None:
-        """Take the present force and torque at the tool as zero."""
-        self.peripherals.zero_wrench(self._wrench.of(self.latest, self.peripherals.tcp_offset))
 
     # ------------------------------------------------------------------ commands that concern the whole robot
 

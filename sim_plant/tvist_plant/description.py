@@ -25,8 +25,6 @@ Tensor = tuple[NotNegative, Number, Number, NotNegative, Number, NotNegative]
 MAX_JOINTS = 7
 DISTURBANCES = ("friction", "gear", "noise")
 """Disturbances unknown to a shaper: Coulomb friction, kinematic error of the gears, noise of the accelerometer."""
-
-
 QUIET_STEP = 2.0 * math.pi / 2**23
 """Step of an encoder with 23 bits per turn [rad]; an arm at rest moves by less than this while its drives settle."""
 
@@ -204,9 +202,7 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
 
     def quiet(self) -> "RobotDescription":
         """Return the same arm with sensors whose values are constant once the arm is at rest."""
-        return msgspec.structs.replace(
-            self, sensors=Sensors(accelerometer_noise=0.0, encoder_step=QUIET_STEP)
-        )
+        return msgspec.structs.replace(self, sensors=Sensors(encoder_step=QUIET_STEP))
 
     def without_floor(self) -> "RobotDescription":
         """Return the same arm without a floor that it could collide with."""

@@ -29,7 +29,7 @@ def search(
         stops: Number of stops to try, of every kind, at random moments of accepted moves.
         streams: Number of set-point streams towards the floor, the arm itself and the limits.
         changes: Number of changes of payload, shaper, estimator and speed during a motion.
-        sequences: Number of sequences of 40 random commands.
+        sequences: Number of sequences of 40 random commands; every third one has programs among them.
         seed: Seed of the cases; another seed tries other cases.
         robot: Name of a robot that comes with the package, or path of a robot file.
         flexible: Simulate the flexible arm in stops and streams, too, and report how far it overshoots the reference.

@@ -80,7 +80,7 @@ async def _idle_loop(server: Served, _: int) -> AsyncIterator[None]:
 
 def _options(port: str) -> list[str]:
     """Options of a server that has no other of UR's interfaces than RTDE."""
-    options = ["--ur-address", ADDRESS]
+    options = ["--profile", "real", "--ur-address", ADDRESS]
     for interface in UrPorts().open():
         options += ["--ur-port", f"{interface}={port if interface == 'rtde' else 'off'}"]
     return options
