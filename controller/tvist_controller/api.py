@@ -23,6 +23,7 @@ from tvist_controller.mode_source import ModeSource
 from tvist_controller.own_shapers import OwnShaper, RecordedShaper
 from tvist_controller.paths.poses import placement_vector
 from tvist_controller.presence import Presence
+from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.refusal import RefusalError
 from tvist_controller.reporting import truth_of
 from tvist_controller.safety import TORQUE_SHARE
@@ -50,6 +51,7 @@ __all__ = [
     "Presence",
     "RecordedShaper",
     "RefusalError",
+    "ScriptCompiler",
     "Setup",
     "Sink",
     "Target",

@@ -7,7 +7,8 @@ from typing import Any
 from tvist_lab.benchmark.many_robots import robots_at_500_hz
 from tvist_lab.benchmark.one_robot import one_robot
 from tvist_lab.benchmark.parts import parts
-from tvist_lab.benchmark.ur_interfaces import ur_interfaces
+from tvist_lab.benchmark.programs import programs
+from tvist_lab.benchmark.ur_interfaces import ur_interfaces, with_a_program
 
 OF_MANY = 0.4
 """Time for which each number of robots is measured, as a share of the time for one robot [-]."""
@@ -21,8 +22,10 @@ def bench(seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
         tell: Called with a description of each measurement before it starts.
     """
     result: dict[str, Any] = parts(tell)
+    result["programs"] = programs(tell)
     if seconds > 0.0:
         result |= asyncio.run(one_robot(seconds, tell))
         result["ur_interfaces"] = asyncio.run(ur_interfaces(seconds, tell))
+        result["ur_interfaces_with_a_program"] = asyncio.run(with_a_program(OF_MANY * seconds, tell))
         result["robots_at_500_hz"] = asyncio.run(robots_at_500_hz(max(2.0, OF_MANY * seconds), tell))
     return result

@@ -6,6 +6,7 @@ import pytest
 from tvist_controller.kinematics.tool import ToolKinematics
 from tvist_controller.paths.poses import placement_vector
 from tvist_protocol import commands as c
+from tvist_protocol.codec import encode
 from tvist_protocol.io import SetRegisters
 from tvist_protocol.motions import MoveL
 from tvist_protocol.programs import ProgramClosePopup, ProgramPause, ProgramPlay, ProgramRun, ProgramStop
@@ -328,7 +329,7 @@ def test_a_watchdog_pauses_or_stops_the_program_when_its_register_is_not_written
         assert robot.controller.io().watched == ["input_int_register_0"]
     robot.tick(60)
     assert robot.controller.programs.state == state
-    assert robot.controller.io().watched == []
+    assert (robot.controller.io().watched == []) == (action == "stop")
     robot.until_rest()
 
 
@@ -476,3 +477,84 @@ def test_the_end_of_a_program_names_the_safety_stop():
     (why,) = ended(robot)
     (stop,) = [event for event in robot.events if event.kind == "safety_stop"]
     assert why == stop.why
+
+
+def test_a_program_that_is_paused_in_a_safeguard_stop_stays_paused_after_it():
+    robot = a_robot()
+    start(robot, f"movel({pose(dz=0.1)}, v=0.1)")
+    robot.tick(200)
+    robot.send(SimulationInject, fault="safeguard_stop", seconds=1.0)
+    robot.tick(300)
+    assert robot.send(ProgramPause) == Done()
+    robot.tick(200)
+    held = robot.states[-1].reference_q
+    robot.tick(800)
+    assert robot.states[-1].reference_q == held
+    assert robot.send(ProgramPlay) == Done()
+    finish(robot)
+    np.testing.assert_allclose(places(robot)[-1], place(0, 0, 0.1), atol=1e-6)
+
+
+@pytest.mark.parametrize("secondary", [True, False])
+def test_a_program_that_uses_all_evaluations_leaves_some_to_the_others(secondary):
+    busy = ("while True:", "  i = 0", "  while i < 200:", "    i = i + 1", "  end", "  sync()", "end")
+    robot = a_robot()
+    if secondary:
+        text = "\n".join(("sec busy():", *busy, "end", ""))
+        robot.send(ProgramRun, text=text)
+        start(robot, "sleep(0.01)", "textmsg(1)")
+    else:
+        start(robot, *busy)
+        robot.send(ProgramRun, text="sec other():\n  sleep(0.01)\n  textmsg(1)\nend\n")
+    robot.tick(100)
+    assert said(robot) == ["1"]
+
+
+@pytest.mark.parametrize(
+    "move", [f"movej({NEAR})", f"movel({pose(dz=0.05)})", "speedj([0.1,0,0,0,0,0], 1, 0.2)"]
+)
+def test_a_protective_stop_of_the_program_pauses_it_before_its_next_move(move):
+    robot = a_robot()
+    run(robot, "protective_stop()", move, "textmsg(1)")
+    assert robot.controller.programs.state == "PAUSED"
+    assert failure(robot) is None
+    assert robot.send(c.UnlockProtectiveStop) == Done()
+    assert robot.send(ProgramPlay) == Done()
+    finish(robot)
+    assert said(robot) == ["1"]
+
+
+def test_a_watchdog_waits_while_the_program_is_paused_and_watches_again_after():
+    robot = a_robot()
+    start(robot, 'rtde_set_watchdog("input_int_register_0", 10.0, "stop")', "while True:", "  sync()", "end")
+    robot.tick(20)
+    robot.send(ProgramPause)
+    robot.tick(300)
+    assert robot.controller.programs.state == "PAUSED"
+    robot.send(ProgramPlay)
+    robot.tick(40)
+    assert playing(robot)
+    robot.tick(20)
+    assert robot.controller.programs.state == "STOPPED"
+
+
+def test_what_is_left_of_a_cut_character_is_shown_as_one_that_is_not_known():
+    robot = a_robot()
+    run(robot, 'textmsg(str_at("é", 0))')
+    (text,) = (event for event in robot.events if event.kind == "text")
+    assert encode(text)
+    assert text.why == "\ufffd"
+
+
+def test_a_program_cannot_move_an_arm_that_a_client_streams_to():
+    robot = a_robot()
+    robot.send(c.ServoStart, period=0.002, velocity=1.0, acceleration=2.0, jerk=100.0)
+    start(robot, f"movej({NEAR})")
+    robot.tick(5)
+    assert "streams set-points" in failure(robot).why
+
+
+def test_the_history_of_the_joints_has_the_present_from_the_first_tick():
+    robot = a_robot()
+    run(robot, "textmsg(norm(get_actual_joint_positions_history(0) - get_actual_joint_positions()))")
+    assert said(robot) == ["0"]

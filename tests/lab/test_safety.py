@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.trajectory import PathStop
-from tvist_lab.safety import sequences, stops
+from tvist_lab.safety import programs, sequences, stops
 from tvist_lab.safety.markdown import page
 from tvist_lab.safety.report import Counts, broken, search
 from tvist_plant.description import load
@@ -19,6 +19,11 @@ UR5E = load("ur5e")
 @pytest.mark.parametrize("number", range(12))
 def test_whatever_is_sent_the_promises_hold(number):
     sequences.Sequence(UR5E, number).run()
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_whatever_programs_do_the_promises_hold(number):
+    programs.ProgramSequence(UR5E, number).run()
 
 
 @pytest.mark.parametrize(

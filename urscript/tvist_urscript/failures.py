@@ -44,6 +44,16 @@ def position_of(steps: Any) -> tuple[int, int] | None:
     return found
 
 
+def line_of(steps: Any) -> int | None:
+    """Return the line of `position_of`, which is found a hundred times as fast."""
+    found = None
+    while (frame := getattr(steps, "gi_frame", None)) is not None:
+        if frame.f_code.co_filename == FILE and frame.f_lasti >= 0:
+            found = frame
+        steps = steps.gi_yieldfrom
+    return None if found is None else found.f_lineno or 1
+
+
 def _places(traceback: TracebackType | None) -> list[tuple[int, int]]:
     places = []
     while traceback is not None:

@@ -6,7 +6,7 @@ from typing import Any
 
 from tvist_urscript.compiler import Script
 from tvist_urscript.errors import Fault, ScriptError
-from tvist_urscript.failures import TooDeep, failure, position_of
+from tvist_urscript.failures import TooDeep, failure, line_of, position_of
 from tvist_urscript.functions import DEEPEST_CALLS
 from tvist_urscript.library import PURE
 from tvist_urscript.operators import operators
@@ -84,9 +84,7 @@ class Machine:
     @property
     def line(self) -> int:
         """The present line of the main thread."""
-        present = position_of(self._main.steps)
-        if present is not None:
-            self._line = present[0]
+        self._line = line_of(self._main.steps) or self._line
         return self._line
 
     def resume(self, budget: int = EVALUATIONS) -> int:

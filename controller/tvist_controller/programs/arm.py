@@ -7,20 +7,19 @@ from dataclasses import dataclass, field
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.access import Access
+from tvist_controller.programs.moves import command_of
 from tvist_controller.refusal import RefusalError
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
-from tvist_protocol.motions import JointSegment, LineSegment, MoveL, MovePath, Segment
+from tvist_protocol.motions import Segment
 from tvist_protocol.replies import Accepted
 from tvist_protocol.stream import Event
-from tvist_protocol.transitions import Activity
+from tvist_protocol.transitions import Activity, after
 from tvist_urscript import Fault
 
 Turns = Generator[None, None, None]
 """Course of a function that lets time pass: it yields once a tick."""
 
-OWN_TOKEN = "program"  # noqa: S105  the lease was checked when the program was played
-"""Token in the commands that a program makes, which are not sent to clients."""
 DELAY, DELAY_PER_PART = 10, 4
 """Ticks from the call of a move along a line or path to its start, and ticks more for each further part of a path:
 time to plan it beside the ticks. They do not depend on how long planning takes, so equal programs move alike.
@@ -105,17 +104,17 @@ class ProgramArm:
         return None if path is None else path.legs[-1]
 
     def _travel(self, path: _Path) -> Turns:
-        yield from self._come_to_rest()
         while path.legs:
             self.waypoint = path.legs[-1]
-            yield from self._wait_for_unlock()
+            yield from self._come_to_rest()
             self._check_ready()
             plan = yield from self._planned(path.legs)
             if self._motion.activity.protective:
                 continue
             if isinstance(plan.found, RefusalError):
-                self._refused(plan.found, path.legs)
-                yield  # in a protective stop the program is paused here, and tries again when it is resumed
+                self._refused(
+                    plan.found, path.legs
+                )  # in a protective stop, it tries again when it is resumed
                 continue
             marks = self._start(path.legs, plan)
             passed = 0
@@ -128,15 +127,13 @@ class ProgramArm:
                 for effects in path.effects[passed:]:
                     self._pass(effects)
                 passed = len(path.legs)
-            else:
-                yield from self._come_to_rest()
             del path.legs[:passed], path.effects[:passed]
 
     def _start(self, legs: list[Segment], plan: Plan) -> tuple[tuple[int, float], ...]:
         """Start a planned motion; return where its blends begin, see `PlannedMove.marks`."""
         try:
-            reply = self._access.send(_command(legs), plan)
-        except RefusalError as refusal:  # a client has moved the arm meanwhile
+            reply = self._access.send(command_of(legs), plan)
+        except RefusalError as refusal:
             raise Fault(refusal.reply.why) from refusal
         assert isinstance(reply, Accepted)
         assert isinstance(plan.found, PlannedMove)
@@ -145,12 +142,14 @@ class ProgramArm:
 
     def _planned(self, legs: list[Segment]) -> Generator[None, None, Plan]:
         """The plan of a move. Lines and paths begin a fixed time after it is ordered."""
-        access, command = self._access, _command(legs)
+        access, command = self._access, command_of(legs)
         if isinstance(command, MoveJ):
             return access.plan(command)
         ordered = access.order(command)
         for _ in range(DELAY + DELAY_PER_PART * (len(legs) - 1)):
             yield
+        yield from self._come_to_rest()  # a client may have moved the arm meanwhile
+        self._check_ready()
         plan = ordered()
         return plan if plan.holds(access.basis()) else access.plan(command)
 
@@ -165,11 +164,6 @@ class ProgramArm:
             effect()
         effects.clear()
 
-    def _wait_for_unlock(self) -> Turns:
-        """Wait in a protective stop that another thread has just caused; the program is paused then."""
-        while self._motion.activity.protective:
-            yield
-
     def _check_ready(self) -> None:
         try:
             self._motion.check("move_j")
@@ -179,18 +173,18 @@ class ProgramArm:
     def _refused(self, refusal: RefusalError, legs: list[Segment]) -> None:
         """End a program whose move is impossible, or stop the robot if it is a line or path that leads nowhere."""
         reply = refusal.reply
-        if isinstance(_command(legs), MoveJ) or reply.code not in _UNREACHABLE:
+        if isinstance(command_of(legs), MoveJ) or reply.code not in _UNREACHABLE:
             raise Fault(reply.why)
         self._motion.protect(f"the program's move was refused: {reply.why}", reply.code)
 
     def _come_to_rest(self) -> Turns:
-        """Stop what still moves."""
+        """Stop what still moves. In a protective stop of this tick the program is paused here."""
         motion = self._motion
         if motion.activity is Activity.STREAMING:
             raise Fault("a client streams set-points to the arm, so the program cannot move it")
         if motion.activity in {Activity.GUIDED, Activity.MOVING, Activity.PAUSED}:
             self.brake(lambda: self._access.guidance.stop_joints(BRAKING))
-        while motion.activity.moving and not motion.activity.protective:
+        while motion.activity.moving or motion.activity.protective:
             yield
 
     # ------------------------------------------------------------------ guided motions
@@ -207,9 +201,16 @@ class ProgramArm:
         """
         yield from self.finish()
         with self._moving():
-            yield from self._wait_for_unlock()
+            while self.stopping:
+                yield
             self.steer(start)
             yield from wait()
+
+    @property
+    def stopping(self) -> bool:
+        """Whether a guided motion has to wait: for a stop under way, or in a protective stop of this tick."""
+        activity = self._motion.activity
+        return (activity.moving or activity.protective) and after(activity, "speed_j") is None
 
     def steer(self, start: Callable[[bool], int]) -> None:
         """Begin or change a guided motion within a call of `guide`; see there. In a protective stop nothing happens."""
@@ -326,26 +327,3 @@ class ProgramArm:
             raise
         finally:
             self._inside = None
-
-
-def _command(legs: list[Segment]) -> MoveJ | MoveL | MovePath:
-    """The command for a path: the simplest that does."""
-    token = OWN_TOKEN
-    match legs:
-        case [JointSegment() as leg]:
-            return MoveJ(
-                token=token,
-                q=leg.q,
-                velocity=leg.velocity,
-                acceleration=leg.acceleration,
-                duration=leg.duration,
-            )
-        case [LineSegment() as leg]:
-            return MoveL(
-                token=token,
-                pose=leg.pose,
-                velocity=leg.velocity,
-                acceleration=leg.acceleration,
-                duration=leg.duration,
-            )
-    return MovePath(token=token, segments=tuple(legs))

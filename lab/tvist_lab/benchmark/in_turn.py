@@ -54,12 +54,16 @@ async def in_turn(
 
 
 def _compare(without: np.ndarray[Any, Any], loaded: np.ndarray[Any, Any]) -> dict[str, float]:
-    difference = loaded - without
-    spread = float(difference.std(ddof=1) / np.sqrt(len(difference))) if len(difference) > 1 else float("nan")
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2.0, len(difference) - 1)) * spread
+    difference, half = mean_and_interval(loaded - without)
     return {
         "without": float(without.mean()),
         "with": float(loaded.mean()),
-        "difference": float(difference.mean()),
+        "difference": difference,
         "interval": half,
     }
+
+
+def mean_and_interval(values: np.ndarray[Any, Any]) -> tuple[float, float]:
+    """Return the mean of independent values and the half-width of its 95 % interval (Student); nan for one value."""
+    spread = float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
+    return float(values.mean()), float(stats.t.ppf(0.5 + CONFIDENCE / 2.0, len(values) - 1)) * spread

@@ -51,7 +51,7 @@ _WHAT = {
     "8, payload 0 to 5 kg, plain and shaped",
     "streams": "streams of set-points towards the floor, the arm itself and the limits, cut or ended at random",
     "changes": "changes during a motion",
-    "sequences": "sequences of 40 random commands",
+    "sequences": "sequences of 40 random commands, a third of them with programs in URScript",
 }
 
 

@@ -8,13 +8,15 @@ from typing import Any, TypeVar
 import numpy as np
 
 from tvist_lab.evaluation.workers import spread
-from tvist_lab.safety import changes, sequences, stops, streams
+from tvist_lab.safety import changes, programs, sequences, stops, streams
 from tvist_plant.description import RobotDescription, load
 
 T = TypeVar("T")
 
 APART = 1_000_000
 """Difference between the case numbers of two consecutive seeds."""
+PROGRAMS = 3
+"""One in so many sequences of commands contains programs."""
 
 
 @dataclass(frozen=True)
@@ -92,8 +94,9 @@ def _stream(description: RobotDescription, flexible: bool, number: int) -> strea
 
 
 def _sequence(description: RobotDescription, number: int) -> str | None:
+    kind = programs.ProgramSequence if number % PROGRAMS == PROGRAMS - 1 else sequences.Sequence
     try:
-        sequences.Sequence(description, number).run()
+        kind(description, number).run()
     except sequences.BrokenError as error:
         return str(error)
     return None

@@ -1,17 +1,18 @@
 """Random sequences of arbitrary commands, and guarantees that must hold throughout."""
 
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
-from tvist_controller.api import CLEARANCE, STILL, CollisionModel, body, paper_payload
+from tvist_controller.api import CLEARANCE, CollisionModel, body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_lab.safety import space
 from tvist_lab.safety.changes import far_payload
 from tvist_lab.safety.stops import SHAPERS
 from tvist_lab.safety.subject import CLIENT, SESSION, Subject
+from tvist_lab.safety.undisturbed import ROUNDING, Undisturbed
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
@@ -25,8 +26,6 @@ COMMANDS = 40
 """Number of commands in a sequence."""
 PAUSES = (0, 1, 2, 5, 20, 60, 150, 400)
 """Possible numbers of ticks between two commands."""
-ROUNDING = 1e-9
-"""Differences between positions below this are rounding errors [rad]."""
 VELOCITY, ACCELERATION = 1.003, 1.01
 """Largest shaped velocity and acceleration, relative to the joints' limits [-]."""
 FAULTS = (
@@ -35,22 +34,14 @@ FAULTS = (
 )  # fmt: skip
 STOPS_ON_WAY = frozenset({"protective_stop", "safeguard_stop", "emergency_stop", "system_emergency_stop"})
 """Faults that stop a motion on its path."""
-HALTS = frozenset({"stop", "pause", "power_off", "inject", "lose", "release"})
+HALTS = frozenset(
+    {"stop", "pause", "power_off", "inject", "lose", "release", "program_pause", "program_stop"}
+)
 """Commands after which the reference must not get ahead of the uninterrupted motion."""
 
 
 class BrokenError(AssertionError):
     """A guarantee was violated; the text names the command and the sequence."""
-
-
-@dataclass
-class Undisturbed:
-    """Future references if no command comes."""
-
-    references: Floats
-    """References from that moment on, one per tick, shape (k, n) [rad]."""
-    since: int
-    """Tick of that moment."""
 
 
 class Sequence:
@@ -87,12 +78,12 @@ class Sequence:
         Raises:
             BrokenError: A guarantee was violated.
         """
-        names = list(_SENT)
-        weights = np.array([weight for weight, _ in _SENT.values()], dtype=float)
+        sent = self.sent
+        weights = np.array([weight for weight, _ in sent.values()], dtype=float)
         for _ in range(count):
-            name = str(self._random.choice(names, p=weights / weights.sum()))
+            name = str(self._random.choice(list(sent), p=weights / weights.sum()))
             before = self._foresee() if name in HALTS else None
-            reply = _SENT[name][1](self)
+            reply = sent[name][1](self)
             said = reply.code if isinstance(reply, Refused) else type(reply).__name__
             self.done.append(f"tick {self.robot.controller.tick_number} {name}: {said}")
             if name != "wait":
@@ -100,6 +91,11 @@ class Sequence:
                 self._ahead = None if goes_on else before
             self._tick(int(self._random.choice(PAUSES)))
         self._come_back()
+
+    @property
+    def sent(self) -> Mapping[str, tuple[float, Callable[[Any], object]]]:
+        """Commands and their relative frequencies."""
+        return SENT
 
     def _posture(self) -> Floats:
         while True:
@@ -157,7 +153,10 @@ class Sequence:
                 raise self._broken(f"a reference accelerates by {hard:.3f} rad/s²")
             self._watch_clearance(q)
         if self._ahead is not None:
-            self._watch_way(self._ahead, q[-1])
+            tick = robot.controller.tick_number - self._ahead.since
+            breach = self._ahead.breach(tick, q[-1], resting=robot.resting)
+            if breach is not None:
+                raise self._broken(breach)
 
     def _watch_clearance(self, q: Floats) -> None:
         collisions = self.robot.controller.motion.collisions
@@ -166,25 +165,6 @@ class Sequence:
             self._excused = False
         elif not self._excused:
             raise self._broken(f"by the reference {meeting}, nearer than {CLEARANCE} m")
-
-    def _watch_way(self, ahead: Undisturbed, q: Floats) -> None:
-        """Check that the reference is on the line, not ahead, and at rest no later."""
-        references = ahead.references
-        tick = self.robot.controller.tick_number - ahead.since
-        way = references[-1] - references[0]
-        length = float(np.linalg.norm(way))
-        if length < ROUNDING:
-            return
-        along = way / length
-        reached, there = (q - references[0]) @ along, references[min(tick, len(references) - 1)]
-        # Changes below 1e-7 rad per tick count as rest, so the filter's tail still creeps.
-        creeps = 10.0 * STILL if tick >= len(references) else 0.0
-        if reached > (there - references[0]) @ along + ROUNDING + creeps:
-            raise self._broken("a stop is ahead of what the motion would have done")
-        if np.abs(q - references[0] - reached * along).max() > ROUNDING:
-            raise self._broken("a stop leaves the line")
-        if tick > len(references) + 1 and not self.robot.resting:
-            raise self._broken("a stop lasts longer than the motion would have")
 
     def _come_back(self) -> None:
         """Check that the robot can be moved again from its present state."""
@@ -326,7 +306,7 @@ def _in_space(send: Callable[[Subject, np.random.Generator], object]) -> Callabl
     return lambda it: send(it.robot, it._random)  # noqa: SLF001  the sequence's own commands
 
 
-_SENT: dict[str, tuple[float, Callable[[Sequence], object]]] = {
+SENT: dict[str, tuple[float, Callable[[Sequence], object]]] = {
     "move": (14.0, Sequence.move),
     "stream": (5.0, Sequence.stream),
     "servo_stop": (2.0, lambda it: it.robot.send(c.ServoStop)),

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tvist_controller.api import ToolKinematics, placement_vector, turned
+from tvist_lab.recordings import Floats
 from tvist_lab.safety.subject import Subject
 from tvist_protocol import motions as m
 from tvist_protocol.replies import Reply
@@ -18,7 +19,12 @@ NEAR, TURN = 0.2, 0.6
 
 def _pose(robot: Subject, random: Random, share: float = 1.0) -> Pose:
     """A pose of the flange near the present one."""
-    rotation, position = ToolKinematics(robot.description).pose(robot.references[-1])
+    return pose_near(ToolKinematics(robot.description), robot.references[-1], random, share)
+
+
+def pose_near(kinematics: ToolKinematics, q: Floats, random: Random, share: float = 1.0) -> Pose:
+    """Return a random pose near that of the tool at a posture."""
+    rotation, position = kinematics.pose(q)
     moved = position + share * random.uniform(-NEAR, NEAR, 3)
     return placement_vector(turned(rotation, share * random.uniform(-TURN, TURN, 3)), moved)
 

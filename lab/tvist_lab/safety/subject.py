@@ -81,6 +81,8 @@ class Subject:
     events: list[Event] = field(default_factory=list)
     references: list[Floats] = field(default_factory=list)
     """Shaped references played, one array per tick; the first is the start [rad]."""
+    numbers: set[int] = field(default_factory=set)
+    """Numbers of the motions that its client has asked for."""
     actual: list[Floats] = field(default_factory=list)
     """Measured joint angles, one array per tick [rad]."""
 
@@ -112,7 +114,10 @@ class Subject:
         """Send a command with the token of the lease, unless another one is given."""
         if "token" in kind.__struct_fields__:
             fields.setdefault("token", self.token)
-        return self.controller.receive(kind(**fields))
+        reply = self.controller.receive(kind(**fields))
+        if isinstance(reply, Accepted) and reply.id is not None:
+            self.numbers.add(reply.id)
+        return reply
 
     def setpoint(self, sequence: int, q: Floats) -> None:
         """Send a set-point."""

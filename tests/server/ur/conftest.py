@@ -164,6 +164,7 @@ def robot(snapshots) -> SimpleNamespace:
         tell=told.append,
         told=told,
         report=reported.append,
+        report_refusal=reported.append,
         reported=reported,
     )
 

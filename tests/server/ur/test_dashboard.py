@@ -431,7 +431,7 @@ LINES = st.one_of(
 @given(lines=st.lists(LINES.map(lambda line: line.replace(b"\n", b"")), max_size=20), data=st.data())
 def test_every_line_is_answered_with_one_line(lines, data):
     lines = [line for line in lines if line.strip().lower() != b"quit"]
-    said = {"tell": message, "report": str}
+    said = {"tell": message, "report_refusal": str}
     robot = host(SimpleNamespace(description=UR5E, name="a", serial="20245500001", latest=None, **said))
     replies = st.sampled_from([Done(), Accepted(id=1), Refused(code="no_control", where="", why="x")])
     control = SimpleNamespace(

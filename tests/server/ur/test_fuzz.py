@@ -48,7 +48,7 @@ class House(Sink):
         self.controller.session.release()
         self.host = Host(self.controller, self)
         self.instruments = Instruments(UR5E)
-        self.robot = UrRobot(UR5E, "ur5e", self.tell, lambda _: None)
+        self.robot = UrRobot(UR5E, "ur5e", self.tell, lambda _: None, lambda _: None)
         self.leases = {host: HostLease(self, host, self.due_append) for host in ("127.0.0.1", "127.0.0.2")}
         self.due = deque()
         self.clients = []

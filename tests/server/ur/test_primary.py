@@ -581,7 +581,8 @@ def test_the_read_only_ports_answer_commands_with_210_and_do_nothing(robot, cont
 @given(data=st.binary(max_size=300))
 def test_no_bytes_break_a_session(data):
     reported = []
-    robot = host(SimpleNamespace(description=UR5E, latest=None, tell=message, report=reported.append))
+    said = {"tell": message, "report": reported.append, "report_refusal": reported.append}
+    robot = host(SimpleNamespace(description=UR5E, latest=None, **said))
     control = SimpleNamespace(
         peer="x",
         held_by_other=True,

@@ -149,7 +149,10 @@ class MotionFunctions:
         def wait() -> Iterator[None]:
             yield
             while course()[1] > radius:
-                self._arm.steer(start)
+                if (
+                    not self._access.motion.activity.protective
+                ):  # else the program is paused from this tick on
+                    self._arm.steer(start)
                 yield
 
         yield from self._arm.guide(start, wait)

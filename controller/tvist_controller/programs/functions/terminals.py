@@ -2,7 +2,8 @@
 
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import flag, integer, number, shown
-from tvist_controller.programs.arm import OWN_TOKEN, ProgramArm
+from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.moves import OWN_TOKEN
 from tvist_protocol.io import SetIo
 from tvist_urscript import Array, Fault, signature
 

@@ -76,10 +76,10 @@ class UrInterfaces(Gateway):
         self.setpoints_refused = 0
         self.address = address
         self._desk = desk
-        self._scripts, self._coming_and_going = (
-            Notices(lambda line: log.warning("robot %s: %s", name, line)) for _ in range(2)
+        self._scripts, self._refusals, self._coming_and_going = (
+            Notices(lambda line: log.warning("robot %s: %s", name, line)) for _ in range(3)
         )
-        self.robot = UrRobot(description, name, self._tell, self._scripts.tell)
+        self.robot = UrRobot(description, name, self._tell, self._scripts.tell, self._refusals.tell)
         self._instruments = Instruments(description)
         self._io: Io | None = None
         self._early = deque[State](maxlen=FIRST)
@@ -183,6 +183,7 @@ class UrInterfaces(Gateway):
         self._loop = None
         self._room.set()  # releases a thread that waits to pass on a state
         self._scripts.flush()
+        self._refusals.flush()
         self._coming_and_going.flush()
 
     def close(self) -> None:

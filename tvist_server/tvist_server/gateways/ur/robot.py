@@ -20,6 +20,7 @@ class UrRobot:
         name: Name of the robot on the network.
         tell: Sends a robot message to all clients that get them.
         report: Takes a sentence for the server's console.
+        report_refusal: Takes one that says why something was refused.
     """
 
     def __init__(
@@ -28,6 +29,7 @@ class UrRobot:
         name: str,
         tell: Callable[[bytes], None],
         report: Callable[[str], None],
+        report_refusal: Callable[[str], None],
     ) -> None:
         self.description = description
         self.name = name
@@ -40,12 +42,11 @@ class UrRobot:
         self.inputs = InputOwners()
         self.programs = Programs(self)
         self._tell = tell
-        self._report = report
+        self.report = report
+        """Writes a sentence to the server's console."""
+        self.report_refusal = report_refusal
+        """Writes a sentence about a refusal to it, which no other sentence displaces."""
 
     def tell(self, message: bytes) -> None:
         """Send a robot message to all clients that get them."""
         self._tell(message)
-
-    def report(self, sentence: str) -> None:
-        """Write a sentence to the server's console."""
-        self._report(sentence)

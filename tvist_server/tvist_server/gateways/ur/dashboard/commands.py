@@ -131,7 +131,7 @@ def _load(request: Request) -> None:
             return
         place = refused.where.replace("text:", "line ").replace(":", ", column ")
         why = f"{place}: {refused.why}" if refused.code == "script_error" else refused.why
-        request.robot.report(f'the program "{path}" of {request.control.peer} was not loaded: {why}')
+        request.robot.report_refusal(f'the program "{path}" of {request.control.peer} was not loaded: {why}')
         request.answer(f"File not found: {path}" if refused.code == "out_of_range" else failed)
 
     if request.control.held_by_other:

@@ -67,7 +67,7 @@ class Orders:
     def decline(self, unit: Unit) -> None:
         """Report that this interface accepts no commands."""
         self._read_only()
-        self._report(unit, "was refused: this port is read-only")
+        self._report_refusal(unit, "this port is read-only")
 
     def _work(self) -> None:
         """Carry out the waiting units, until one has to wait for its answer."""
@@ -91,26 +91,21 @@ class Orders:
         if unit.too_long:
             stamp = messages.stamp(self._robot.latest)
             self._robot.tell(messages.runtime_exception(stamp, unit.line, unit.column, TOO_LONG))
-            self._report(unit, f"was refused: it has more than {LONGEST} bytes")
+            self._report_refusal(unit, f"it has more than {LONGEST} bytes")
             done()
         elif len(unit.text) >= 1000 or not self._command(unit, done):
             self._run(unit, done)
 
     def _command(self, unit: Unit, done: Done) -> bool:
         """Carry out one of the interface's own commands; return whether the unit is one."""
-        robot, control, words = self._robot, self._control, unit.words
+        robot, control = self._robot, self._control
 
-        def outcome(refused: Refused | None) -> None:
-            if refused is not None:
-                self._tell_refused(words, refused)
-            self._report(unit, "was run" if refused is None else f"was refused: {refused.why}")
+        def report(what: str) -> None:
+            self._report(unit, what)
             done()
 
-        def stopped(well: bool) -> None:
-            self._report(unit, "was run" if well else "was refused")
-            done()
-
-        match words:
+        outcome = self._outcome(unit, done)
+        match unit.words:
             case "power on":
                 power.power_on(robot, control, outcome)
             case "power off":
@@ -120,13 +115,25 @@ class Orders:
             case "set unlock protective stop":
                 power.unlock(robot, control, outcome)
             case "stop program":
-                robot.programs.stop(control, stopped)
+                robot.programs.stop(control, lambda well: report("was run" if well else "was refused"))
             case "set sim" | "set real":
-                self._report(unit, "changes nothing: the arm is simulated")
-                done()
+                report("changes nothing: the arm is simulated")
             case _:
                 return False
         return True
+
+    def _outcome(self, unit: Unit, done: Done) -> Callable[[Refused | None], None]:
+        """Takes what became of one of the interface's own commands."""
+
+        def outcome(refused: Refused | None) -> None:
+            if refused is None:
+                self._report(unit, "was run")
+            else:
+                self._tell_refused(unit.words, refused)
+                self._report_refusal(unit, refused.why)
+            done()
+
+        return outcome
 
     def _run(self, unit: Unit, done: Done) -> None:
         """Have the controller run a program."""
@@ -136,10 +143,10 @@ class Orders:
                 self._report(unit, "was started")
             elif refused.code == "script_error":  # all clients have got the exception
                 _, line, column = refused.where.split(":")
-                self._report(unit, f"was refused: line {line}, column {column}: {refused.why}")
+                self._report_refusal(unit, f"line {line}, column {column}: {refused.why}")
             else:
                 self._tell_refused(unit.title, refused)
-                self._report(unit, f"was refused: {refused.why}")
+                self._report_refusal(unit, refused.why)
             done()
 
         self._robot.programs.run(unit.text, self._control, outcome, secondary=unit.secondary)
@@ -158,3 +165,6 @@ class Orders:
 
     def _report(self, unit: Unit, what: str) -> None:
         self._robot.report(f'the script "{unit.title}" of {self._control.peer} {what}')
+
+    def _report_refusal(self, unit: Unit, why: str) -> None:
+        self._robot.report_refusal(f'the script "{unit.title}" of {self._control.peer} was refused: {why}')
