@@ -1,7 +1,7 @@
 """Terminals, registers and tool centre point of a robot: set by commands, and published as `Io`."""
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from tvist_controller.command_row import Call, Row
 from tvist_controller.refusal import RefusalError
@@ -11,6 +11,7 @@ from tvist_protocol.io import (
     Bank,
     Io,
     Register,
+    Registers,
     SetIo,
     SetRegisters,
     SetTcp,
@@ -23,6 +24,7 @@ CURRENT = (0.004, 0.020)
 """Range of an analogue terminal as a current [A]."""
 VOLTAGE = (0.0, 10.0)
 """Range of an analogue terminal as a voltage [V]."""
+Number = TypeVar("Number", int, float)
 LEAST, MOST = -(2**31), 2**31 - 1
 """Range of an integer register."""
 
@@ -206,31 +208,39 @@ class Peripherals:
     def _set_registers(self, call: Call[SetRegisters]) -> None:
         """Write registers; input registers may be written without control."""
         command = call.command
-        if command.token is None and command.bank.startswith("output"):
-            why = f"token is missing: {command.bank} registers belong to the robot, and writing them needs control"
+        runs: tuple[SetRegisters | Registers, ...] = (command, *command.also)
+        for bank in (run.bank for run in runs if command.token is None and run.bank.startswith("output")):
+            why = f"token is missing: {bank} registers belong to the robot, and writing them needs control"
             raise RefusalError("missing_field", "token", why)
         self.set_registers(command)
-        for place in range(command.first, command.first + len(command.values)):
-            self._written[command.bank, place] = call.tick
+        for run in runs:
+            for place in range(run.first, run.first + len(run.values)):
+                self._written[run.bank, place] = call.tick
 
     def set_registers(self, command: SetRegisters) -> None:
-        """Write registers.
+        """Write registers: all of them, or none.
 
         Raises:
             RefusalError: A register does not exist, or a value is invalid for its bank.
         """
-        bank, first, values = command.bank, command.first, command.values
-        there = BITS if bank in self._bits else NUMBERS
-        if first + len(values) > there:
-            why = f"first is {first} with {len(values)} values; {bank} has {there} registers"
-            raise RefusalError("out_of_range", "values", why, there)
-        last = first + len(values)
-        if bank in self._bits:
-            self._bits[bank] = _with_bits(self._bits[bank], first, values, bank)
-        elif bank in self._ints:
-            self._ints[bank][first:last] = [_integer(k, value, bank) for k, value in enumerate(values)]
-        else:
-            self._doubles[bank][first:last] = [_double(k, value, bank) for k, value in enumerate(values)]
+        bits, ints, doubles = dict(self._bits), dict(self._ints), dict(self._doubles)
+        runs: tuple[SetRegisters | Registers, ...] = (command, *command.also)
+        for run in runs:
+            bank, first, values = run.bank, run.first, run.values
+            there = BITS if bank in bits else NUMBERS
+            if first + len(values) > there:
+                why = f"first is {first} with {len(values)} values; {bank} has {there} registers"
+                raise RefusalError("out_of_range", "values", why, there)
+            if bank in bits:
+                bits[bank] = _with_bits(bits[bank], first, values, bank)
+            elif bank in ints:
+                ints[bank] = _with(
+                    ints[bank], first, [_integer(k, one, bank) for k, one in enumerate(values)]
+                )
+            else:
+                numbers = [_double(k, one, bank) for k, one in enumerate(values)]
+                doubles[bank] = _with(doubles[bank], first, numbers)
+        self._bits, self._ints, self._doubles = bits, ints, doubles
 
     def io(
         self, tick: int, payload: Payload, speed: float, program: LoadedProgram, wrench: list[float] | None
@@ -273,6 +283,10 @@ class Peripherals:
     def _analog_output(self, number: int) -> float:
         voltage = bool(self._analog_types >> (2 + number) & 1)
         return analog_value(self._analog_ratios[number], voltage=voltage)
+
+
+def _with(values: list[Number], first: int, new: list[Number]) -> list[Number]:
+    return values[:first] + new + values[first + len(new) :]
 
 
 def _with_bits(words: list[int], first: int, values: Sequence[Register], bank: Bank) -> list[int]:

@@ -42,7 +42,7 @@ from tvist_protocol.commands import (
 )
 from tvist_protocol.errors import ProtocolError, RefusedError, TvistError
 from tvist_protocol.info import CalibrationInfo, Clock, Info, Limits, Stopping, StopReason
-from tvist_protocol.io import Bank, Io, SetIo, SetRegisters, SetTcp, SimulationSetInputs
+from tvist_protocol.io import Bank, Io, Registers, SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.motions import (
@@ -119,6 +119,7 @@ __all__ = [
     "ProtocolError",
     "Refused",
     "RefusedError",
+    "Registers",
     "ReleaseClock",
     "ReleaseControl",
     "Reply",

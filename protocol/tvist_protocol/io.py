@@ -106,8 +106,19 @@ class SetIo(ClientMessage, frozen=True, kw_only=True, tag="set_io"):
     """Value of the second analogue output as a share of its range [-]."""
 
 
-class SetRegisters(ClientMessage, frozen=True, kw_only=True, tag="set_registers"):
-    """Write consecutive registers."""
+class Registers(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Consecutive registers that a `set_registers` writes besides others."""
+
+    bank: Bank
+    """Bank of registers to write."""
+    values: Annotated[tuple[Register, ...], Meta(min_length=1, max_length=BITS)]
+    """Values to write, as in `set_registers`."""
+    first: Annotated[int, Meta(ge=0, le=BITS - 1)] = 0
+    """Number of the first register."""
+
+
+class SetRegisters(ClientMessage, frozen=True, kw_only=True, tag="set_registers", omit_defaults=True):
+    """Write registers at one tick: consecutive ones, and others beside them."""
 
     bank: Bank
     """Bank of registers to write."""
@@ -117,6 +128,8 @@ class SetRegisters(ClientMessage, frozen=True, kw_only=True, tag="set_registers"
     """Number of the first register."""
     token: Token | None = None
     """Token of the lease; output registers, which belong to the robot, need it, input registers do not."""
+    also: Annotated[tuple[Registers, ...], Meta(max_length=BITS)] = ()
+    """Further registers; programs never see some of them written and others not."""
 
 
 class SetTcp(ClientMessage, frozen=True, kw_only=True, tag="set_tcp"):

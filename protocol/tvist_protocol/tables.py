@@ -10,7 +10,7 @@ from tvist_protocol.channels import CHANNELS, COMMANDS, REPLIES, Channel, tag
 from tvist_protocol.commands import Setpoint
 from tvist_protocol.faults import FAULTS, Fault
 from tvist_protocol.info import CalibrationInfo, Info, Limits, Stopping, StopReason
-from tvist_protocol.io import Io
+from tvist_protocol.io import Io, Registers
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment
 from tvist_protocol.replies import CODE_MEANINGS
@@ -36,7 +36,9 @@ def tables() -> dict[str, str]:
         "keys": _table(("key", "kind", "by", "carries", "what"), map(_channel_row, CHANNELS)),
         "commands": _messages(COMMANDS),
         "setpoint": _messages((Setpoint,)),
-        "parts": _messages((Payload, StepSetpoint, JointSegment, LineSegment, ProcessSegment, ArcSegment)),
+        "parts": _messages(
+            (Payload, Registers, StepSetpoint, JointSegment, LineSegment, ProcessSegment, ArcSegment)
+        ),
         "replies": _messages(REPLIES),
         "codes": _table(("code", "meaning"), ((f"`{code}`", text) for code, text in CODE_MEANINGS.items())),
         "streams": _messages((State, Event, Truth, Telemetry, Io)),

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tvist_controller.peripherals import Peripherals
 from tvist_controller.setup import paper_payload
 from tvist_protocol.commands import PowerOff, PowerOn
-from tvist_protocol.io import BITS, NUMBERS, SetIo, SetRegisters, SetTcp, SimulationSetInputs
+from tvist_protocol.io import BITS, NUMBERS, Registers, SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.simulation import SimulationInject, SimulationReset
@@ -207,3 +207,30 @@ def test_a_quiet_arm_at_rest_says_the_same_from_tick_to_tick():
 
 def _placement(pose):
     return pin.SE3(pin.exp3(np.array(pose[3:])), np.array(pose[:3]))
+
+
+def test_registers_of_several_banks_are_written_together_or_not_at_all():
+    robot = Robot()
+    also = [
+        Registers(bank="input_double", first=3, values=(0.5, 1.5)),
+        Registers(bank="input_bit", values=(True,)),
+    ]
+    assert robot.send(SetRegisters, bank="input_int", values=(7,), also=tuple(also)) == Done()
+    io = robot.controller.io()
+    assert (io.input_int_register[0], io.input_double_register[3:5], io.input_bit_register[0]) == (
+        7,
+        [0.5, 1.5],
+        1,
+    )
+    wrong = Registers(bank="input_double", first=47, values=(1.0, 2.0))
+    assert isinstance(robot.send(SetRegisters, bank="input_int", values=(8,), also=(*also, wrong)), Refused)
+    assert robot.controller.io().input_int_register[0] == 7
+
+
+def test_output_registers_beside_input_registers_need_control():
+    robot = Robot()
+    also = (Registers(bank="output_int", values=(1,)),)
+    command = SetRegisters(bank="input_int", values=(1,), also=also)
+    reply = robot.controller.receive(command)
+    assert (reply.code, reply.where) == ("missing_field", "token")
+    assert robot.controller.io().input_int_register[0] == 0

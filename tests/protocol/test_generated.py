@@ -16,11 +16,12 @@ from tvist_protocol.channels import COMMANDS, MESSAGES, tag
 from tvist_protocol.commands import Setpoint
 from tvist_protocol.generate import FOLDER, filled, generated, golden, stray
 from tvist_protocol.info import CalibrationInfo, Limits, StopReason
+from tvist_protocol.io import Registers
 from tvist_protocol.schema import field_docs, json_schema
 from tvist_protocol.simulation import StepSetpoint
 from tvist_protocol.values import Payload
 
-STRUCTS = (*MESSAGES, Payload, StepSetpoint, Limits, StopReason, CalibrationInfo)
+STRUCTS = (*MESSAGES, Payload, Registers, StepSetpoint, Limits, StopReason, CalibrationInfo)
 INPUT = (*COMMANDS, Setpoint, Payload, StepSetpoint)
 
 

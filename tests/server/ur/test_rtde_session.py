@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.examples import share
 
 from tvist_protocol.commands import SetSpeed
-from tvist_protocol.io import SetIo, SetRegisters
+from tvist_protocol.io import Registers, SetIo, SetRegisters
 from tvist_server.gateways.ur import version
 from tvist_server.gateways.ur.input_owners import InputOwners
 from tvist_server.gateways.ur.rtde.codec import PackageReader
@@ -320,14 +320,20 @@ class TestRegisters:
         (command,) = one.put(1, names, 5, 1.5, 1)
         assert (command.bank, command.first, len(command.values)) == ("input_bit", 0, 32)
 
-    def test_registers_apart_are_commands_apart(self, one):
+    def test_registers_of_a_package_are_one_command_so_that_programs_see_it_as_a_whole(self, one):
         names = [ints[0], ints[1], ints[7], doubles[0], "input_bit_register_64"]
         one.with_inputs(names)
         assert one.put(1, names, 1, 1, 1, 1.0, True) == [
-            SetRegisters(bank="input_int", first=0, values=(1, 1)),
-            SetRegisters(bank="input_int", first=7, values=(1,)),
-            SetRegisters(bank="input_double", first=0, values=(1.0,)),
-            SetRegisters(bank="input_bit", first=64, values=(True,)),
+            SetRegisters(
+                bank="input_int",
+                first=0,
+                values=(1, 1),
+                also=(
+                    Registers(bank="input_int", first=7, values=(1,)),
+                    Registers(bank="input_double", first=0, values=(1.0,)),
+                    Registers(bank="input_bit", first=64, values=(True,)),
+                ),
+            )
         ]
 
     def test_a_word_is_thirty_two_bits(self, one):

@@ -5,7 +5,7 @@ from math import isclose
 
 from tvist_controller.peripherals import analog_share
 from tvist_protocol.commands import Command, SetSpeed
-from tvist_protocol.io import Bank, Io, SetIo, SetRegisters
+from tvist_protocol.io import Bank, Io, Registers, SetIo, SetRegisters
 from tvist_protocol.replies import Refused, Reply
 from tvist_server.gateways.ur.base import ControllerAccess
 from tvist_server.gateways.ur.robot import UrRobot
@@ -96,15 +96,16 @@ class InputWriter:
                 cell.update({first + k: (bool(int(value) >> k & 1), new) for k in range(32)})
             else:
                 cell[first] = (value, new)
-        commands = [
-            SetRegisters(bank=bank, first=first, values=run)
+        # One command, since a program must see a package as a whole: a client that sends what to do in one register and
+        # the numbers for it in others would have it done with those of the package before.
+        head, *rest = [
+            Registers(bank=bank, first=first, values=run)
             for bank, cell in cells.items()
             for first, run in _runs(cell)
         ]
+        command = SetRegisters(bank=head.bank, first=head.first, values=head.values, also=tuple(rest))
         self._ledger.ask(news)
-        then = self._last_of(len(commands), news)
-        for command in commands:
-            self._control.ask(command, then)
+        self._control.ask(command, self._answer_of(news))
 
     # ------------------------------------------------------------------ what needs control
 
@@ -188,17 +189,13 @@ class InputWriter:
             self._complain("another client has control: speed and outputs stay as they are")
             return
         self._ledger.ask(values)
-        self._control.change(command, self._last_of(1, values))
+        self._control.change(command, self._answer_of(values))
 
-    def _last_of(self, count: int, values: dict[Hashable, object]) -> Callable[[Reply], None]:
-        """Takes the replies to so many commands, which set these values."""
-        left = count
+    def _answer_of(self, values: dict[Hashable, object]) -> Callable[[Reply], None]:
+        """Takes the reply to a command that sets these values."""
 
         def then(reply: Reply) -> None:
-            nonlocal left
-            left -= 1
-            if left == 0:
-                self._ledger.answered(values)
+            self._ledger.answered(values)
             if isinstance(reply, Refused):
                 self._complain(reply.why)
 
