@@ -37,7 +37,8 @@ class Tell:
         if err.is_terminal and now - self._shown >= SHOWN_EVERY:
             self._shown, self._visible = now, True
             place = f", line {watch.line}" if watch.line else ""
-            progress = f"{watch.name}: {watch.seconds:.1f} s{place}, {len(watch.moves)} moves"
+            move = f", move {len(watch.moves)}" if watch.moves else ""
+            progress = f"{watch.name}: {watch.seconds:.1f} s{place}{move}"
             sys.stderr.write(_CLEAR + progress[: max(err.width - 1, 1)])
             sys.stderr.flush()
 

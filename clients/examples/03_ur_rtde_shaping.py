@@ -40,7 +40,7 @@ def program(control: RTDEControlInterface) -> None:
 def served(shaper: str) -> Iterator[None]:
     """Serve a robot with a shaper while the block runs."""
     options = ["--ur-address", HOST, "--listen", ENDPOINT, "--profile", "real", "--shaper", shaper]
-    with subprocess.Popen(  # noqa: S603  the server of this very environment
+    with subprocess.Popen(  # noqa: S603  our own program
         [sys.executable, "-m", "tvist_cli", "serve", *options, "--start", START],
         stderr=subprocess.PIPE, text=True,
     ) as server:  # fmt: skip

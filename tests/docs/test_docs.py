@@ -241,7 +241,7 @@ class TestSnippets:
         if '"127.0.0.1"' in text:
             text = text.replace("127.0.0.1", request.getfixturevalue("interfaces"))
         if "import urx" in text:
-            pytest.importorskip("urx")  # it needs older packages than TVIST, so an environment of its own
+            pytest.importorskip("urx")  # needs older packages than this project
         if "mine.py" in text:
             pytest.skip("test_own_shaper.py runs it beside its file")
         if "first.mcap" in text:

@@ -9,6 +9,7 @@ import pytest
 from msgspec.structs import replace
 from tests.conformance.served import NOISE, PATIENCE, free_endpoint
 from tests.conformance.wire import Wire
+from tests.places import own_address
 
 from tvist_lab.mcap_file import read
 from tvist_plant.description import load
@@ -31,6 +32,13 @@ end
 """
 FAILS = "def fails():\n  sleep(0.1)\n  x = [1, 2]\n  y = x[2]\nend\n"
 WRONG = "def wrong():\n  movej(x)\n  freedrive_mode()\nend\n"
+WRITES = """
+import sys
+from rtde_io import RTDEIOInterface
+robot = RTDEIOInterface(sys.argv[1])  # refuses to begin if it may not set outputs
+print(robot.setStandardDigitalOut(3, True), flush=True)
+print(robot.setInputIntRegister(20, 9), flush=True)
+"""
 
 
 def command(*arguments):
@@ -201,6 +209,36 @@ class TestInRealTime:
         out, err = process.communicate(timeout=PATIENCE)
         assert (process.returncode, out) == (0, "got 5\n"), err
         assert "waits ran for" in err
+
+    @pytest.mark.usefixtures("tvist")
+    def test_urs_clients_of_this_machine_have_a_hand_in_it(self, tmp_path):
+        pytest.importorskip("rtde_io")
+        address = own_address(3)
+        (tmp_path / "ur.toml").write_text(f"ur_address = '{address}'\n", encoding="utf-8")
+        program = tmp_path / "waits.script"
+        program.write_text(WAITS.replace("(24)", "(20)"), encoding="utf-8")
+        process = subprocess.Popen(
+            command("run", program, "--ur", "--config", "ur.toml", "--listen", free_endpoint()),
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
+        )  # fmt: skip
+        try:
+            assert process.stdout.readline() == "ready\n"
+            while "listens on" not in process.stderr.readline():
+                assert process.poll() is None
+            # In a process of its own, which ur-rtde aborts when the robot has gone.
+            client = subprocess.run(
+                [sys.executable, "-c", WRITES, address],
+                capture_output=True,
+                text=True,
+                timeout=PATIENCE,
+                check=False,
+            )
+            assert client.stdout == "True\nTrue\n", client.stderr
+            out, err = process.communicate(timeout=PATIENCE)
+        finally:
+            process.kill()
+            process.communicate(timeout=PATIENCE)
+        assert (process.returncode, out) == (0, "got 9\n"), err
 
     def test_a_client_that_stops_it_makes_it_fail(self, waiting):
         process, wire = waiting

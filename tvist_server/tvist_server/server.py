@@ -66,6 +66,7 @@ class Server:
             lockstep = config.clock != "realtime"
             self._network = Network(listen, guard, lockstep=lockstep)
             self._console = Console()
+            self._interfaces: list[UrInterfaces] = []
             self.ur: list[tuple[str, dict[InterfaceName, int]]] = []
             """Address and ports of each robot's UR interfaces; empty if they are not open."""
             for number, robot in enumerate(self.robots):
@@ -76,6 +77,16 @@ class Server:
         except BaseException:  # a signal, too
             self.discard()
             raise
+
+    def share_control(self, host: str, token: str) -> None:
+        """Let clients of UR's interfaces act with control that this process holds; to be called before `start`.
+
+        Args:
+            host: Address of the clients; the lease must be held in the name `ur-ADDRESS`.
+            token: Token of the lease.
+        """
+        for interfaces in self._interfaces:
+            interfaces.adopt(host, token)
 
     def discard(self) -> None:
         """Close the robots of a server that has not started, and remove their recordings."""
@@ -90,6 +101,7 @@ class Server:
         ]
         if config.ur:
             interfaces = _interfaces(robot, config, number)
+            self._interfaces.append(interfaces)
             self.ur.append((interfaces.address, interfaces.ports))
             gateways.append(interfaces)
         if not self._observed:

@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable, Sequence
 
 from tvist_controller.api import Controller
-from tvist_lab.programs.start import LEASE, start
+from tvist_lab.programs.start import CLIENT, LEASE, start
 from tvist_lab.programs.watch import ProgramWatch
 from tvist_protocol.commands import KeepAlive
 from tvist_protocol.programs import ProgramClosePopup
@@ -13,6 +13,8 @@ from tvist_server.config import ServeConfig
 from tvist_server.ending import Ending
 from tvist_server.server import Server
 
+HERE = "127.0.0.1"
+"""Address of this machine's own clients."""
 ATTEND = 0.05
 """Time between two calls of the function that tells people about the run [s]."""
 
@@ -47,7 +49,10 @@ class ProgramServer:
         self.server = Server(config, observe)
         (self._robot,) = self.server.robots
         try:
-            self._token = start(self._robot.request, text, inputs)
+            # Clients of UR's interfaces on this machine have a hand in the program, as beside one of their own.
+            client = f"ur-{HERE}" if config.ur else CLIENT
+            self._token = start(self._robot.request, text, inputs, client)
+            self.server.share_control(HERE, self._token)
         except BaseException:
             self.server.discard()
             raise

@@ -11,7 +11,7 @@ from tvist_protocol.programs import ProgramRun
 from tvist_protocol.replies import Accepted, Refused, Reply
 
 CLIENT: Final = "tvist run"
-"""Name under which the run has control."""
+"""Name under which a run has control."""
 LEASE: Final = 3600.0
 """Time without renewal after which it loses control [s]."""
 
@@ -61,19 +61,20 @@ def input_command(text: str, token: str) -> SetRegisters | SimulationSetInputs:
     return SetRegisters(token=token, bank="input_double", values=(_number(text, value),), first=number)
 
 
-def start(request: Request, text: str, inputs: Sequence[str]) -> str:
+def start(request: Request, text: str, inputs: Sequence[str], client: str = CLIENT) -> str:
     """Take control, set inputs and start a program; return the token of the lease.
 
     Args:
         request: Has a command carried out.
         text: Text of the program.
         inputs: Inputs to set before, each as NAME=VALUE.
+        client: Name under which the run has control.
 
     Raises:
         InputError: See `input_command`; or the robot refuses an input.
         RefusedError: The robot refuses the program, for example because it cannot be compiled.
     """
-    reply = request(TakeControl(client=CLIENT, lease_s=LEASE))
+    reply = request(TakeControl(client=client, lease_s=LEASE))
     assert isinstance(reply, Accepted)
     assert reply.token is not None
     for one in inputs:

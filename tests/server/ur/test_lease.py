@@ -156,3 +156,19 @@ def test_a_lease_is_kept_alive_while_there_is_one():
     host.keep_alive()
     desk.answer()
     assert desk.kinds == ["TakeControl", "SetSpeed", "KeepAlive"]
+
+
+def test_control_that_somebody_holds_for_a_host_is_shared_and_not_given_back_with_the_last_connection():
+    desk, replies = Desk(), []
+    token = desk.take("ur-127.0.0.1").token
+    host = lease(desk)
+    host.adopt(token, "the program")
+    connection = ConnectionControl(host)
+    assert not connection.held_by_other
+    connection.change(slow(0.5), replies.append)
+    desk.answer()
+    assert replies == [Done()]
+    assert "TakeControl" not in desk.kinds
+    connection.leave()
+    desk.answer()
+    assert desk.controller.session.lease.token == token

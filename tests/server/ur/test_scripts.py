@@ -1,6 +1,8 @@
 """Scripts that clients send: run in their order, with the client's control, and told about on the primary interface."""
 
 import asyncio
+import select
+import socket
 import struct
 
 from tvist_protocol.programs import ProgramRun
@@ -160,3 +162,17 @@ async def test_the_dashboard_plays_a_script_again_under_its_name(desk):
         "Pausing program",
         "PAUSED again",
     ]
+
+
+async def test_a_client_that_leaves_at_once_without_reading_has_sent_its_script(desk):
+    await desk.tick()
+    stream = socket.create_connection(("127.0.0.1", desk.interfaces.ports["realtime"]))
+    await until(lambda: desk.interfaces._connections)
+    await desk.tick()
+    select.select([stream], [], [], PATIENCE)
+    stream.sendall(b"def f():\n  sleep(10)\nend\n")
+    stream.close()  # with a reset, since there is something to read
+    desk.host.tick()
+    desk.host.tick()
+    await until(lambda: desk.controller.programs.name == "f")
+    await until(lambda: not desk.interfaces._connections)

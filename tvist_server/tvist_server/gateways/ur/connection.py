@@ -1,8 +1,10 @@
 """One client's socket, and the session behind it."""
 
 import asyncio
+import contextlib
 import ipaddress
 import logging
+import os
 import socket
 from collections.abc import Callable
 from typing import cast
@@ -30,6 +32,9 @@ ANSWERS = MAX_UNREAD // 2
 """Unread bytes above which, in real time, reading from a client pauses until it has read."""
 MAX_UNREAD_LOCKSTEP = 64_000_000
 """Limit in lockstep, where samples wait as well: a minute of samples."""
+
+LAST_WORDS = 65_536
+"""Most bytes that are still taken from a client that has reset its connection: the longest known program and more."""
 
 FIRST_WORD = 30.0
 """Time within which a client has to send something if it has to begin [s]."""
@@ -142,10 +147,13 @@ class Connection(asyncio.BufferedProtocol):
         else:
             transport.resume_reading()
 
-    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  treated alike, whatever the reason
+    def connection_lost(self, exc: Exception | None) -> None:
         """Clean up after the connection was closed by either side."""
-        session, self.session = self.session, None
-        self._transport = None
+        session, transport = self.session, self._transport
+        if isinstance(exc, ConnectionError) and session is not None and transport is not None:
+            left = _left_in(transport)
+            self._guarded(lambda: session.receive(left))
+        self.session = self._transport = None
         self._places.taken.discard(self)
         if self._first_word is not None:
             self._first_word.cancel()
@@ -230,6 +238,23 @@ class Connection(asyncio.BufferedProtocol):
             log.exception("a UR interface failed and disconnected its client")
             if self._transport is not None:
                 self._transport.abort()
+
+
+def _left_in(transport: asyncio.Transport) -> bytes:
+    """What has arrived on a connection that was reset before it was read.
+
+    A client that sends a script and closes at once, with states unread, resets its connection. If the server writes
+    before it reads, it gets to know of the reset first.
+    """
+    left = bytearray()
+    with (
+        socket.socket(fileno=os.dup(transport.get_extra_info("socket").fileno())) as stream,
+        contextlib.suppress(OSError),  # the reset itself
+    ):
+        stream.setblocking(False)
+        while len(left) < LAST_WORDS and (data := stream.recv(LAST_WORDS - len(left))):
+            left += data
+    return bytes(left)
 
 
 def _is_loopback(host: str) -> bool:

@@ -88,6 +88,8 @@ class UrInterfaces(Gateway):
         """Connections that have a place while the interfaces are open."""
         self._leases = WeakValueDictionary[str, HostLease]()
         """Lease of each host; it exists as long as one of the host's connections."""
+        self._adopted: HostLease | None = None
+        """Lease that this process holds in the name of a host."""
         self._lockstep = lockstep
         # Each of these counters is written by one thread only.
         self._handed, self._taken = 0, 0
@@ -219,6 +221,16 @@ class UrInterfaces(Gateway):
         for connection in tuple(self._connections):
             if isinstance(connection.session, PrimarySession) and connection.session.informed:
                 connection.tell(message)
+
+    def adopt(self, host: str, token: str) -> None:
+        """Let the clients of a host act with control that this process holds in its name; before `open`.
+
+        Args:
+            host: Address of the host.
+            token: Token of the lease.
+        """
+        self._adopted = self._lease(host)
+        self._adopted.adopt(token, self)
 
     def _lease(self, host: str) -> HostLease:
         lease = self._leases.get(host)

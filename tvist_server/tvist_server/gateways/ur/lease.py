@@ -75,6 +75,16 @@ class HostLease:
         if not self._users:
             self._desk.client_gone(self.client)
 
+    def adopt(self, token: str, holder: object) -> None:
+        """Act with control that this host holds already, and do not give it back.
+
+        Args:
+            token: Token of the lease.
+            holder: Who holds it for the host.
+        """
+        self._token = token
+        self._users.add(holder)
+
     def keep_alive(self) -> None:
         """Renew the lease, if there is one."""
         if self._token != _NO_TOKEN:
