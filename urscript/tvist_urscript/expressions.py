@@ -13,6 +13,8 @@ from tvist_urscript.values import LONGEST, Array, Pose
 
 MOST_OPERATIONS = 1000
 """Evaluations of one statement; beyond them nothing could interrupt it in time."""
+START = 20
+"""Evaluations that the start of a thread takes; they limit the threads that start in a tick."""
 
 ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "remainder"}
 SCALING, SUMS = "*/", "+-"
@@ -279,7 +281,7 @@ class Expressions:
     def run(self, node: tree.Call) -> ast.expr:
         """Translate the start of a thread."""
         at = Position.of(node)
-        self.cost += 1
+        self.cost += START
         scope = self.scope.find(node.name)
         if scope is None and node.name not in self.signatures:
             self.report(node.line, node.column, name_not_found(node.name))
