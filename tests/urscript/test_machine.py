@@ -399,3 +399,13 @@ def test_a_signature_says_what_a_manual_says():
     assert known.parameters[4].default == Pose([0] * 6)
     with pytest.raises(ValueError, match="no list of parameters"):
         signature("q a")
+
+
+def test_arguments_are_computed_in_the_order_of_the_text():
+    for call in ('f(b=g("first"), a=g("second"))', 'move(speed=g("first"), target=g("second"))'):
+        robot = Robot(
+            "def g(x):\n say(x)\n return str_len(x)\nend\n"
+            f"def f(a, b=2, c=3):\n return a + 10 * b + 100 * c\nend\nx = {call}\nsay(x)"
+        )
+        robot.ticks(5)
+        assert robot.said == ["first", "second", "356" if call[0] == "f" else "30"]

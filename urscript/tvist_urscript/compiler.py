@@ -9,7 +9,7 @@ from types import CodeType, MappingProxyType
 from tvist_urscript import tree
 from tvist_urscript.errors import ScriptError, syntax_error
 from tvist_urscript.failures import FILE
-from tvist_urscript.functions import Functions
+from tvist_urscript.functions import MOST_FUNCTIONS, Functions
 from tvist_urscript.names import scopes
 from tvist_urscript.parsing import parse
 from tvist_urscript.signatures import Signatures
@@ -70,6 +70,10 @@ def translate(text: str, signatures: Signatures) -> tuple[Script | None, list[Sc
     except ScriptError as error:
         return None, [error]
     found = scopes(program)
+    if len(found) > MOST_FUNCTIONS:
+        head = found[MOST_FUNCTIONS].function
+        why = f"a program of {len(found)} functions is too long: the limit is {MOST_FUNCTIONS}"
+        return None, [ScriptError(head.line, head.column, why)]
     translator = Functions(known, report)
     trees = [made for scope in found for made in translator.function(scope)]
     if errors:
