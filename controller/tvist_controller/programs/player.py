@@ -204,7 +204,10 @@ class ProgramPlayer:
     def _close(self, running: _Running, why: str | None = None) -> None:
         self._all.remove(running)
         self._starved.discard(running)
-        running.machine.end()
+        try:
+            running.machine.end()
+        except ScriptError as error:
+            self._fail(running, error)
         self._popups.close(running.machine)
         secondary = running.script.secondary or None
         self._emit("program_stopped", program=running.name, why=why, secondary=secondary)
