@@ -251,7 +251,7 @@ def test_a_program_of_the_dashboard_reaches_its_end_within_one_step_of_another_c
     }  # a replay makes the program's moves again
     started = [event["tick"] for event in stepper.received["event"] if event["kind"] == "motion_started"]
     assert started[0] == 2
-    assert len(set(started)) == lines
+    assert len(set(started)) == moves
 
 
 def test_the_dashboard_pauses_resumes_and_stops_within_a_step(tmp_path):
