@@ -216,21 +216,19 @@ class ProgramPlayer:
             self._watchdogs.clear()
             self.arm.forget()
 
-    def _machine(self) -> object:
+    def _machine(self) -> Machine:
         """The program that runs now."""
         assert self._now is not None, "only programs call their functions"
         return self._now.machine
 
     def _thread(self) -> object:
         """What identifies the thread that runs now."""
-        assert self._now is not None, "only programs call their functions"
-        return id(self._now.machine), self._now.machine.thread
+        machine = self._machine()
+        return machine, machine.thread
 
     def _lives(self, thread: object) -> bool:
         return any(
-            (id(running.machine), number) == thread
-            for running in self._all
-            for number in running.machine.living
+            (running.machine, number) == thread for running in self._all for number in running.machine.living
         )
 
     # ------------------------------------------------------------------ commands
