@@ -1,4 +1,4 @@
-"""What is wrong with a program, without a robot."""
+"""Checks programs without a robot."""
 
 import re
 from dataclasses import dataclass
