@@ -42,6 +42,8 @@ class Admitted(NamedTuple):
     """Session of the client that the command gives control or the clock to, if `client_gone` will report its end."""
     client: str | None = None
     """Client that sent it, from its token or the name in the command; None if it has neither."""
+    origin: str | None = None
+    """IP address of the machine that sent it; None if the network does not tell."""
 
 
 def admit(data: bytes, lease: Lease | None, clock: ClockHold | None = None) -> Admitted | Refused:

@@ -24,6 +24,7 @@ from tvist_controller.own_shapers import OwnShaper, RecordedShaper
 from tvist_controller.paths.poses import placement_vector
 from tvist_controller.presence import Presence
 from tvist_controller.programs.compiling import ScriptCompiler
+from tvist_controller.programs.socket_traffic import SocketNews
 from tvist_controller.refusal import RefusalError
 from tvist_controller.reporting import truth_of
 from tvist_controller.safety import TORQUE_SHARE
@@ -54,6 +55,7 @@ __all__ = [
     "ScriptCompiler",
     "Setup",
     "Sink",
+    "SocketNews",
     "Target",
     "ToolKinematics",
     "Trajectory",

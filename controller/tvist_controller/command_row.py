@@ -21,6 +21,8 @@ class Call(NamedTuple, Generic[C]):
     """Session of the client that the command gives control to, if `client_gone` will report its end."""
     planned: Callable[[], Any]
     """Returns the plan for the command, making it if necessary; raises `RefusalError` if it cannot be carried out."""
+    origin: str | None = None
+    """IP address of the machine that sent the command; None if the network does not tell."""
 
 
 class Row(NamedTuple):

@@ -44,7 +44,13 @@ class CommandTable:
         return lambda: self._planner.plan(command, basis)
 
     def carry_out(
-        self, command: Command, tick: int, now: float, plan: Plan | None = None, session: str | None = None
+        self,
+        command: Command,
+        tick: int,
+        now: float,
+        plan: Plan | None = None,
+        session: str | None = None,
+        origin: str | None = None,
     ) -> Reply | None:
         """Carry out a command between two ticks.
 
@@ -54,6 +60,7 @@ class CommandTable:
             now: Time [s].
             plan: Plan for the command that holds, if it was made beforehand.
             session: Session of the client that gets control, if its end will be reported.
+            origin: IP address of the machine that sent it, if known.
 
         Raises:
             RefusalError: It cannot be carried out, and has changed nothing.
@@ -65,4 +72,4 @@ class CommandTable:
                 raise found
             return found
 
-        return self.row(command).handle(Call(command, tick, now, session, planned))
+        return self.row(command).handle(Call(command, tick, now, session, planned, origin))

@@ -26,7 +26,6 @@ from tvist_controller.motion_commands import MotionCommands
 from tvist_controller.peripherals import Peripherals
 from tvist_controller.planner import Planner
 from tvist_controller.planning.basis import PlanBasis, ToolBasis
-from tvist_controller.planning.filter_planner import PlannedFilter
 from tvist_controller.planning.plan import QUESTIONS, Plan
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.player import ProgramPlayer
@@ -145,13 +144,20 @@ class Controller:
         on = self.filters.basis
         return PlanBasis(on, self.motion.basis(on), ToolBasis(self.motion.tcp, self.cycle.reference))
 
-    def receive(self, command: c.Command, plan: Plan | None = None, session: str | None = None) -> Reply:
+    def receive(
+        self,
+        command: c.Command,
+        plan: Plan | None = None,
+        session: str | None = None,
+        origin: str | None = None,
+    ) -> Reply:
         """Carry out a command between two ticks. A refused command changes nothing.
 
         Args:
             command: The command.
             plan: Plan for the command, if it was made beforehand; it must hold on the present `basis`.
             session: Session of the client that gets control, if `client_gone` will report its end.
+            origin: IP address of the machine that sent it, if known.
         """
         self.counters.commands += 1
         row = self._commands.row(command)
@@ -159,7 +165,7 @@ class Controller:
             token: Any = getattr(command, "token", None)
             if row.lease == "needed" or (row.lease == "if named" and token is not None):
                 self.session.renew(token, self.now)
-            reply = self._commands.carry_out(command, self.tick_number + 1, self.now, plan, session)
+            reply = self._commands.carry_out(command, self.tick_number + 1, self.now, plan, session, origin)
         except (RefusalError, NoControlError) as refusal:
             self.counters.refused += 1
             return refusal.reply
@@ -191,6 +197,7 @@ class Controller:
 
     def begin_tick(self) -> None:
         """Begin a control period: what has timed out ends, and programs have their turn."""
+        self.programs.sockets.orders.clear()
         self._watch_time()
         self.programs.advance(self.tick_number + 1)
 
@@ -314,9 +321,8 @@ class Controller:
 
     def _reset(self, call: Call[SimulationReset]) -> Reply:
         """Place the simulated arm somewhere at rest."""
-        command = call.command
+        command, chosen = call.command, call.planned()
         check_content(command, self.setup.description)
-        chosen: PlannedFilter | None = call.planned()
         self.programs.end("simulation.reset")
         self.motion.abandon("simulation.reset")
         self._faults.clear()
@@ -338,7 +344,6 @@ class Controller:
 
     def _check_step(self, call: Call[SimulationStep]) -> Reply:
         """Check that a client may advance time; the host then does so."""
-        command = call.command
-        self._authority.check_step(command, call.now)
-        self._setpoints.check(command)
-        return Done(tick=self.tick_number + command.ticks)
+        self._authority.check_step(call.command, call.now)
+        self._setpoints.check(call.command)
+        return Done(tick=self.tick_number + call.command.ticks)

@@ -4,13 +4,15 @@ It has no clock, thread or socket: time advances when `tick` is called. With the
 does this through `simulation.step`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from tvist_controller.about import info_of
 from tvist_controller.admission import Admitted, Unreadable, admit, admit_setpoint
 from tvist_controller.controller import Controller
 from tvist_controller.planning.plan import Plan
+from tvist_controller.programs.socket_traffic import SocketNews
 from tvist_controller.sink import Sink
+from tvist_controller.socket_ports import NoPorts, SocketPorts
 from tvist_controller.standing import Standing
 from tvist_controller.stepping import may_step
 from tvist_protocol.codec import encode
@@ -31,10 +33,12 @@ class Host:
     Args:
         controller: The robot.
         sinks: Sinks that take its output, in this order.
+        ports: Network for the sockets of programs; None if there is none, so that none can be opened.
     """
 
-    def __init__(self, controller: Controller, *sinks: Sink) -> None:
+    def __init__(self, controller: Controller, *sinks: Sink, ports: SocketPorts | None = None) -> None:
         self.controller = controller
+        self._ports = ports or NoPorts()
         self.failure: str | None = None
         """Why the controller has stopped ticking; None if it ticks."""
         self._sinks = sinks
@@ -43,12 +47,12 @@ class Host:
         self._info: tuple[int, Standing | None, bytes] = -1, None, b""
         self._stepping = False
 
-    def request(self, data: bytes) -> Reply:
-        """Admit and carry out an encoded command."""
+    def request(self, data: bytes, origin: str | None = None) -> Reply:
+        """Admit and carry out an encoded command; `origin` is the IP address of the machine that sent it, if known."""
         admitted = admit(data, self.standing.lease, self.standing.clock)
         if isinstance(admitted, Refused):
             return self._turned_away(admitted)
-        return self.carry_out(admitted)
+        return self.carry_out(admitted._replace(origin=origin))
 
     def carry_out(self, admitted: Admitted, plan: Plan | None = None, attend: Attend | None = None) -> Reply:
         """Carry out a command.
@@ -65,7 +69,7 @@ class Host:
         session = admitted.session
         entry = Entry(tick=self._next, kind="command", message=admitted.content, session=session)
         try:
-            reply = self.controller.receive(command, plan, session)
+            reply = self.controller.receive(command, plan, session, admitted.origin)
         except Exception:
             self._note(entry)  # needed to reproduce the error
             raise
@@ -112,6 +116,7 @@ class Host:
     def tick(self) -> None:
         """Compute one control period."""
         self.controller.begin_tick()
+        news = self._carry_out_orders()
         io = self.controller.changed_io()
         if io is not None:
             for sink in self._sinks:
@@ -130,6 +135,23 @@ class Host:
             or self.controller.motion.may_move is not told.may_move
         ):
             self.publish()
+        for one in news:
+            self.socket(one)
+
+    def _carry_out_orders(self) -> Sequence[SocketNews]:
+        """Pass on what programs want of their sockets; return what is known of it at once."""
+        orders = self.controller.programs.sockets.orders
+        if not orders:
+            return ()
+        news = self._ports.carry_out(orders)
+        orders.clear()
+        return news
+
+    def socket(self, news: SocketNews) -> None:
+        """Take what happened to a socket of a program."""
+        number, change, data = news
+        self._note(Entry(tick=self._next, kind="socket", socket=number, change=change, data=data or None))
+        self.controller.programs.sockets.hear(news)
 
     def warn(self, why: str) -> None:
         """Send clients a warning about something outside the controller, which is not part of its replay."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from msgspec.structs import fields
 
-from tvist_controller.api import Controller, OwnShaper, Presence, RecordedShaper, Setup
+from tvist_controller.api import Controller, OwnShaper, Presence, RecordedShaper, Setup, SocketNews
 from tvist_lab.mcap_file import RecordingFile
 from tvist_protocol.commands import HandOver, Setpoint, TakeControl
 from tvist_protocol.content import checked
@@ -151,6 +151,8 @@ def _give(controller: Controller, entry: Entry, presence: Presence) -> None:
             controller.client_gone(entry.client or "", entry.session or "")
         case "missed":
             controller.missed(entry.count or 0)
+        case "socket":
+            controller.programs.sockets.hear(SocketNews.of(entry))
         case "setpoint_refused":
             controller.refuse_setpoint(entry.why or "")
         case _:

@@ -12,7 +12,13 @@ from tvist_protocol.commands import Command, Setpoint
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.explain import explain_content
 
-EntryKind = Literal["command", "setpoint", "setpoint_refused", "client_seen", "client_gone", "missed"]
+EntryKind = Literal[
+    "command", "setpoint", "setpoint_refused", "client_seen", "client_gone", "missed", "socket"
+]
+SocketChange = Literal["opened", "failed", "received", "closed", "expired"]
+"""What happened to a program's socket: it was opened or could not be, has received bytes, or was closed from outside;
+or the wall time of a wait for it is over.
+"""
 
 
 class Entry(Struct, frozen=True, kw_only=True, tag_field="type", tag="journal"):
@@ -22,8 +28,8 @@ class Entry(Struct, frozen=True, kw_only=True, tag_field="type", tag="journal"):
     """Number of the first control period computed after it."""
     kind: EntryKind
     """Kind of entry: a message, an unreadable set-point of the lease's holder, the end of the session that had
-    control or the clock, or ticks that began too late. Recordings made before sessions were distinguished contain every
-    liveliness token that came or went."""
+    control or the clock, ticks that began too late, or what happened to a program's socket. Recordings made before
+    sessions were distinguished contain every liveliness token that came or went."""
     client: str | None = None
     """Client that it came from or concerns, if known."""
     session: str | None = None
@@ -34,6 +40,12 @@ class Entry(Struct, frozen=True, kw_only=True, tag_field="type", tag="journal"):
     """Number of ticks that began too late."""
     why: str | None = None
     """Reason why a set-point could not be read; the event of a stream that stops may repeat it."""
+    socket: int | None = None
+    """Number of the socket, or of the wait that is over."""
+    change: SocketChange | None = None
+    """What happened to the socket."""
+    data: bytes | None = None
+    """Bytes that the socket has received."""
 
 
 def entry_of(tick: int, message: Command | Setpoint, client: str | None = None) -> Entry:

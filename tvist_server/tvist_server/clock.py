@@ -10,7 +10,7 @@ import os
 import threading
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from tvist_controller.host import Host
 from tvist_server.jobs import Do, Jobs
@@ -37,10 +37,12 @@ class Mailbox:
 
     Args:
         host: The controller.
+        patience: Returns how long a step may wait for a socket that a program reads [s].
     """
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: Host, patience: Callable[[], float] = float) -> None:
         self.host = host
+        self._patience = patience
         self.jobs = Jobs()
         self.ending = False
         """Whether a step in progress has to end."""
@@ -56,8 +58,13 @@ class Mailbox:
         self.jobs.post(do, client)
 
     def attend(self, stepper: str | None) -> bool:
-        """Between the ticks of a client's step, do the jobs of others; return whether the step may continue."""
+        """Between the ticks of a client's step, do the jobs of others; return whether the step may continue.
+
+        If a program waits for data, wait for them a while: time must not pass before anyone could send them.
+        """
         self.jobs.do_others(stepper)
+        while not self.ending and (left := self._patience()) > 0.0:
+            self.jobs.do_next_other(stepper, left)
         return not self.ending
 
 

@@ -99,6 +99,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """IP address on which UR's interfaces listen; each further robot uses the next address."""
     ur_ports: UrPorts = UrPorts()
     """Ports of UR's interfaces that differ from UR's defaults; 0 closes an interface."""
+    ur_allow: tuple[str, ...] = ()
+    """Machines that programs may open sockets to, besides the one that sent them: IP addresses, networks, names."""
 
     def setups(self) -> list[Setup]:
         """Return the initial setup of every robot's controller.

@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from queue import Empty, SimpleQueue
 from typing import NamedTuple
 
@@ -63,8 +64,20 @@ class Jobs:
             stepper: The stepping client.
         """
         for _ in range(self._new.qsize()):
-            job = self._new.get()
-            if job.client is not None and job.client == stepper:
-                self._behind.append(job)
-            else:
-                job.do()
+            self._do_other(self._new.get(), stepper)
+
+    def do_next_other(self, stepper: str | None, timeout: float) -> None:
+        """Within a client's step, wait for a job, and do it or set it aside.
+
+        Args:
+            stepper: The stepping client.
+            timeout: Longest wait [s].
+        """
+        with suppress(Empty):
+            self._do_other(self._new.get(timeout=timeout), stepper)
+
+    def _do_other(self, job: _Job, stepper: str | None) -> None:
+        if job.client is not None and job.client == stepper:
+            self._behind.append(job)
+        else:
+            job.do()

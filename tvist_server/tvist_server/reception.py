@@ -57,10 +57,11 @@ class Reception(Desk):
         standing = self._host.standing
         self._hand_in(admit(data, standing.lease, standing.clock), answer)
 
-    def command(self, command: Command, answer: Answer) -> None:
-        """Take a command; `answer` as for `request`."""
+    def command(self, command: Command, answer: Answer, origin: str | None = None) -> None:
+        """Take a command; `answer` as for `request`, and `origin` is the IP address of the machine that sent it."""
         standing = self._host.standing
-        self._hand_in(admit_command(command, standing.lease, standing.clock), answer)
+        admitted = admit_command(command, standing.lease, standing.clock)
+        self._hand_in(admitted if isinstance(admitted, Refused) else admitted._replace(origin=origin), answer)
 
     def info(self, answer: Callable[[bytes], None]) -> None:
         """Answer with a description of the robot."""

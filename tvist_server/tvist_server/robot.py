@@ -8,6 +8,7 @@ from tvist_controller.admission import Admitted
 from tvist_controller.controller import Controller
 from tvist_controller.host import Host
 from tvist_controller.planner import Planner
+from tvist_controller.programs.socket_traffic import SocketNews
 from tvist_controller.setup import Setup
 from tvist_controller.sink import Sink
 from tvist_protocol.codec import encode
@@ -15,7 +16,9 @@ from tvist_protocol.commands import Command
 from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import Telemetry
 from tvist_server.clock import Clock, Mailbox
+from tvist_server.gateways.allowed_hosts import AllowedHosts
 from tvist_server.gateways.base import Answer, Gateway
+from tvist_server.gateways.sockets import ProgramSockets
 from tvist_server.lateness import Punctuality
 from tvist_server.plan_ahead import PlanAhead
 from tvist_server.plans_of_programs import PlansOfPrograms
@@ -24,6 +27,9 @@ from tvist_server.publisher import Publisher
 from tvist_server.reception import Reception
 from tvist_server.recording.black_box import BlackBox
 from tvist_server.recording.recorder import Recorder
+
+LOCAL = "127.0.0.1"
+"""Where commands of this process come from."""
 
 
 class ServedRobot:
@@ -35,6 +41,7 @@ class ServedRobot:
         dump: Folder for the last second before a failure.
         observe: Makes a further sink of the controller's messages.
         programs: Folder with programs that clients load by their names.
+        allowed: Machines that programs may connect to, besides the one that sent them.
 
     Raises:
         ValueError: The setup is invalid.
@@ -48,6 +55,7 @@ class ServedRobot:
         dump: Path,
         observe: Callable[[Controller], Sink] | None = None,
         programs: ProgramFolder | None = None,
+        allowed: Sequence[str] = (),
     ) -> None:
         self.setup = setup
         self._complete = None if programs is None else programs.complete
@@ -70,8 +78,10 @@ class ServedRobot:
         self._publisher = Publisher(lossless=lockstep)
         sinks: list[Sink] = [] if self.recorder is None else [self.recorder]
         sinks += [] if observe is None else [observe(self.controller)]
-        self._host = Host(self.controller, *sinks, black_box, self._publisher)
-        self.driven = Mailbox(self._host)
+        self.sockets = ProgramSockets(self._hear, self._warn, AllowedHosts(allowed))
+        """Gateway for the sockets of programs."""
+        self._host = Host(self.controller, *sinks, black_box, self._publisher, ports=self.sockets)
+        self.driven = Mailbox(self._host, self.sockets.patience)
         """The robot as seen by the clock."""
         self._plan_ahead = (
             None if lockstep else PlanAhead(self._host, _planner(setup), self.driven.post, self._complete)
@@ -102,7 +112,7 @@ class ServedRobot:
 
         What is done before the first tick does not depend on how fast this machine is.
         """
-        return self._host.request(encode(command))
+        return self._host.request(encode(command), LOCAL)
 
     def hand_on(self) -> None:
         """Hand on the messages that wait for the gateways."""
@@ -212,6 +222,15 @@ class ServedRobot:
         if self.recorder is not None:
             self.recorder.close()
             self.recorder.path.unlink(missing_ok=True)
+
+    def _hear(self, news: SocketNews) -> None:
+        """Tell the controller what happened to a socket of a program."""
+
+        def hear() -> None:
+            self.sockets.note(news)
+            self._host.socket(news)
+
+        self.driven.post(hear)
 
     def _warn(self, why: str) -> None:
         """Publish a warning to clients and the console."""

@@ -97,7 +97,8 @@ class Server:
     def _gateways(self, robot: ServedRobot, config: ServeConfig, number: int) -> list[Gateway]:
         name, desk, lockstep = robot.setup.name, robot.reception, config.clock != "realtime"
         gateways: list[Gateway] = [
-            self._network.gateway(name, desk, lockstep=lockstep, truth=robot.setup.truth)
+            self._network.gateway(name, desk, lockstep=lockstep, truth=robot.setup.truth),
+            robot.sockets,
         ]
         if config.ur:
             interfaces = _interfaces(robot, config, number)
@@ -196,7 +197,7 @@ def _robot(
         path = recording_of(config.record, setup.name) if several else Path(config.record)
     programs = config.program_folder(setup.name)
     try:
-        return ServedRobot(setup, path, Path(config.dump), observe, programs)
+        return ServedRobot(setup, path, Path(config.dump), observe, programs, config.ur_allow)
     except ValueError as error:
         raise ConfigError(str(error)) from error
 

@@ -39,6 +39,7 @@ def run(
     truth: bool = False,
     listen: list[str] | None = None,
     ur: bool = False,
+    ur_allow: list[str] | None = None,
     config: str | None = None,
     json: bool = False,
 ) -> None:
@@ -74,6 +75,7 @@ def run(
         truth: Record also what a real robot cannot measure, such as the arm's deflection.
         listen: Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447].
         ur: Open UR's own interfaces as well, so that their clients can watch the robot and write its registers.
+        ur_allow: Let the program open sockets to this machine too, repeatable, see tvist serve [only this machine].
         config: TOML file with any options of tvist serve for one robot; options on the command line take precedence.
         json: Print one JSON object at the end instead of messages.
     """
@@ -85,7 +87,7 @@ def run(
         "robot": robot, "profile": lower(profile), "payload": payload, "overload": overload or None,
         "shaper": lower(shaper), "shape_servo": shape_servo or None, "start": start, "seed": seed,
         "record": None if record is None else str(record), "truth": truth or None, "listen": listen,
-        "ur": ur or None,
+        "ur": ur or None, "ur_allow": ur_allow,
     }  # fmt: skip
     checked = _configuration(given, config, lockstep=lockstep)
     say_if_compiling()
@@ -136,10 +138,11 @@ def _configuration(given: dict[str, Any], config: str | None, *, lockstep: bool)
     from tvist_server.config import ConfigError, from_mapping, read_toml
 
     if lockstep:
-        for name in ("listen", "ur"):
+        for name in ("listen", "ur", "ur_allow"):
             if given[name] is not None:
+                option = name.replace("_", "-")
                 raise Failure(
-                    f"--lockstep and --{name} exclude each other: in lockstep there is no network", code=2
+                    f"--lockstep and --{option} exclude each other: in lockstep there is no network", code=2
                 )
     source = "configuration" if config is None else f"configuration {config}"
     with told(ConfigError, code=2):

@@ -49,6 +49,7 @@ def serve(
     ur: bool = False,
     ur_address: str | None = None,
     ur_port: list[str] | None = None,
+    ur_allow: list[str] | None = None,
     config: str | None = None,
 ) -> None:
     """Run one or more robots on the network until Control+C, SIGTERM, SIGQUIT or the terminal closes.
@@ -99,6 +100,8 @@ def serve(
         ur_address: IP address on which UR's interfaces listen; each further robot uses the next address [127.0.0.1].
         ur_port: Change the port of one UR interface, repeatable: rtde=31004, or dashboard=off to close it. The others
             are primary, secondary, realtime, primary_read_only, secondary_read_only and realtime_read_only.
+        ur_allow: Let programs open sockets to this machine too, repeatable: an IP address, a network such as
+            192.168.1.0/24, or a name as programs write it [only the machine that sent the program].
         config: TOML file with any of these options; options on the command line take precedence.
     """
     given: dict[str, Any] = {
@@ -110,7 +113,7 @@ def serve(
         "record": record, "dump": dump, "truth": truth or None, "quiet": quiet,
         "floor": floor, "compensate_sag": compensate_sag, "programs": programs,
         "ur": (ur or ur_address is not None or ur_port is not None) or None, "ur_address": ur_address,
-        "ur_ports": ur_ports(ur_port),
+        "ur_ports": ur_ports(ur_port), "ur_allow": ur_allow,
     }  # fmt: skip
     began = time.monotonic()
     say_if_compiling()

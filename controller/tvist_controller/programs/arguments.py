@@ -86,6 +86,17 @@ def flag(name: str, value: Value) -> bool:
     return bool(value)
 
 
+def text(name: str, value: Value) -> str:
+    """Return a text.
+
+    Raises:
+        Fault: It is none.
+    """
+    if not isinstance(value, str):
+        raise Fault(f"{name} is {shown(value)}: it must be a text")
+    return value
+
+
 def a_list(values: Sequence[float]) -> Array:
     """Return a list of numbers as programs have it."""
     return Array(tuple(values))

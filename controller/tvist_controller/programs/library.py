@@ -12,15 +12,17 @@ from tvist_controller.programs.functions import (
     registers,
     safety,
     settings,
+    sockets,
     state,
     terminals,
     unsimulated,
 )
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.programs.popups import Popups
+from tvist_controller.programs.sockets import Sockets
 from tvist_controller.programs.watchdogs import Watchdogs
 
-_MODULES = (motions, poses, state, settings, registers, terminals, messages, safety, unsimulated)
+_MODULES = (motions, poses, state, settings, registers, terminals, messages, sockets, safety, unsimulated)
 SIGNATURES = {name: one for module in _MODULES for name, one in module.SIGNATURES.items()}
 """Signature of each function; those of the language itself are in `tvist_urscript`."""
 
@@ -29,7 +31,7 @@ MOVING = frozenset(motions.SIGNATURES)
 
 
 def functions(
-    access: Access, arm: ProgramArm, popups: Popups, watchdogs: Watchdogs
+    access: Access, arm: ProgramArm, popups: Popups, watchdogs: Watchdogs, connections: Sockets
 ) -> dict[str, Callable[..., Any]]:
     """Return the functions for the programs of one robot, by name."""
     kinematics = ProgramKinematics(access.description, access.motion)
@@ -41,6 +43,7 @@ def functions(
         registers: registers.RegisterFunctions(access, arm),
         terminals: terminals.TerminalFunctions(access, arm),
         messages: messages.MessageFunctions(access, arm, popups),
+        sockets: sockets.SocketFunctions(connections, arm),
         safety: safety.SafetyFunctions(access, arm, watchdogs),
         unsimulated: unsimulated.UnsimulatedFunctions(),
     }

@@ -9,6 +9,7 @@ from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.built_in import built_in
 from tvist_controller.programs.library import MOVING, functions
 from tvist_controller.programs.popups import Popups
+from tvist_controller.programs.sockets import Sockets
 from tvist_controller.programs.steadiness import Steadiness
 from tvist_controller.programs.watchdogs import Watchdogs
 from tvist_controller.refusal import RefusalError, out_of_turn
@@ -41,6 +42,8 @@ class _Running:
     name: str
     script: Script
     machine: Machine
+    origin: str | None
+    """Address of the machine that started it; None if it is unknown."""
 
 
 class ProgramPlayer:
@@ -60,7 +63,8 @@ class ProgramPlayer:
         self.arm = ProgramArm(access, self._thread)
         self._popups = Popups(access.emit, self._machine)
         self._watchdogs = Watchdogs(access.peripherals)
-        self._functions = functions(access, self.arm, self._popups, self._watchdogs)
+        self.sockets = Sockets(access.emit, self._machine, lambda: self._now.origin if self._now else None)
+        self._functions = functions(access, self.arm, self._popups, self._watchdogs, self.sockets)
         self._built_in = frozenset(built_in(access.description))
         self._kept: dict[str, Script] = {}
         """Programs that were loaded with their text, by name."""
@@ -209,6 +213,7 @@ class ProgramPlayer:
         except ScriptError as error:
             self._fail(running, error)
         self._popups.close(running.machine)
+        self.sockets.close(running.machine)
         secondary = running.script.secondary or None
         self._emit("program_stopped", program=running.name, why=why, secondary=secondary)
         if running is self._main:
@@ -255,11 +260,11 @@ class ProgramPlayer:
             if sum(running is not self._main for running in self._all) >= MAX_BESIDE:
                 why = f"{MAX_BESIDE} secondary programs are running: wait until one of them has ended"
                 raise RefusalError("busy", "", why, MAX_BESIDE)
-            self._begin(script, script.name)
+            self._begin(script, script.name, call.origin)
             return
         self._replace("another program was started")
         self.name, self._loaded = script.name, script
-        self._start(script)
+        self._start(script, call.origin)
 
     def _play(self, call: Call[ProgramPlay]) -> None:
         if self._loaded is None:
@@ -268,7 +273,7 @@ class ProgramPlayer:
             raise RefusalError("busy", "", f"program {self.name} is playing")
         if self._main is None:
             self._motion.check("move_j")
-            self._start(self._loaded)
+            self._start(self._loaded, call.origin)
             return
         if self._motion.activity is Activity.PAUSED:
             self._motion.resume()
@@ -315,12 +320,13 @@ class ProgramPlayer:
             self._close(self._main, why)
             self._motion.stop(None, why)
 
-    def _start(self, script: Script) -> None:
-        self._main, self.state, self.line = self._begin(script, self.name or script.name), "PLAYING", 1
+    def _start(self, script: Script, origin: str | None) -> None:
+        self._main = self._begin(script, self.name or script.name, origin)
+        self.state, self.line = "PLAYING", 1
 
-    def _begin(self, script: Script, name: str) -> _Running:
+    def _begin(self, script: Script, name: str, origin: str | None) -> _Running:
         machine = Machine(script, self._functions, finish=self.arm.finish)
-        running = _Running(name, script, machine)
+        running = _Running(name, script, machine, origin)
         self._all.append(running)
         self._emit("program_started", program=name, secondary=script.secondary or None)
         return running

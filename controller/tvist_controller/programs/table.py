@@ -11,6 +11,7 @@ from tvist_controller.programs.functions import (
     registers,
     safety,
     settings,
+    sockets,
     state,
     terminals,
     unsimulated,
@@ -38,6 +39,7 @@ SUBJECTS: tuple[tuple[str, ModuleType, type], ...] = (
     ("Registers and flags", registers, registers.RegisterFunctions),
     ("Inputs and outputs", terminals, terminals.TerminalFunctions),
     ("Messages and time", messages, messages.MessageFunctions),
+    ("Sockets", sockets, sockets.SocketFunctions),
     ("Safety", safety, safety.SafetyFunctions),
 )
 

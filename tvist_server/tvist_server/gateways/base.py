@@ -25,8 +25,14 @@ class Desk(Protocol):
     def request(self, data: bytes, answer: Answer) -> None:
         """Take an encoded command; `answer` is called once: immediately if it is rejected, else from another thread."""
 
-    def command(self, command: Command, answer: Answer) -> None:
-        """Take a command that the gateway made itself; `answer` as for `request`."""
+    def command(self, command: Command, answer: Answer, origin: str | None = None) -> None:
+        """Take a command that the gateway made itself.
+
+        Args:
+            command: The command.
+            answer: As for `request`.
+            origin: IP address of the machine on whose behalf it was made, if known.
+        """
 
     def setpoint(self, data: bytes) -> None:
         """Take an encoded set-point."""

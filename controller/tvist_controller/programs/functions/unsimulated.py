@@ -29,24 +29,6 @@ SUBJECTS = {
     "modbus_set_output_signal": ("signal_name, digital_value, is_secondary_program=False", "Modbus"),
     "rpc_factory": ("type, url", "remote procedure calls"),
     "screw_driving": ("f, v_limit", "screw driving"),
-    **{
-        name: (parameters, "sockets of programs")
-        for name, parameters in (
-            ("socket_open", 'address, port, socket_name="socket_0"'),
-            ("socket_close", 'socket_name="socket_0"'),
-            ("socket_send_string", 'str, socket_name="socket_0"'),
-            ("socket_send_line", 'str, socket_name="socket_0"'),
-            ("socket_send_int", 'value, socket_name="socket_0"'),
-            ("socket_send_byte", 'value, socket_name="socket_0"'),
-            ("socket_get_var", 'name, socket_name="socket_0"'),
-            ("socket_set_var", 'name, value, socket_name="socket_0"'),
-            ("socket_read_binary_integer", 'number, socket_name="socket_0", timeout=2'),
-            ("socket_read_byte_list", 'number, socket_name="socket_0", timeout=2'),
-            ("socket_read_ascii_float", 'number, socket_name="socket_0", timeout=2'),
-            ("socket_read_string", 'socket_name="socket_0", prefix="", suffix="", interpret_escape=False, timeout=2'),
-            ("socket_read_line", 'socket_name="socket_0", timeout=2'),
-        )
-    },
 }  # fmt: skip
 """Parameters of each function, and what is not simulated."""
 

@@ -34,7 +34,7 @@ class HostLease:
     def __init__(self, desk: Desk, host: str, soon: Soon) -> None:
         self.client = f"ur-{host}"
         """Name under which the lease is held."""
-        self._desk = desk
+        self._desk, self._host = desk, host
         self._soon = soon
         self._token = _NO_TOKEN
         self._waiting: list[tuple[Callable[[str], Command], Then]] = []
@@ -61,7 +61,7 @@ class HostLease:
 
     def ask(self, command: Command, then: Then) -> None:
         """Send a command unchanged."""
-        self._desk.command(command, lambda reply: self._soon(lambda: then(reply)))
+        self._desk.command(command, lambda reply: self._soon(lambda: then(reply)), self._host)
 
     def leave(self, connection: object) -> None:
         """Note that a connection is closed; give back control if it was the last one that used it."""

@@ -1,0 +1,170 @@
+"""Functions for sockets, over which programs talk to other machines."""
+
+import math
+from collections.abc import Generator
+from struct import pack
+from typing import Any, TypeVar
+
+from tvist_controller.programs import socket_messages as cut
+from tvist_controller.programs.arguments import a_list, flag, integer, number, text
+from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.sockets import Sockets, Take
+from tvist_urscript import Value, signature, to_str
+from tvist_urscript.values import Array, to_bytes, to_text
+
+MOST = 30
+"""Values that one call reads."""
+ANSWER = 2.0
+"""Time to wait for the value of a variable [s]."""
+MORE = 25
+"""Ticks for which a program waits for more data before the moves start that wait to be blended into a next one."""
+_ONE = 'socket_name="socket_0"'
+_READ = f"number, {_ONE}, timeout=2"
+T = TypeVar("T")
+
+SIGNATURES = {
+    "socket_open": signature(f"address, port, {_ONE}", blocks=True, cost=20),
+    "socket_close": signature(_ONE, cost=5),
+    "socket_read_binary_integer": signature(_READ, blocks=True, cost=10),
+    "socket_read_byte_list": signature(_READ, blocks=True, cost=10),
+    "socket_read_ascii_float": signature(_READ, blocks=True, cost=20),
+    "socket_read_line": signature(f"{_ONE}, timeout=2", blocks=True, cost=10),
+    "socket_read_string": signature(
+        f'{_ONE}, prefix="", suffix="", interpret_escape=False, timeout=2', blocks=True, cost=10
+    ),
+    "socket_get_var": signature(f"name, {_ONE}", blocks=True, cost=20),
+    "socket_set_var": signature(f"name, value, {_ONE}", cost=10),
+    "socket_send_int": signature(f"value, {_ONE}", cost=5),
+    "socket_send_byte": signature(f"value, {_ONE}", cost=5),
+    "socket_send_line": signature(f"str, {_ONE}", cost=10),
+    "socket_send_string": signature(f"str, {_ONE}", cost=10),
+}
+
+
+class SocketFunctions:
+    """Opens and closes sockets, and reads and writes them.
+
+    Reading takes what has arrived, and waits for the rest. It waits for ever if the time-out is not above 0. What has
+    arrived incompletely when the time is over stays for the next call.
+
+    Args:
+        sockets: The sockets of the robot's programs.
+        arm: Its arm: what is sent after a move that is blended is sent where the blend begins.
+    """
+
+    def __init__(self, sockets: Sockets, arm: ProgramArm) -> None:
+        self._sockets, self._arm = sockets, arm
+
+    def socket_open(self, address: object, port: object, socket_name: object) -> Generator[None, None, bool]:
+        """Connect to a machine; return whether this has succeeded within 2 s.
+
+        Programs may connect to the machine that sent them, and to those that the server allows (`--ur-allow`).
+        """
+        machine, at = text("address", address), integer("port", port, 1, 65535)
+        name = text("socket_name", socket_name)
+        yield from self._arm.finish()
+        return (yield from self._sockets.connect(name, machine, at))
+
+    def socket_close(self, socket_name: object) -> None:
+        """Close a socket. Nothing happens if it is not open."""
+        name = text("socket_name", socket_name)
+        self._arm.then(lambda: self._sockets.disconnect(name))
+
+    def socket_read_binary_integer(
+        self, number: object, socket_name: object, timeout: object
+    ) -> Generator[None, None, Array]:
+        """Read integers of 32 bits, at most 30, as `[n, v1, …, vn]`; `[0, -1, …, -1]` when the time is over."""
+        count = integer("number", number, 0, MOST)
+        found = yield from self._read(socket_name, lambda got: cut.integers(got, count), timeout)
+        return _counted(found, count, -1)
+
+    def socket_read_byte_list(
+        self, number: object, socket_name: object, timeout: object
+    ) -> Generator[None, None, Array]:
+        """Read bytes, at most 30, as `[n, v1, …, vn]`; `[0, -1, …, -1]` when the time is over."""
+        count = integer("number", number, 0, MOST)
+        found = yield from self._read(socket_name, lambda got: cut.octets(got, count), timeout)
+        return _counted(found, count, -1)
+
+    def socket_read_ascii_float(
+        self, number: object, socket_name: object, timeout: object
+    ) -> Generator[None, None, Array]:
+        """Read numbers in brackets, at most 30: `(1.5, 2)` is `[2, 1.5, 2]`; `[0, nan, …, nan]` if that fails."""
+        count = integer("number", number, 1, MOST)
+        found = yield from self._read(socket_name, lambda got: cut.floats(got, count), timeout)
+        return _counted(found, count, math.nan)
+
+    def socket_read_line(self, socket_name: object, timeout: object) -> Generator[None, None, str]:
+        """Read a line of at most 1023 bytes, without its end; an empty text when the time is over."""
+        found = yield from self._read(socket_name, cut.line, timeout)
+        return to_text(found or b"")
+
+    def socket_read_string(
+        self, socket_name: object, prefix: object, suffix: object, interpret_escape: object, timeout: object
+    ) -> Generator[None, None, str]:
+        r"""Read what has arrived, or what stands between `prefix` and `suffix`; an empty text when the time is over.
+
+        Leading spaces of both do not count; with `interpret_escape` they may contain `\n`, `\r` and `\t`.
+        """
+        escaped = flag("interpret_escape", interpret_escape)
+        first, last = (
+            to_bytes(cut.unescaped(one) if escaped else one)
+            for one in (text("prefix", prefix).lstrip(" "), text("suffix", suffix).lstrip(" "))
+        )
+        found = yield from self._read(socket_name, lambda got: cut.between(got, first, last), timeout)
+        return to_text((found or b"")[: cut.LONGEST_LINE])
+
+    def socket_get_var(self, name: object, socket_name: object) -> Generator[None, None, int]:
+        r"""Send `GET name\n` and return the integer of the answer `name value\n`; 0 if none comes within 2 s."""
+        wanted, socket = text("name", name), text("socket_name", socket_name)
+        yield from self._arm.finish()
+        self._sockets.send(socket, to_bytes(f"GET {wanted}\n"))
+        found = yield from self._sockets.read(socket, lambda got: cut.variable(got, wanted), ANSWER, _idle)
+        return found or 0
+
+    def socket_set_var(self, name: object, value: object, socket_name: object) -> None:
+        r"""Send `SET name value\n`."""
+        wanted, given = text("name", name), integer("value", value, -(2**31), 2**31 - 1)
+        self._send(socket_name, to_bytes(f"SET {wanted} {given}\n"))
+
+    def socket_send_int(self, value: object, socket_name: object) -> bool:
+        """Send an integer of 32 bits in network byte order; return whether the socket is open."""
+        return self._send(socket_name, pack(">i", integer("value", value, -(2**31), 2**31 - 1)))
+
+    def socket_send_byte(self, value: object, socket_name: object) -> bool:
+        """Send a byte, 0 to 255 or -128 to 127; return whether the socket is open."""
+        return self._send(socket_name, bytes([integer("value", value, -128, 255) % 256]))
+
+    def socket_send_line(self, str: Value, socket_name: object) -> bool:  # noqa: A002  UR's name
+        """Send a text and a line feed; return whether the socket is open."""
+        return self._send(socket_name, to_bytes(to_str(str)) + b"\n")
+
+    def socket_send_string(self, str: Value, socket_name: object) -> bool:  # noqa: A002  UR's name
+        """Send a text; return whether the socket is open."""
+        return self._send(socket_name, to_bytes(to_str(str)))
+
+    def _send(self, socket_name: object, data: bytes) -> bool:
+        name = text("socket_name", socket_name)
+
+        def send() -> None:
+            self._sockets.send(name, data)
+
+        self._arm.then(send)
+        return self._sockets.is_open(name)
+
+    def _read(self, socket_name: object, take: Take[T], timeout: object) -> Generator[None, None, T | None]:
+        name, longest = text("socket_name", socket_name), number("timeout", timeout)
+        return self._sockets.read(name, take, longest, self._go_on)
+
+    def _go_on(self, waited: int) -> Generator[None, None, None]:
+        """Carry out the moves that wait for a further one, if its data have not come by now."""
+        if waited == MORE:
+            yield from self._arm.finish()
+
+
+def _idle(_: int) -> Generator[None, None, None]:
+    yield from ()
+
+
+def _counted(found: tuple[Any, ...] | None, count: int, missing: float) -> Array:
+    return a_list((count, *found)) if found is not None else a_list((0,) + (missing,) * count)

@@ -1,0 +1,206 @@
+"""Sockets of programs: what they have received, and what waits for more.
+
+The network is the host's: it connects, sends and receives, and reports what happened as `SocketNews`, which the journal
+contains. So a replay gets the same bytes at the same ticks.
+"""
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field
+from math import ceil
+from typing import Any, TypeVar
+
+from tvist_controller.events import Emit
+from tvist_controller.programs.socket_traffic import (
+    Close,
+    Expire,
+    Open,
+    Send,
+    SocketNews,
+    SocketOrder,
+    Taken,
+    Wait,
+    Waited,
+)
+from tvist_plant.plant import PERIOD
+from tvist_urscript import Fault
+
+MAX_SOCKETS = 16
+"""Sockets that a program may have at a time."""
+
+T = TypeVar("T")
+Take = Callable[[bytes], tuple[T, int] | None]
+"""Finds what a program reads at the beginning of the received bytes: its value and its length in bytes; None as long
+as it has not arrived completely.
+"""
+
+
+@dataclass
+class _Socket:
+    number: int
+    received: bytearray = field(default_factory=bytearray)
+    opening: bool = True
+    open: bool = False
+
+
+class Sockets:
+    """The sockets of one robot's programs. Each program has its own, by name.
+
+    Args:
+        emit: Emits events.
+        owner: Returns what identifies the program that runs now.
+        origin: Returns the address of the machine that started the program that runs now; None if it is unknown.
+    """
+
+    def __init__(self, emit: Emit, owner: Callable[[], object], origin: Callable[[], str | None]) -> None:
+        self._emit, self._owner, self._origin = emit, owner, origin
+        self.orders: list[SocketOrder] = []
+        """Orders for the network since the last tick began, in their order; the host may take them earlier."""
+        self._named: dict[tuple[object, str], _Socket] = {}
+        self._numbered: dict[int, _Socket] = {}
+        self._last = self._last_wait = 0
+        self._waits: dict[int, bool] = {}
+        """Present waits, and whether the time of each is over on the wall, too."""
+
+    def hear(self, news: SocketNews) -> None:
+        """Take what happened to a socket or to a wait for one."""
+        if news.change == "expired":
+            if news.number in self._waits:
+                self._waits[news.number] = True
+            return
+        socket = self._numbered.get(news.number)
+        if socket is None:  # closed meanwhile
+            return
+        match news.change:
+            case "opened":
+                socket.opening, socket.open = False, True
+            case "received":
+                socket.received += news.data
+            case _:
+                socket.opening = socket.open = False
+
+    # ------------------------------------------------------------------ what programs call
+
+    def connect(self, name: str, address: str, port: int) -> Generator[None, None, bool]:
+        """Connect a socket, and wait until it is open or this has failed, which the network decides.
+
+        Args:
+            name: Name of the socket; one of the same name is closed first.
+            address: Name or IP address of the machine.
+            port: Its port.
+
+        Returns:
+            Whether it is open.
+
+        Raises:
+            Fault: The program has too many sockets.
+        """
+        self.disconnect(name)
+        owner = self._owner()
+        if sum(one is owner for one, _ in self._named) >= MAX_SOCKETS:
+            raise Fault(f"the program has {MAX_SOCKETS} open sockets: close one first")
+        self._last += 1
+        socket = self._named[owner, name] = self._numbered[self._last] = _Socket(self._last)
+        self.orders.append(Open(socket.number, self._origin(), address, port))
+        wait = self._begin(socket)
+        try:
+            while socket.opening:
+                yield
+        finally:
+            self._end(wait)
+            if not socket.open and self._named.get((owner, name)) is socket:
+                self._drop(owner, name)
+        if not socket.open:
+            self._emit("warning", why=f'socket_open: "{name}" has no connection to {address} port {port}')
+        return socket.open
+
+    def disconnect(self, name: str) -> None:
+        """Close a socket of the program; nothing happens if there is none of this name."""
+        if (self._owner(), name) in self._named:
+            self._drop(self._owner(), name)
+
+    def is_open(self, name: str) -> bool:
+        """Return whether a socket of the program is open."""
+        socket = self._named.get((self._owner(), name))
+        return socket is not None and socket.open
+
+    def send(self, name: str, data: bytes) -> bool:
+        """Send bytes; return whether the socket is open."""
+        socket = self._named.get((self._owner(), name))
+        if socket is None or not socket.open:
+            return False
+        self.orders.append(Send(socket.number, data))
+        return True
+
+    def read(
+        self, name: str, take: Take[T], timeout: float, meanwhile: Callable[[int], Generator[None, None, Any]]
+    ) -> Generator[None, None, T | None]:
+        """Read from a socket, and wait until what is read has arrived.
+
+        What has arrived incompletely stays for the next call. A read that fails takes at least a tick, so that a loop
+        of them lets time pass.
+
+        Args:
+            name: Name of the socket.
+            take: Finds what is read.
+            timeout: Time to wait at most [s], counted in robot time, but not less on the wall; for ever if it is not
+                above 0.
+            meanwhile: Called with the number of ticks that the call has waited so far, before each further one.
+
+        Returns:
+            What is read; None if the time is over, or if the socket is not open and has not received it.
+        """
+        socket = self._named.get((self._owner(), name))
+        if socket is None:
+            yield
+            return None
+        found = self._take(socket, take)
+        if found is not None:
+            return found[0]
+        last = ceil(timeout / PERIOD - 1e-9)
+        wait, waited = self._begin(socket), 0
+        try:
+            while True:
+                yield
+                waited += 1
+                found = self._take(socket, take)
+                if found is not None:
+                    return found[0]
+                if not socket.open or self._waits[wait]:
+                    return None
+                if waited == last:
+                    self.orders.append(Expire(wait, socket.number, timeout))
+                yield from meanwhile(waited)
+        finally:
+            self._end(wait)
+
+    def close(self, owner: object) -> None:
+        """Close all sockets of a program, which has ended."""
+        for one, name in tuple(self._named):
+            if one is owner:
+                self._drop(one, name)
+
+    # ------------------------------------------------------------------ parts
+
+    def _take(self, socket: _Socket, take: Take[T]) -> tuple[T, int] | None:
+        """Remove what is read from the received bytes."""
+        found = take(bytes(socket.received)) if socket.received else None
+        if found is not None:
+            del socket.received[: found[1]]
+            self.orders.append(Taken(socket.number, found[1]))
+        return found
+
+    def _begin(self, socket: _Socket) -> int:
+        self._last_wait += 1
+        self._waits[self._last_wait] = False
+        self.orders.append(Wait(self._last_wait, socket.number))
+        return self._last_wait
+
+    def _end(self, wait: int) -> None:
+        del self._waits[wait]
+        self.orders.append(Waited(wait))
+
+    def _drop(self, owner: object, name: str) -> None:
+        socket = self._named.pop((owner, name))
+        del self._numbered[socket.number]
+        socket.opening = socket.open = False
+        self.orders.append(Close(socket.number))

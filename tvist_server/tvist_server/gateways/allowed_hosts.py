@@ -1,0 +1,52 @@
+"""Which machines programs may connect to."""
+
+import ipaddress
+from collections.abc import Sequence
+
+IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
+
+
+class AllowedHosts:
+    """The machines that the server allows, besides the one that sent a program.
+
+    Args:
+        given: IP addresses, networks such as 192.168.1.0/24, and names.
+    """
+
+    def __init__(self, given: Sequence[str]) -> None:
+        self._names = set(given)
+        self._networks = [network for text in given if (network := _network(text)) is not None]
+
+    def allows(self, name: str, address: str, origin: str | None) -> bool:
+        """Return whether a program may connect to an address.
+
+        The loopback interface is open to programs that came from there.
+
+        Args:
+            name: What the program calls the machine.
+            address: IP address that this stands for.
+            origin: IP address of the machine that started the program; None if it is unknown.
+        """
+        if name in self._names:
+            return True
+        to, sender = _ip(address), None if origin is None else _ip(origin)
+        if sender is not None and (to == sender or (_is_here(to) and sender.is_loopback)):
+            return True
+        return any(to in network for network in self._networks)
+
+
+def _ip(text: str) -> IpAddress:
+    """An address without its zone; an IPv4 address in IPv6's form counts as such."""
+    found = ipaddress.ip_address(text.partition("%")[0])
+    return getattr(found, "ipv4_mapped", None) or found
+
+
+def _is_here(address: IpAddress) -> bool:
+    return address.is_loopback or address.is_unspecified
+
+
+def _network(text: str) -> ipaddress.IPv4Network | ipaddress.IPv6Network | None:
+    try:
+        return ipaddress.ip_network(text, strict=False)
+    except ValueError:  # a name
+        return None

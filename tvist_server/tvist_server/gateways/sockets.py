@@ -1,0 +1,243 @@
+"""The sockets of a robot's programs as sockets of this machine."""
+
+import asyncio
+import contextlib
+import logging
+import time
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from tvist_controller.programs.socket_traffic import (
+    Close,
+    Expire,
+    Open,
+    Send,
+    SocketNews,
+    SocketOrder,
+    Taken,
+    Wait,
+    Waited,
+)
+from tvist_controller.sink import Topic
+from tvist_controller.socket_ports import SocketPorts
+from tvist_protocol.journal import SocketChange
+from tvist_server.gateways.allowed_hosts import AllowedHosts
+from tvist_server.gateways.base import Gateway, Message
+
+log = logging.getLogger(__name__)
+
+CONNECT_WITHIN: Final = 2.0
+"""Longest time to connect, with looking up the name [s]; that of UR's controllers."""
+PATIENCE: Final = 1.0
+"""Wall time for which a step waits for a socket that a program reads [s]."""
+MAX_UNREAD: Final = 65_536
+"""Bytes that may wait for a program to read them, besides those of one more piece; then the sender has to wait."""
+MAX_UNSENT: Final = 262_144
+"""Bytes that may wait for the other side to read them; then it is disconnected."""
+
+
+class _Link(asyncio.Protocol):
+    """One socket. Its methods are called in the network's thread.
+
+    Args:
+        number: Number of the socket.
+        tell: Tells the controller what happened to it.
+    """
+
+    def __init__(self, number: int, tell: Callable[[SocketNews], None]) -> None:
+        self._number, self._tell = number, tell
+        self._transport: asyncio.Transport | None = None
+        self._received = 0
+        self.taken = 0
+        """Received bytes that the program has read; written in the controller's thread."""
+        self.paused = False
+        """Whether the sender has to wait."""
+        self.ended = False
+        """Whether nothing more of it counts."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        if self.ended:
+            transport.abort()
+        else:
+            self._transport = transport
+            self._say("opened")
+
+    def data_received(self, data: bytes) -> None:
+        self._received += len(data)
+        self._say("received", data)
+        self.look()
+
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  the program is told only that it ended
+        self._transport = None
+        self.end("closed")
+
+    def look(self) -> None:
+        """Let the sender wait, or let it go on."""
+        transport = self._transport
+        if transport is None or transport.is_closing():
+            return
+        self.paused = True  # before looking, so that what is read meanwhile leads to another look
+        if self._received - self.taken > MAX_UNREAD:
+            transport.pause_reading()
+        else:
+            self.paused = False
+            transport.resume_reading()
+
+    def send(self, data: bytes) -> None:
+        """Send bytes; disconnect a machine that leaves too many of them unread."""
+        transport = self._transport
+        if transport is None or transport.is_closing():
+            return
+        transport.write(data)
+        if transport.get_write_buffer_size() > MAX_UNSENT:
+            log.warning("a socket of a program was closed because the other side does not read")
+            transport.abort()
+
+    def end(self, change: SocketChange | None = None) -> None:
+        """End it, and tell the controller unless it knows."""
+        if change is not None:
+            self._say(change)
+        self.ended = True
+        if self._transport is not None:
+            self._transport.close()
+
+    def _say(self, change: SocketChange, data: bytes = b"") -> None:
+        if not self.ended:
+            self._tell(SocketNews(self._number, change, data))
+
+
+class ProgramSockets(Gateway, SocketPorts):
+    """Opens sockets to the machines that programs may connect to, and carries their bytes.
+
+    Args:
+        tell: Tells the controller what happened; may be called from any thread and does not block.
+        warn: Tells people; likewise.
+        allowed: The machines that programs may connect to.
+    """
+
+    def __init__(
+        self, tell: Callable[[SocketNews], None], warn: Callable[[str], None], allowed: AllowedHosts
+    ) -> None:
+        self.setpoints_refused = 0
+        self._tell_controller, self._warn, self._allowed = tell, warn, allowed
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._early: list[Callable[[], object]] | None = []
+        """What is to be done when the network's thread begins; None from then on."""
+        self._opening: set[asyncio.Task[None]] = set()
+        # The following are used in the controller's thread only.
+        self._links: dict[int, _Link] = {}
+        self._waits: dict[int, tuple[int, float]] = {}
+        """Socket of each present wait, and when it began."""
+        self._moved: set[int] = set()
+        """Sockets of which something was told since the last tick."""
+
+    # ------------------------------------------------------------------ in the controller's thread
+
+    def carry_out(self, orders: Sequence[SocketOrder]) -> Sequence[SocketNews]:
+        """Carry out orders; what comes of them is told later."""
+        now = time.monotonic()
+        for order in orders:
+            match order:
+                case Open():
+                    link = self._links[order.socket] = _Link(order.socket, self._tell_controller)
+                    self._soon(lambda order=order, link=link: self._begin(order, link))  # type: ignore[misc]
+                case Send():
+                    self._soon(lambda link=self._links[order.socket], data=order.data: link.send(data))  # type: ignore[misc]
+                case Close():
+                    self._soon(self._links.pop(order.socket).end)
+                case Taken():
+                    link = self._links[order.socket]
+                    link.taken += order.amount
+                    if link.paused:
+                        self._soon(link.look)
+                case Wait():
+                    self._waits[order.wait] = order.socket, now
+                case Waited():
+                    del self._waits[order.wait]
+                case Expire():
+                    left = self._waits[order.wait][1] + order.seconds - now
+                    self._after(left, SocketNews(order.wait, "expired"))
+        return ()
+
+    def note(self, news: SocketNews) -> None:
+        """Note that news reach the controller before the next tick."""
+        self._moved.add(news.number)
+
+    def patience(self) -> float:
+        """Return how long a step may wait for a socket that a program reads [s]; 0 if there is no reason."""
+        waits = self._waits
+        if not waits or not self._moved.isdisjoint(socket for socket, _ in waits.values()):
+            self._moved.clear()
+            return 0.0
+        return max(0.0, max(begun for _, begun in waits.values()) + PATIENCE - time.monotonic())
+
+    def _after(self, seconds: float, news: SocketNews) -> None:
+        if seconds <= 0.0:
+            self._tell_controller(news)
+        else:
+            loop = self._loop
+            assert loop is not None, "only an open socket has something to wait for"
+            self._soon(lambda: loop.call_later(seconds, self._tell_controller, news))
+
+    def _soon(self, action: Callable[[], object]) -> None:
+        """Have something done in the network's thread."""
+        if self._loop is not None:
+            with contextlib.suppress(RuntimeError):  # the loop is closed at shutdown
+                self._loop.call_soon_threadsafe(action)
+        elif self._early is not None:
+            self._early.append(action)
+
+    # ------------------------------------------------------------------ in the network's thread
+
+    def publish(self, topic: Topic, message: Message, payload: bytes) -> None:
+        """Ignore what the robot publishes."""
+
+    async def open(self) -> None:
+        """Begin to connect."""
+        self._loop = asyncio.get_running_loop()
+        early, self._early = self._early or [], None
+        for action in early:
+            action()
+
+    async def shut(self) -> None:
+        """Close all sockets."""
+        self._loop = None
+        for task in self._opening:
+            task.cancel()
+        for link in tuple(self._links.values()):
+            link.end()
+        await asyncio.sleep(0)  # lets the connections end
+
+    def close(self) -> None:
+        """Connect no more. A second call does nothing."""
+        self._loop = self._early = None
+
+    def _begin(self, order: Open, link: _Link) -> None:
+        task = asyncio.ensure_future(self._connect(order, link))
+        self._opening.add(task)
+        task.add_done_callback(self._opening.discard)
+
+    async def _connect(self, order: Open, link: _Link) -> None:
+        loop = asyncio.get_running_loop()
+        with contextlib.suppress(OSError, UnicodeError, TimeoutError, ValueError):
+            async with asyncio.timeout(CONNECT_WITHIN):
+                for address in await self._addresses(order):
+                    with contextlib.suppress(ConnectionError):
+                        await loop.create_connection(lambda: link, address, order.port)
+                        return
+        link.end("failed")
+
+    async def _addresses(self, order: Open) -> list[str]:
+        """IP addresses of a machine that the program may connect to; warns if it has others only."""
+        loop = asyncio.get_running_loop()
+        found = await loop.getaddrinfo(order.address, order.port, proto=6)
+        addresses = list(dict.fromkeys(str(one[4][0]) for one in found))
+        allowed = [one for one in addresses if self._allowed.allows(order.address, one, order.origin)]
+        if not allowed:
+            sender = "it is not known which" if order.origin is None else order.origin
+            self._warn(
+                f"a program may not connect to {order.address}: it may to the machine that sent it ({sender}), and to "
+                f"those of tvist serve --ur-allow {order.address}"
+            )
+        return allowed
