@@ -197,7 +197,6 @@ class Controller:
 
     def begin_tick(self) -> None:
         """Begin a control period: what has timed out ends, and programs have their turn."""
-        self.programs.sockets.orders.clear()
         self._watch_time()
         self.programs.advance(self.tick_number + 1)
 

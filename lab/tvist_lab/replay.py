@@ -136,6 +136,7 @@ def _write(setup: Setup, content: RecordingFile, done: Replay, output: Path) -> 
 
 def _tick(controller: Controller, setup: Setup, done: Replay) -> None:
     state, events = controller.tick()
+    controller.programs.sockets.orders.clear()  # what became of them is in the journal
     done.states.append(state)
     done.events += events
     if setup.truth:

@@ -3,7 +3,6 @@
 import zlib
 from pathlib import Path, PurePosixPath
 from typing import Final
-from xml.etree import ElementTree as ET
 
 import msgspec
 
@@ -12,6 +11,7 @@ from tvist_plant.user_file import LARGEST, UserFileError, read_bytes
 from tvist_protocol.codec import decode_info, encode
 from tvist_protocol.programs import MAX_SCRIPT, ProgramLoad
 from tvist_protocol.replies import Refused
+from tvist_server.polyscope import PolyscopeError, script_of
 
 SCRIPT, URP = ".script", ".urp"
 """Endings of the files. A script is text in URScript; a .urp file is the same, or a file that PolyScope has saved."""
@@ -105,37 +105,14 @@ def _text(path: Path, data: bytes) -> str:
         if unpack.unconsumed_tail:
             raise UserFileError(f"program {path} has more than {LARGEST >> 20} MiB when it is unpacked")
     if data.lstrip().startswith(_XML):
-        return _of_polyscope(path, data)
+        try:
+            return script_of(path.stem, data)
+        except PolyscopeError as error:
+            raise UserFileError(f"program {path}: {error}") from error
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise UserFileError(f"program {path} is not text in UTF-8: byte {error.start}") from error
-
-
-def _of_polyscope(path: Path, data: bytes) -> str:
-    """Text of a program of PolyScope that consists of one script.
-
-    Raises:
-        UserFileError: It has other nodes, or it is not XML.
-    """
-    nodes: list[ET.Element] = []
-    if b"<!DOCTYPE" not in data:  # its entities could expand without end
-        try:
-            nodes = ET.fromstring(data).findall("./children/MainProgram/children/*")  # noqa: S314  see above
-        except (ET.ParseError, LookupError, ValueError) as error:  # the last two: of an unknown encoding
-            raise UserFileError(f"program {path} is not valid XML: {error}") from error
-    if [node.tag.lower() for node in nodes] != ["script"]:
-        found = ", ".join(node.tag for node in nodes) or "none"
-        raise UserFileError(
-            f"program {path} is PolyScope's and has the nodes {found}: "
-            "only a program of one Script node can be played; save it as a script"
-        )
-    parts = [nodes[0].findtext(tag) for tag in ("cachedContents", "text")]
-    text = next((part for part in parts if part), nodes[0].text or "")
-    if not text.strip():
-        raise UserFileError(f"program {path} has a Script node without text: save the script itself")
-    name = "".join(letter if letter.isalnum() and letter.isascii() else "_" for letter in path.stem)
-    return f"def {name or 'program'}():\n{text}\nend\n"
 
 
 def _checked(path: Path, text: str) -> str:

@@ -209,7 +209,15 @@ def _interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> UrInter
     except ExposureError as error:
         raise ConfigError(str(error)) from error
     setup, lockstep = robot.setup, config.clock != "realtime"
-    return UrInterfaces(robot.reception, setup.description, setup.name, address, ports, lockstep=lockstep)
+    return UrInterfaces(
+        robot.reception,
+        setup.description,
+        setup.name,
+        address,
+        ports,
+        lockstep=lockstep,
+        programs=config.program_folder(setup.name),
+    )
 
 
 def _drivers(config: ServeConfig, robots: Sequence[ServedRobot]) -> tuple[list[Courier], list[Clock]]:

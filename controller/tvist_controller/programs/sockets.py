@@ -54,7 +54,7 @@ class Sockets:
     def __init__(self, emit: Emit, owner: Callable[[], object], origin: Callable[[], str | None]) -> None:
         self._emit, self._owner, self._origin = emit, owner, origin
         self.orders: list[SocketOrder] = []
-        """Orders for the network since the last tick began, in their order; the host may take them earlier."""
+        """Orders for the network, in their order, which the host takes away."""
         self._named: dict[tuple[object, str], _Socket] = {}
         self._numbered: dict[int, _Socket] = {}
         self._last = self._last_wait = 0

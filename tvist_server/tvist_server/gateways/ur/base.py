@@ -20,6 +20,8 @@ class ControllerAccess(Protocol):
 
     peer: str
     """The client and its interface, as a phrase for messages to people."""
+    host: str
+    """IP address of the client."""
 
     def change(self, command: Callable[[str], Command], then: Then) -> None:
         """Send a command that needs control; take control first if no client has it.

@@ -21,13 +21,16 @@ from tvist_server.gateways.base import Desk, Gateway, GatewayError, Message
 from tvist_server.gateways.ur.base import PortSession, Send
 from tvist_server.gateways.ur.connection import Connection
 from tvist_server.gateways.ur.dashboard.session import DashboardSession
+from tvist_server.gateways.ur.external_control import ExternalControl
 from tvist_server.gateways.ur.lease import ALIVE, ConnectionControl, HostLease
 from tvist_server.gateways.ur.notices import Notices
 from tvist_server.gateways.ur.places import Places
 from tvist_server.gateways.ur.primary.session import PrimarySession
+from tvist_server.gateways.ur.program_request import ProgramRequests
 from tvist_server.gateways.ur.realtime import RealtimeSession
 from tvist_server.gateways.ur.robot import UrRobot
 from tvist_server.gateways.ur.rtde.session import RtdeSession
+from tvist_server.program_folder import ProgramFolder
 from tvist_server.ur_ports import InterfaceName
 
 log = logging.getLogger(__name__)
@@ -58,6 +61,7 @@ class UrInterfaces(Gateway):
         address: IP address to listen on.
         ports: Port of each interface; an interface without a port stays closed.
         lockstep: Whether a client advances time, so that no state may be lost.
+        programs: Folder with programs that clients load by their names.
 
     Raises:
         GatewayError: The server cannot listen on a port.
@@ -72,6 +76,7 @@ class UrInterfaces(Gateway):
         ports: Mapping[InterfaceName, int],
         *,
         lockstep: bool = False,
+        programs: ProgramFolder | None = None,
     ) -> None:
         self.setpoints_refused = 0
         self.address = address
@@ -79,7 +84,9 @@ class UrInterfaces(Gateway):
         self._scripts, self._refusals, self._coming_and_going = (
             Notices(lambda line: log.warning("robot %s: %s", name, line)) for _ in range(3)
         )
-        self.robot = UrRobot(description, name, self._tell, self._scripts.tell, self._refusals.tell)
+        self._requests = ProgramRequests()
+        external = ExternalControl(programs, self._requests.fetch)
+        self.robot = UrRobot(description, name, self._tell, external, self._scripts.tell, self._refusals.tell)
         self._instruments = Instruments(description)
         self._io: Io | None = None
         self._early = deque[State](maxlen=FIRST)
@@ -175,6 +182,7 @@ class UrInterfaces(Gateway):
         """Let no more clients in, and disconnect the present ones."""
         if self._alive is not None:
             self._alive.cancel()
+        self._requests.end()
         for server in self._servers:
             server.close()
         for connection in tuple(self._connections):

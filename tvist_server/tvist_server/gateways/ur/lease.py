@@ -34,7 +34,7 @@ class HostLease:
     def __init__(self, desk: Desk, host: str, soon: Soon) -> None:
         self.client = f"ur-{host}"
         """Name under which the lease is held."""
-        self._desk, self._host = desk, host
+        self._desk, self.host = desk, host
         self._soon = soon
         self._token = _NO_TOKEN
         self._waiting: list[tuple[Callable[[str], Command], Then]] = []
@@ -61,7 +61,7 @@ class HostLease:
 
     def ask(self, command: Command, then: Then) -> None:
         """Send a command unchanged."""
-        self._desk.command(command, lambda reply: self._soon(lambda: then(reply)), self._host)
+        self._desk.command(command, lambda reply: self._soon(lambda: then(reply)), self.host)
 
     def leave(self, connection: object) -> None:
         """Note that a connection is closed; give back control if it was the last one that used it."""
@@ -133,7 +133,7 @@ class ConnectionControl(ControllerAccess):
         hear: Callable[[Callable[[], None]], None] | None = None,
         peer: str | None = None,
     ) -> None:
-        self.peer = peer or lease.client
+        self.peer, self.host = peer or lease.client, lease.host
         self._lease = lease
         self._hear = hear or _at_once
         self.unanswered = 0

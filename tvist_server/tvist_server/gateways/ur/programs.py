@@ -21,6 +21,7 @@ from tvist_protocol.stream import Event
 from tvist_protocol.values import PATTERN_MEANINGS, PROGRAM_NAME_PATTERN
 from tvist_server.gateways.ur import messages
 from tvist_server.gateways.ur.base import ControllerAccess
+from tvist_server.gateways.ur.external_control import ExternalControl
 
 FOLDER: Final = "/programs"
 """Folder in which a controller keeps programs; every other folder is accepted too."""
@@ -52,10 +53,11 @@ class Programs:
 
     Args:
         host: Access to the robot.
+        external: Completes programs that get a part of their text from the client that plays them.
     """
 
-    def __init__(self, host: ProgramRobot) -> None:
-        self._host = host
+    def __init__(self, host: ProgramRobot, external: ExternalControl) -> None:
+        self._host, self._external = host, external
         self.path: str | None = None
         """Path of the loaded program; only its name if a client has sent it as a script; None before the first."""
         self.state: ProgramState = "STOPPED"
@@ -104,7 +106,7 @@ class Programs:
             outcome(refused)
 
         if re.match(PROGRAM_NAME_PATTERN, name):
-            control.ask(ProgramLoad(name=name), then)
+            control.ask(ProgramLoad(name=name, text=self._external.text(name)), then)
         else:
             why = f"the path does not name a file, which has {PATTERN_MEANINGS[PROGRAM_NAME_PATTERN]}"
             outcome(Refused(code="out_of_range", where="name", why=why))
@@ -140,9 +142,31 @@ class Programs:
             control: Access of the client that plays it.
             heard: Called once, as soon as the program runs or has failed to start.
         """
-        if self.path is None or control.held_by_other:
+        name = self.name
+        if name is None or control.held_by_other:
             heard(False)
             return
+        text = self._external.text(name) if self.state == "STOPPED" else None
+        if text is None:
+            self._play(control, heard)
+            return
+
+        def completed(whole: str | None) -> None:
+            def loaded(reply: Reply) -> None:
+                if isinstance(reply, Refused):
+                    self._except(reply)
+                    heard(False)
+                else:
+                    self._play(control, heard)
+
+            if whole is None:
+                heard(False)
+            else:
+                control.ask(ProgramLoad(name=name, text=whole), loaded)
+
+        self._external.complete(text, control.host, completed)
+
+    def _play(self, control: ControllerAccess, heard: Heard) -> None:
         lasting = control.lasting()
 
         def then(reply: Reply) -> None:

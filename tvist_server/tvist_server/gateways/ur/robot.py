@@ -5,6 +5,7 @@ from zlib import crc32
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_plant.description import RobotDescription
+from tvist_server.gateways.ur.external_control import ExternalControl
 from tvist_server.gateways.ur.input_owners import InputOwners
 from tvist_server.gateways.ur.programs import Programs
 
@@ -19,6 +20,7 @@ class UrRobot:
         description: Description of the robot.
         name: Name of the robot on the network.
         tell: Sends a robot message to all clients that get them.
+        external: Completes programs with a node External Control.
         report: Takes a sentence for the server's console.
         report_refusal: Takes one that says why something was refused.
     """
@@ -28,6 +30,7 @@ class UrRobot:
         description: RobotDescription,
         name: str,
         tell: Callable[[bytes], None],
+        external: ExternalControl,
         report: Callable[[str], None],
         report_refusal: Callable[[str], None],
     ) -> None:
@@ -40,7 +43,7 @@ class UrRobot:
         self.operational_mode = NO_MODE
         """Operational mode set by the dashboard."""
         self.inputs = InputOwners()
-        self.programs = Programs(self)
+        self.programs = Programs(self, external)
         self._tell = tell
         self.report = report
         """Writes a sentence to the server's console."""

@@ -1,0 +1,79 @@
+"""Asks a client for the program of a node External Control, as UR's URCap of that name does."""
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Callable
+from typing import Final
+
+from tvist_protocol.programs import MAX_SCRIPT
+
+log = logging.getLogger(__name__)
+
+PORT: Final = 50002
+"""Port on which UR's client library answers."""
+REQUEST: Final = b"request_program\n"
+ENDS: Final = b"# NODE_CONTROL_LOOP_ENDS"
+"""Line near the end of the library's program."""
+WITHIN: Final = 2.0
+"""Longest wait for a connection, and for more of a program [s]."""
+SILENCE: Final = 0.1
+"""Time without more data after which a program with the line `ENDS` is complete [s]; the library sends no end."""
+
+
+class ProgramRequests:
+    """Asks for programs; the requests run in the present event loop."""
+
+    def __init__(self) -> None:
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def fetch(self, host: str, then: Callable[[str | None], None]) -> None:
+        """Ask a machine for its program.
+
+        Args:
+            host: Its address.
+            then: Called once with the text; with None if the machine does not answer.
+        """
+        task = asyncio.ensure_future(self._fetch(host, then))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    def end(self) -> None:
+        """End the requests under way."""
+        for task in self._tasks:
+            task.cancel()
+
+    async def _fetch(self, host: str, then: Callable[[str | None], None]) -> None:
+        text = None
+        try:
+            text = await asyncio.wait_for(_requested(host), 3 * WITHIN)
+        except (OSError, TimeoutError, UnicodeDecodeError) as error:
+            log.warning(
+                "%s port %d did not send the program for External Control: %s",
+                host,
+                PORT,
+                error or "no answer",
+            )
+        then(text)
+
+
+async def _requested(host: str) -> str:
+    reader, writer = await asyncio.wait_for(asyncio.open_connection(host, PORT), WITHIN)
+    try:
+        writer.write(REQUEST)
+        received = bytearray()
+        while len(received) <= MAX_SCRIPT:
+            try:
+                piece = await asyncio.wait_for(reader.read(65_536), SILENCE if ENDS in received else WITHIN)
+            except TimeoutError:
+                break
+            if not piece:
+                break
+            received += piece
+        if not received.strip():
+            raise TimeoutError("it sent nothing")
+        return received.decode()
+    finally:
+        writer.close()
+        with contextlib.suppress(OSError):
+            await writer.wait_closed()
