@@ -39,6 +39,8 @@ class _Socket:
     number: int
     received: bytearray = field(default_factory=bytearray)
     opening: bool = True
+    connected: bool = False
+    """Whether it was open, even if the other side has closed it since."""
     open: bool = False
 
 
@@ -72,7 +74,7 @@ class Sockets:
             return
         match news.change:
             case "opened":
-                socket.opening, socket.open = False, True
+                socket.opening, socket.connected, socket.open = False, True, True
             case "received":
                 socket.received += news.data
             case _:
@@ -89,7 +91,7 @@ class Sockets:
             port: Its port.
 
         Returns:
-            Whether it is open.
+            Whether it was opened.
 
         Raises:
             Fault: The program has too many sockets.
@@ -107,11 +109,11 @@ class Sockets:
                 yield
         finally:
             self._end(wait)
-            if not socket.open and self._named.get((owner, name)) is socket:
+            if not socket.connected and self._named.get((owner, name)) is socket:
                 self._drop(owner, name)
-        if not socket.open:
+        if not socket.connected:
             self._emit("warning", why=f'socket_open: "{name}" has no connection to {address} port {port}')
-        return socket.open
+        return socket.connected
 
     def disconnect(self, name: str) -> None:
         """Close a socket of the program; nothing happens if there is none of this name."""
@@ -186,7 +188,8 @@ class Sockets:
         found = take(bytes(socket.received)) if socket.received else None
         if found is not None:
             del socket.received[: found[1]]
-            self.orders.append(Taken(socket.number, found[1]))
+            if socket.number in self._numbered:  # another thread may have closed it
+                self.orders.append(Taken(socket.number, found[1]))
         return found
 
     def _begin(self, socket: _Socket) -> int:

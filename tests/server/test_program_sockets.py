@@ -1,0 +1,249 @@
+"""The sockets of programs on a real network: who may be reached, what arrives, what is cut, and how much may wait."""
+
+import asyncio
+import contextlib
+
+import pytest
+
+from tvist_controller.programs.socket_traffic import Close, Expire, Open, Send, Taken, Wait, Waited
+from tvist_server.gateways.allowed_hosts import AllowedHosts
+from tvist_server.gateways.sockets import MAX_UNREAD, MAX_UNSENT, PATIENCE, ProgramSockets
+
+HERE = "127.0.0.1"
+
+
+class Side:
+    """A robot's sockets and a machine that they connect to."""
+
+    def __init__(self, sockets, server, heard, warned):
+        self.sockets, self.heard, self.warned = sockets, heard, warned
+        self.port = server.sockets[0].getsockname()[1]
+        self.accepted = asyncio.Queue()
+
+    async def connect(self, number=1, address=HERE, origin=HERE):
+        self.sockets.carry_out([Open(number, origin, address, self.port)])
+        await self.until(lambda: any(news.number == number for news in self.heard))
+        return self.heard[-1].change
+
+    async def until(self, condition):
+        async with asyncio.timeout(60):
+            while not condition():  # noqa: ASYNC110  what changes belongs to the loop
+                await asyncio.sleep(0)
+
+    def received(self, number=1):
+        return b"".join(
+            news.data for news in self.heard if news.number == number and news.change == "received"
+        )
+
+    def changes(self):
+        return [news.change for news in self.heard]
+
+
+def with_sockets(test, allowed=()):
+    """Run a test with them."""
+
+    async def run():
+        heard, warned = [], []
+        sockets = ProgramSockets(heard.append, warned.append, AllowedHosts(allowed))
+        side = None
+
+        writers = []
+
+        async def accept(reader, writer):
+            writers.append(writer)
+            await side.accepted.put((reader, writer))
+
+        server = await asyncio.start_server(accept, HERE, 0)
+        side = Side(sockets, server, heard, warned)
+        await sockets.open()
+        try:
+            await test(side)
+        finally:
+            await sockets.shut()
+            sockets.close()
+            server.close()
+            for writer in writers:
+                writer.transport.abort()
+            await asyncio.sleep(0)
+
+    asyncio.run(run())
+
+
+def test_bytes_go_both_ways_and_the_end_is_told_once():
+    async def test(side):
+        assert await side.connect() == "opened"
+        reader, writer = await side.accepted.get()
+        side.sockets.carry_out([Send(1, b"hello")])
+        assert await reader.readexactly(5) == b"hello"
+        writer.write(b"well")
+        await side.until(lambda: side.received() == b"well")
+        writer.write(b"bye")
+        writer.close()
+        await side.until(lambda: "closed" in side.changes())
+        side.sockets.carry_out([Send(1, b"too late"), Close(1)])
+        await asyncio.sleep(0)
+        assert side.received() == b"wellbye"
+        assert side.changes().count("closed") == 1
+
+    with_sockets(test)
+
+
+def test_a_program_that_closes_hears_nothing_more_and_what_it_sent_arrives():
+    async def test(side):
+        await side.connect()
+        reader, writer = await side.accepted.get()
+        side.sockets.carry_out([Send(1, b"last words"), Close(1)])
+        assert await reader.read() == b"last words"
+        writer.write(b"late")
+        with contextlib.suppress(ConnectionError):
+            await writer.drain()
+        assert side.changes() == ["opened"]
+
+    with_sockets(test)
+
+
+def test_a_socket_that_is_closed_while_it_connects_is_never_opened():
+    async def test(side):
+        side.sockets.carry_out([Open(1, HERE, HERE, side.port), Close(1)])
+        assert await side.connect(2) == "opened"
+        assert [news.number for news in side.heard] == [2]
+
+    with_sockets(test)
+
+
+@pytest.mark.parametrize("port", [1, None])
+def test_a_machine_that_does_not_answer_is_told(port):
+    async def test(side):
+        side.port = port or side.port
+        assert await side.connect(address="no.such.host.invalid" if port is None else HERE) == "failed"
+
+    with_sockets(test)
+
+
+@pytest.mark.parametrize(
+    ("origin", "address", "allowed", "well"),
+    [
+        ("127.0.0.1", "127.0.0.1", (), True),
+        ("127.0.0.1", "localhost", (), True),
+        ("127.0.0.2", "127.0.0.1", (), True),
+        ("::1", "127.0.0.1", (), True),
+        ("192.168.1.5", "127.0.0.1", (), False),
+        (None, "127.0.0.1", (), False),
+        (None, "127.0.0.1", ("127.0.0.0/8",), True),
+        (None, "localhost", ("localhost",), True),
+        ("192.168.1.5", "127.0.0.1", ("127.0.0.1",), True),
+    ],
+)
+def test_a_program_reaches_the_machine_that_sent_it_and_those_that_are_allowed(origin, address, allowed, well):
+    async def test(side):
+        assert await side.connect(address=address, origin=origin) == ("opened" if well else "failed")
+        assert bool(side.warned) is not well
+        assert well or f"--ur-allow {address}" in side.warned[0]
+
+    with_sockets(test, allowed)
+
+
+@pytest.mark.parametrize(
+    ("name", "address", "origin", "well"),
+    [
+        ("h", "192.168.1.5", "192.168.1.5", True),
+        ("h", "192.168.1.5", "::ffff:192.168.1.5", True),
+        ("h", "192.168.1.6", "192.168.1.5", False),
+        ("h", "0.0.0.0", "192.168.1.5", False),  # noqa: S104  a program's target
+        ("h", "0.0.0.0", "127.0.0.1", True),  # noqa: S104
+        ("h", "fe80::1", "fe80::1%eth0", True),
+        ("h", "10.1.2.3", None, True),
+        ("gripper", "172.16.0.1", None, True),
+        ("h", "172.16.0.1", None, False),
+    ],
+)
+def test_who_may_be_reached(name, address, origin, well):
+    assert AllowedHosts(["10.0.0.0/8", "gripper"]).allows(name, address, origin) is well
+
+
+def test_a_sender_that_floods_has_to_wait_until_the_program_reads():
+    async def test(side):
+        await side.connect()
+        _, writer = await side.accepted.get()
+        size = 64 * MAX_UNREAD
+        writer.write(bytes(size))
+        await side.until(lambda: len(side.received()) > MAX_UNREAD)
+        for _ in range(2000):
+            await asyncio.sleep(0)
+        held = len(side.received())
+        assert held < size // 4
+        taken = 0
+        while taken < size:
+            await side.until(lambda: len(side.received()) > taken)
+            more = len(side.received()) - taken
+            side.sockets.carry_out([Taken(1, more)])
+            taken += more
+        assert side.received() == bytes(size)
+
+    with_sockets(test)
+
+
+def test_a_machine_that_does_not_read_is_disconnected():
+    async def test(side):
+        await side.connect()
+        reader, writer = await side.accepted.get()
+        writer.transport.pause_reading()
+        for _ in range(400):
+            side.sockets.carry_out([Send(1, bytes(MAX_UNSENT // 8))])
+            await asyncio.sleep(0)
+        await side.until(lambda: "closed" in side.changes())
+        del reader
+
+    with_sockets(test)
+
+
+def test_a_time_out_waits_for_the_wall_and_only_for_waits_that_ask():
+    async def test(side):
+        await side.connect()
+        side.sockets.carry_out([Wait(7, 1), Wait(8, 1), Expire(7, 1, 0.05)])
+        loop = asyncio.get_running_loop()
+        begun = loop.time()
+        await side.until(lambda: "expired" in side.changes())
+        assert loop.time() - begun >= 0.045
+        assert side.heard[-1].number == 7
+        side.sockets.carry_out([Waited(7), Waited(8)])
+
+    with_sockets(test)
+
+
+def test_a_step_waits_for_a_socket_that_is_read_but_not_once_something_came():
+    async def test(side):
+        sockets = side.sockets
+        assert sockets.patience() == 0.0
+        await side.connect()
+        sockets.carry_out([Wait(1, 1)])
+        assert 0.0 < sockets.patience() <= PATIENCE
+        _, writer = await side.accepted.get()
+        writer.write(b"x")
+        await side.until(lambda: side.received())
+        assert sockets.patience() > 0.0  # the controller does not know yet
+        sockets.note(side.heard[-1])
+        assert sockets.patience() == 0.0
+        sockets.carry_out([Waited(1)])
+        assert sockets.patience() == 0.0
+
+    with_sockets(test)
+
+
+def test_what_is_asked_before_the_network_opens_is_done_then():
+    async def run():
+        heard = []
+        server = await asyncio.start_server(lambda _, writer: writer.close(), HERE, 0)
+        sockets = ProgramSockets(heard.append, heard.append, AllowedHosts([]))
+        sockets.carry_out([Open(1, HERE, HERE, server.sockets[0].getsockname()[1])])
+        await asyncio.sleep(0)
+        assert not heard
+        await sockets.open()
+        async with asyncio.timeout(60):
+            while not heard:  # noqa: ASYNC110
+                await asyncio.sleep(0)
+        assert heard[0].change == "opened"
+        await sockets.shut()
+        server.close()
+
+    asyncio.run(run())
