@@ -105,7 +105,6 @@ def test_a_movej_to_a_pose_ends_there_near_the_present_joints():
             "force_mode(p[0,0,0,0,0,0], [0,0,1,0,0,0], [0,0,1,0,0,0], 2, [1,1,1,1,1,1])",
             "does not simulate force",
         ),
-        ('socket_open("127.0.0.1", 5)', "does not simulate sockets"),
     ],
 )
 def test_what_cannot_be_done_ends_the_program_at_its_call_and_the_arm_stays(move, text):

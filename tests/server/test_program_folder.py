@@ -8,11 +8,13 @@ from tests.controller.robots import Robot
 
 from tvist_controller.admission import Admitted
 from tvist_controller.host import Host
+from tvist_controller.programs.checking import check_program
 from tvist_plant.user_file import UserFileError
 from tvist_protocol.codec import decode_info
 from tvist_protocol.programs import MAX_SCRIPT, ProgramLoad, ProgramStop
 from tvist_protocol.replies import Done, Refused
 from tvist_server.config import ConfigError, from_mapping
+from tvist_server.polyscope import EXTERNAL_CONTROL, program, with_external_control
 from tvist_server.program_folder import ProgramFolder
 
 TEXT = "def pick():\n  sync()\nend\n"
@@ -61,12 +63,44 @@ def test_a_program_of_polyscope_that_is_one_script_is_that_script(folder, pack):
     assert folder.read("saved-1.urp") == 'def saved_1():\ntextmsg("a < b")\nend\n'
 
 
+LINE = "".join(f"<ExpressionChar character='{letter}'/>" for letter in "sync()")
+EXTERNAL = (
+    "<Contributed strategyClass='com.fzi.externalcontrol.ExternalControlNode'><dataModel/></Contributed>"
+)
+
+
+def test_lines_waits_and_external_control_of_polyscope_follow_one_another_and_the_program_may_repeat(folder):
+    nodes = (EXTERNAL, f"<Script type='Line'><expression>{LINE}</expression></Script>")
+    nodes = (*nodes, "<Wait type='Sleep'><waitTime>10.0</waitTime></Wait>")
+    once = polyscope(*nodes).replace("<MainProgram>", "<MainProgram runOnlyOnce='true'>")
+    again = once.replace("'true'", "'false'")
+    (folder.path / "once.urp").write_text(once)
+    (folder.path / "7.urp").write_text(again)
+    body = f"{EXTERNAL_CONTROL}\nsync()\nsleep(10)"
+    assert folder.read("once.urp") == f"def once():\n{body}\nend\n"
+    assert folder.read("7.urp") == f"def program():\nwhile True:\n{body}\nend\nend\n"
+    for name in ("once.urp", "7.urp"):
+        assert check_program(folder.read(name)) == []
+        whole = with_external_control(folder.read(name), SENT)
+        assert check_program(whole) == []
+        assert whole.index("def step") < whole.index("step()\n") < whole.index("sleep(10)")
+
+
+SENT = "# HEADER_BEGIN\ndef step():\n  sync()\nend\n# HEADER_END\nstep()\n# NODE_CONTROL_LOOP_ENDS\n"
+
+
+def test_a_text_without_a_header_stands_whole_where_the_node_is():
+    assert with_external_control(program("a", EXTERNAL_CONTROL), "sync()\n") == "def a():\n\nsync()\n\nend\n"
+
+
 @pytest.mark.parametrize(
     ("content", "why"),
     [
         (gzip.compress(polyscope("<Move/>", SCRIPT_NODE).encode()), "has the nodes Move, Script"),
         (polyscope().encode(), "has the nodes none"),
         (polyscope("<Script/>").encode(), "without text"),
+        (polyscope(SCRIPT_NODE, "<Wait type='DigitalInput'/>").encode(), "has the nodes Script, Wait"),
+        (polyscope("<Contributed strategyClass='com.other'/>").encode(), "has the nodes Contributed"),
         (b"<!DOCTYPE a>" + polyscope(SCRIPT_NODE).encode(), "has the nodes none"),
         (b"<a", "not valid XML"),
         (b"\x1f\x8bxx", "cannot be unpacked"),

@@ -31,6 +31,7 @@ class FakeControl:
     """
 
     peer = "the client 10.0.0.2:50000 of port 30001"
+    host = "10.0.0.2"
 
     def __init__(self):
         self.commands = []

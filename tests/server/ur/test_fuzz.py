@@ -18,6 +18,7 @@ from tvist_controller.sink import Sink
 from tvist_protocol.codec import encode
 from tvist_server.gateways.ur.dashboard.commands import COMMANDS
 from tvist_server.gateways.ur.dashboard.session import DashboardSession
+from tvist_server.gateways.ur.external_control import ExternalControl
 from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
 from tvist_server.gateways.ur.primary.session import PrimarySession
 from tvist_server.gateways.ur.realtime import RealtimeSession
@@ -26,6 +27,7 @@ from tvist_server.gateways.ur.rtde.session import RtdeSession
 
 from . import rtde_client
 from .decoders import split
+from .hosts import nobody
 
 INTERFACES = {
     "rtde": RtdeSession,
@@ -48,7 +50,9 @@ class House(Sink):
         self.controller.session.release()
         self.host = Host(self.controller, self)
         self.instruments = Instruments(UR5E)
-        self.robot = UrRobot(UR5E, "ur5e", self.tell, lambda _: None, lambda _: None)
+        self.robot = UrRobot(
+            UR5E, "ur5e", self.tell, ExternalControl(None, nobody), lambda _: None, lambda _: None
+        )
         self.leases = {host: HostLease(self, host, self.due_append) for host in ("127.0.0.1", "127.0.0.2")}
         self.due = deque()
         self.clients = []

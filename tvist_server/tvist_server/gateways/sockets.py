@@ -131,6 +131,8 @@ class ProgramSockets(Gateway, SocketPorts):
         """Socket of each present wait, and when it began."""
         self._moved: set[int] = set()
         """Sockets of which something was told since the last tick."""
+        self._silent: set[int] = set()
+        """Sockets that a step has waited for in vain."""
 
     # ------------------------------------------------------------------ in the controller's thread
 
@@ -145,6 +147,7 @@ class ProgramSockets(Gateway, SocketPorts):
                 case Send():
                     self._soon(lambda link=self._links[order.socket], data=order.data: link.send(data))  # type: ignore[misc]
                 case Close():
+                    self._silent.discard(order.socket)
                     self._soon(self._links.pop(order.socket).end)
                 case Taken():
                     link = self._links[order.socket]
@@ -163,14 +166,20 @@ class ProgramSockets(Gateway, SocketPorts):
     def note(self, news: SocketNews) -> None:
         """Note that news reach the controller before the next tick."""
         self._moved.add(news.number)
+        self._silent.discard(news.number)
 
     def patience(self) -> float:
-        """Return how long a step may wait for a socket that a program reads [s]; 0 if there is no reason."""
-        waits = self._waits
-        if not waits or not self._moved.isdisjoint(socket for socket, _ in waits.values()):
+        """Return how long a step may wait for a socket that a program reads [s]; 0 if there is no reason.
+
+        A step waits once for a socket that remains silent, and again when it has received something.
+        """
+        waits = [(socket, begun) for socket, begun in self._waits.values() if socket not in self._silent]
+        if not waits or not self._moved.isdisjoint(socket for socket, _ in waits):
             self._moved.clear()
             return 0.0
-        return max(0.0, max(begun for _, begun in waits.values()) + PATIENCE - time.monotonic())
+        now = time.monotonic()
+        self._silent.update(socket for socket, begun in waits if begun + PATIENCE <= now)
+        return max(0.0, max(begun for _, begun in waits) + PATIENCE - now)
 
     def _after(self, seconds: float, news: SocketNews) -> None:
         if seconds <= 0.0:

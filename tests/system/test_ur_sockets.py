@@ -1,0 +1,149 @@
+"""Programs that connect to their client and are steered by it: whatever becomes of the client, the arm stops."""
+
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from tests.conformance.served import PATIENCE, Served
+from tests.conformance.wire import Wire
+from tests.places import own_address
+
+from tvist_plant.description import load
+
+from .test_ur_lockstep import begin_step, lockstep, replayed, take_clock
+from .ur_driver import MANNERS
+
+HOST = own_address(51)
+LIMITS = load("ur5e").limits
+DRIVER = Path(__file__).with_name("ur_driver.py")
+GONE = {"ends", "cut", "killed", "frozen", "torn"}
+"""Manners after which the program notices that nothing comes any more."""
+
+
+@pytest.mark.realtime
+def test_whatever_becomes_of_the_client_the_arm_stops_inside_its_limits_and_a_replay_is_equal(tmp_path):
+    path = tmp_path / "run.mcap"
+    with Served("--ur-address", HOST, "--record", str(path)) as served:
+        with Wire(served.endpoint) as wire:
+            wire.listen("event", "state")
+            for manner in MANNERS:
+                seen = len(wire.received["event"])
+                driver = subprocess.Popen([sys.executable, DRIVER, HOST, manner])
+                wire.wait("event", lambda event: event["kind"] == "program_stopped", since=seen)
+                driver.send_signal(signal.SIGKILL)
+                driver.wait(PATIENCE)
+                events = wire.received["event"][seen:]
+                assert_told(manner, events)
+                tick = wire.received["state"][-1]["tick"]
+                wire.wait("state", lambda state, tick=tick: state["tick"] > tick + 260)
+        assert served.end() == 0
+    content = replayed(path)
+    assert sum(entry.change == "opened" for entry in content.journal) == len(MANNERS)
+    for state in content.states:
+        assert all(abs(q) <= 1.0001 * most for q, most in zip(state.target_qd, LIMITS.velocity, strict=True))
+        assert all(
+            abs(q) <= 1.0001 * most for q, most in zip(state.target_qdd, LIMITS.acceleration, strict=True)
+        )
+    ends = [event.tick for event in content.events if event.kind == "program_stopped"]
+    of = {state.tick: state for state in content.states}
+    for end in ends:
+        assert max(map(abs, of[end + 250].target_qd)) == 0.0
+
+
+def assert_told(manner, events):
+    said = [event["why"] for event in events if event["kind"] == "text"]
+    errors = [event["why"] for event in events if event["kind"] == "warning" and event.get("line")]
+    assert said == (["the client has gone"] if manner in GONE or manner == "jumping" else []), (
+        manner,
+        events,
+    )
+    assert bool(errors) == (manner == "absurd"), (manner, events)
+    assert not errors or "2147.48" in errors[0]
+
+
+ECHO = """def echo():
+  socket_open("{host}", {port})
+  global n = 0
+  while n < 40:
+    got = socket_read_binary_integer(1, timeout=0.004)
+    if got[0] == 1:
+      n = n + 1
+      socket_send_int(got[1])
+    else:
+      write_output_integer_register(0, read_output_integer_register(0) + 1)
+    end
+  end
+  write_output_integer_register(1, n)
+end
+"""
+
+
+def test_in_lockstep_a_step_waits_for_what_a_program_reads_and_for_a_silent_client_only_a_second(tmp_path):
+    """The client answers late on the wall, and so in each tick anew: no time-out of two ticks is met."""
+    path = tmp_path / "run.mcap"
+    with lockstep(52, path) as (served, host), Wire(served.endpoint) as stepper:
+        clock = take_clock(stepper)
+        stepper.listen("io", "state")
+        stepper.step(clock, 1)
+        with socket.create_server((host, 0)) as server, socket.create_connection((host, 30001)) as script:
+            port = server.getsockname()[1]
+            script.sendall(ECHO.format(host=host, port=port).encode())
+            answers = begin_step(stepper, clock, 40)
+            stream, _ = server.accept()
+            with stream:
+                for number in range(20):
+                    time.sleep(0.01)  # a client that is slow, five times as slow as its robot's clock
+                    stream.sendall(struct.pack(">i", number))
+                    assert stream.recv(4, socket.MSG_WAITALL) == struct.pack(">i", number)
+                begun = time.monotonic()
+                next(iter(answers))
+                assert time.monotonic() - begun >= 0.5
+        latest = stepper.received["io"][-1]
+        assert latest["output_int_register"][0] > 0  # now it has timed out
+        assert served.end() == 0
+    content = replayed(path)
+    assert sum(entry.change == "received" for entry in content.journal) == 20
+
+
+@pytest.mark.realtime
+def test_the_dashboard_plays_external_control_with_the_text_of_the_client_and_the_program_goes_on_after_it(
+    tmp_path,
+):
+    host = own_address(53)
+    (tmp_path / "cell.urp").write_text(
+        "<URProgram><children><MainProgram runOnlyOnce='true'><children>"
+        "<Contributed strategyClass='com.fzi.externalcontrol.ExternalControlNode'/>"
+        "<Script><cachedContents>textmsg(&quot;handed back&quot;)</cachedContents></Script>"
+        "<Wait type='Sleep'><waitTime>0.2</waitTime></Wait>"
+        "</children></MainProgram></children></URProgram>"
+    )
+    text = b'# HEADER_BEGIN\nglobal a = 7\n# HEADER_END\ntextmsg("a=", a)\n# NODE_CONTROL_LOOP_ENDS\n'
+    with (
+        Served("--ur-address", host, "--programs", str(tmp_path)) as served,
+        Wire(served.endpoint) as wire,
+        socket.create_server((host, 50002)) as server,
+        socket.create_connection((host, 29999), source_address=(host, 0)) as dashboard,
+    ):
+        wire.listen("event")
+        talk = dashboard.makefile("rw", newline="\n")
+        talk.readline()
+        for line, answer in (("load cell.urp", "Loading program: cell.urp"), ("play", "Starting program")):
+            talk.write(f"{line}\n")
+            talk.flush()
+            if line == "play":
+                stream, _ = server.accept()
+                with stream:
+                    assert stream.recv(100) == b"request_program\n"
+                    stream.sendall(text)
+                    assert talk.readline().strip() == answer
+            else:
+                assert talk.readline().strip() == answer
+        wire.wait("event", lambda event: event["kind"] == "program_stopped")
+        said = [event["why"] for event in wire.received["event"] if event["kind"] == "text"]
+        assert said == ["a=7", "handed back"]
+        talk.close()
