@@ -318,3 +318,79 @@ def test_a_signature_says_what_a_manual_says():
     assert known.parameters[4].default == Pose([0] * 6)
     with pytest.raises(ValueError, match="no list of parameters"):
         signature("q a")
+
+
+class Added:
+    """A program that runs statements as they are added to it."""
+
+    def __init__(self, text):
+        self.signatures = SIGNATURES | {"interpret": signature("", blocks=True)}
+        self.said, self.waiting = [], []
+        self.last = compile_script(text, self.signatures)
+        self.machine = Machine(
+            self.last,
+            {
+                "say": lambda value: self.said.append(to_str(value)),
+                "sync": self.sync,
+                "interpret": self.interpret,
+            },
+        )
+
+    def sync(self):
+        yield
+
+    def interpret(self):
+        while True:
+            while self.waiting:
+                yield from self.machine.add(self.waiting.pop(0))
+            yield
+
+    def add(self, text):
+        """Compile statements after what was added before, and run a few ticks."""
+        self.last = compile_script(text, self.signatures, self.last)
+        self.waiting.append(self.last)
+        for _ in range(3):
+            self.machine.resume()
+        return self.said
+
+
+PROGRAM = "def main():\n a = [1, 2]\n def twice(x, y=2):\n  return x * y\n end\n interpret()\nend"
+
+
+def test_statements_that_are_added_use_the_program_and_what_was_added_before():
+    added = Added(PROGRAM)
+    assert added.add("say(a)") == ["[1, 2]"]
+    assert added.add("a[0] = twice(4)\nb = [7, 8]") == ["[1, 2]"]
+    assert added.add("def sum(x):\n c = [0]\n c[0] = x[0] + x[1]\n return c[0]\nend")
+    assert added.add("if True:\n sync()\n say(sum(a))\nend\nsay(sum(b))")[1:] == ["10", "15"]
+    assert added.add("thread t():\n say(7)\nend\njoin run t()")[3:] == ["7"]
+    assert added.add("def sum(x):\n return 0\nend\nsay(sum(b))")[-1] == "0"
+
+
+def test_what_was_forgotten_is_unknown_to_later_statements_and_variables_keep_their_values():
+    added, first = Added(PROGRAM), None
+    first = added.last
+    added.add("def sum(x):\n return x[0]\nend\na = [3]")
+    added.machine.forget()
+    added.last = first
+    with pytest.raises(ScriptError, match="name_not_found:sum"):
+        added.add("say(sum(a))")
+    assert added.add("say(a)\nsay(twice(2))") == ["[3]", "4"]
+
+
+@pytest.mark.parametrize(
+    ("text", "place"), [("say(nothing)", (1, 5)), ("x = (1", (1, 7)), ("sec f():\nend", (1, 5)), ("", (1, 1))]
+)
+def test_statements_that_are_not_valid_are_refused_at_their_own_place(text, place):
+    added = Added(PROGRAM)
+    with pytest.raises(ScriptError) as caught:
+        added.add(text)
+    assert (caught.value.line, caught.value.column) == place
+
+
+def test_an_error_of_an_added_statement_has_its_place_in_the_statement():
+    added = Added(PROGRAM)
+    with pytest.raises(ScriptError) as caught:
+        added.add("b = 1\nsay(a[9])")
+    assert (caught.value.line, caught.value.column) == (2, 7)
+    assert not added.machine.running

@@ -64,7 +64,10 @@ class Machine:
         self._started = 0
         self._holder: Thread | None = None
         self._line = 1
-        self._names = self._surroundings(functions)
+        self._functions = functions
+        self._names = self._surroundings()
+        self._include(script)
+        self._own = frozenset(self._names)
         self._main = Thread(0, self._body(self._names[script.main]), None)
         self._running = self._main
         self._threads: list[Thread] = [self._main]
@@ -203,6 +206,26 @@ class Machine:
         if self._finish is not None:
             yield from self._finish()
 
+    # Statements that are added to the program.
+
+    def add(self, script: Script) -> Steps:
+        """Add statements to the program, and return what runs them.
+
+        Args:
+            script: Statements that were compiled after the program and what has been added to it so far.
+
+        Raises:
+            ValueError: They call a function that is not given.
+        """
+        self._include(script)
+        return self._names[script.main](1)  # type: ignore[no-any-return]  # a generator function of compiled code
+
+    def forget(self) -> None:
+        """Forget all functions that have been added; variables keep their values."""
+        for name in self._names.keys() - self._own:
+            if name.startswith(("f", "c")):
+                del self._names[name]
+
     # What compiled code calls.
 
     def _run(self, function: Callable[[int], Steps]) -> int:
@@ -252,8 +275,8 @@ class Machine:
         if not thread.critical and self._holder is thread:
             self._holder = None
 
-    def _surroundings(self, functions: Mapping[str, Callable[..., Any]]) -> dict[str, Any]:
-        names: dict[str, Any] = {
+    def _surroundings(self) -> dict[str, Any]:
+        return {
             "__builtins__": {},
             HERE: self,
             SPENT: _SPENT,
@@ -266,17 +289,19 @@ class Machine:
             "exit_critical": self._exit,
             "halt": _halt,
             "too_deep": _too_deep,
-            **self.script.constants,
         }
-        for name in self.script.used:
-            names[f"b_{name}"] = self._built_in(name, functions)
-        for code in self.script.functions:
-            names[code.co_name] = FunctionType(code, names)
-        return names
 
-    def _built_in(self, name: str, functions: Mapping[str, Callable[..., Any]]) -> Callable[..., Any]:
-        if name in functions:
-            return functions[name]
+    def _include(self, script: Script) -> None:
+        """Make the functions of a script, and what they use, known to compiled code."""
+        self._names |= script.constants
+        for name in script.used:
+            self._names[f"b_{name}"] = self._built_in(name)
+        for code in script.functions:
+            self._names[code.co_name] = FunctionType(code, self._names)
+
+    def _built_in(self, name: str) -> Callable[..., Any]:
+        if name in self._functions:
+            return self._functions[name]
         if name not in PURE:
             raise ValueError(f"the script calls {name}, which is not given")
         signature, function = PURE[name]
