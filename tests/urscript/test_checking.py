@@ -39,11 +39,22 @@ def test_a_text_that_is_no_program_has_one_error():
     ("text", "why"),
     [
         ("x = " + "[" * 10_000 + "]" * 10_000, "levels are nested"),
-        ("x = 1\nx = " + "(" * 10_000 + "x" + ")" * 10_000, None),
-        ("x = " + "(" * 10_000, "ends before"),
+        ("x = 1\nx = " + "(" * 100 + "x" + ")" * 100, None),
+        ("x = 1\nx = " + "(" * 101 + "x" + ")" * 101, "levels are nested"),
+        ("x = " + "(" * 100, "ends before"),
+        ("x = " + "[" * 2**20, "levels are nested"),
+        ("x = 1\n" + "a" * 255 + " = 1", None),
+        ("x = 1\n y = " + "a" * 256 + " + 1", "a name of 256 characters is too long"),
+        ("x = 1\ndef f(" + ", ".join(f"a{k}" for k in range(255)) + "):\nend", None),
+        (
+            "x = 1\ndef f(" + ", ".join(f"a{k}" for k in range(256)) + "):\nend",
+            "256 parameters of f are too many",
+        ),
+        ("x = 1\n" + "def f():\nend\n" * 2_000, "2001 functions"),
+        ("textmsg(1\n end\nend", "unexpected 'end'"),
         ("x = 1\nx = " + "not " * 10_000 + "x", "levels are nested"),
         ("x = 1\nx = " + "x + " * 10_000 + "x", "levels are nested"),
-        ("x = 1\nx = " + "x or " * 10_000 + "x", "operations is too long"),
+        ("x = 1\nx = " + "x or " * 3_000 + "x", "operations is too long"),
         ("x = [" + "1, " * 10_000 + "1]", "too long"),
         ("if True:\n" * 10_000 + "end\n" * 10_000, "levels are nested"),
         ("while True:\n" * 18 + "end\n" * 18, "loops are nested"),
@@ -53,10 +64,20 @@ def test_a_text_that_is_no_program_has_one_error():
         ("x = 1\n" * 20_000, None),
         ("def g():\n def f():\n" + "x = 1\n" * 20_000 + " end\nend", "too many in one function"),
         ("x = 0\nif x == 1:\n" + "elif x == 2:\n" * 3_000 + "else:\ntextmsg(1)\nend", None),
+        ("x = 0\ndef f():\n" + "x = x + x * x\n" * 1_500 + "end", None),
+        (
+            "x = 0\ndef f():\n" + "x = x + x * x\n" * 2_000 + "end",
+            "12000 operations and names of f are too many",
+        ),
+        (
+            "x = 0\nif x:\n" + f"elif {' and '.join(['x'] * 90)}:\n" * 300 + "end",
+            "are too many in one function",
+        ),
+        ("x = 0\n" + f"x = [{', '.join(['x * x'] * 400)}]\n" * 50, None),
         ("\0\1\2", "unexpected character"),
         ("é = 1", "unexpected character"),
     ],
-    ids=range(17),
+    ids=range(29),
 )
 def test_texts_of_any_shape_have_an_error_or_none(text, why):
     if why is None:

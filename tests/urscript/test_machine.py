@@ -13,6 +13,7 @@ from tvist_urscript import (
     signature,
     to_str,
 )
+from tvist_urscript.expressions import START
 from tvist_urscript.machine import OVERDRAFT, PATIENCE
 from tvist_urscript.threads import MOST_THREADS
 
@@ -117,14 +118,94 @@ def test_an_error_of_one_thread_ends_the_others():
     assert robot.closed == [2]
 
 
-def test_an_exception_of_the_controller_is_not_hidden():
+@pytest.mark.parametrize(
+    "kind", [KeyError, AttributeError, AssertionError, NameError, RuntimeError, MemoryError]
+)
+def test_any_exception_of_a_built_in_is_an_error_at_its_call(kind):
     def broken(value):
-        raise KeyError(value)
+        raise kind("x" * 10_000)
 
-    machine = Machine(compile_script("say(1)", SIGNATURES), {"say": broken})
-    with pytest.raises(KeyError):
+    machine = Machine(compile_script("\n  say(1)", SIGNATURES), {"say": broken})
+    with pytest.raises(ScriptError, match=f"line 2, column 3: internal error: {kind.__name__}: ") as caught:
         machine.resume()
+    assert isinstance(caught.value.__cause__, kind)
+    assert len(caught.value.text) < 300
     assert not machine.running
+
+
+def test_all_threads_end_where_one_fails_at_its_end():
+    closed = []
+
+    def hold(value):
+        try:
+            yield
+        finally:
+            closed.append(value)
+            raise KeyError(value)
+
+    script = compile_script(
+        "def p():\nthread t():\n hold(1)\nend\nrun t()\nhold(2)\nend", {"hold": signature("v", blocks=True)}
+    )
+    machine = Machine(script, {"hold": hold})
+    machine.resume()
+    with pytest.raises(ScriptError, match="line 3, column 2: internal error: KeyError"):
+        machine.end()
+    assert sorted(closed) == [1, 2]
+    assert not machine.running
+
+
+def test_a_thread_finishes_before_it_waits_for_another():
+    order = []
+
+    def finish():
+        yield
+        order.append(("finish", robot.machine.thread))
+
+    for waiting in ("join h", "enter_critical"):
+        order.clear()
+        robot = Robot(
+            "thread t():\n enter_critical\n costly()\n i = 0\n while i < 200:\n  i = i + 1\n end\n exit_critical\n"
+            f" while True:\n  sync()\n end\nend\nh = run t()\nsync()\n{waiting}\nsay(1)\nsync()",
+            finish=finish,
+        )
+        robot.ticks(1, budget=150)
+        robot.ticks(4, budget=150)
+        assert order[0] == ("finish", 0), waiting
+
+
+def test_a_join_of_a_thread_that_has_ended_does_not_finish():
+    finished = []
+
+    def finish():
+        finished.append(robot.machine.thread)
+        yield
+
+    robot = Robot("thread t():\nend\nh = run t()\nsync()\nsync()\njoin h\nsync()\nsync()", finish=finish)
+    robot.ticks(4)
+    assert finished == [1]
+
+
+def test_a_thread_that_restarts_itself_keeps_nothing():
+    robot = Robot("thread t():\n run t()\nend\nrun t()\nwhile True:\n sync()\nend")
+    starts = []
+    for _ in range(50):
+        before = robot.machine._started
+        robot.ticks(1)
+        starts.append(robot.machine._started - before)
+        assert len(robot.machine.living) <= 3
+    assert 1 <= max(starts) <= EVALUATIONS // START
+    youngest = robot.machine._threads[-1]
+    assert youngest.parent is None or youngest.parent.number == 0
+
+
+def test_kill_reaches_threads_whose_parent_has_ended():
+    robot = Robot(
+        "thread c():\n move(7)\nend\nthread b():\n run c()\nend\nthread a():\n run b()\n move(1)\nend\n"
+        "h = run a()\nsync()\nkill h\nsync()"
+    )
+    robot.ticks(2)
+    assert sorted(robot.closed) == [1, 7]
+    assert robot.machine.living == [0]
 
 
 def test_a_function_that_is_not_given_is_told_at_once():
@@ -318,6 +399,16 @@ def test_a_signature_says_what_a_manual_says():
     assert known.parameters[4].default == Pose([0] * 6)
     with pytest.raises(ValueError, match="no list of parameters"):
         signature("q a")
+
+
+def test_arguments_are_computed_in_the_order_of_the_text():
+    for call in ('f(b=g("first"), a=g("second"))', 'move(speed=g("first"), target=g("second"))'):
+        robot = Robot(
+            "def g(x):\n say(x)\n return str_len(x)\nend\n"
+            f"def f(a, b=2, c=3):\n return a + 10 * b + 100 * c\nend\nx = {call}\nsay(x)"
+        )
+        robot.ticks(5)
+        assert robot.said == ["first", "second", "356" if call[0] == "f" else "30"]
 
 
 class Added:

@@ -175,6 +175,10 @@ def _deeper(node: T, *parts: list[Any]) -> T:
     for part in parts:
         for child in part:
             deepest = max(deepest, child.depth)
+            if not isinstance(child, tree.Constant | tree.Function):
+                node.size += child.size
+    if isinstance(node, tree.If):
+        node.size += len(node.branches)
     node.depth = deepest + (BLOCK if isinstance(node, tree.If | tree.While | tree.Function) else 1)
     if node.depth > DEEPEST:
         raise ScriptError(

@@ -9,7 +9,7 @@ from types import CodeType, MappingProxyType
 from tvist_urscript import tree
 from tvist_urscript.errors import ScriptError, syntax_error
 from tvist_urscript.failures import FILE
-from tvist_urscript.functions import Functions
+from tvist_urscript.functions import MOST_FUNCTIONS, Functions
 from tvist_urscript.names import Scope, outline, scopes
 from tvist_urscript.parsing import parse
 from tvist_urscript.signatures import Signatures
@@ -78,6 +78,10 @@ def translate(
     except ScriptError as error:
         return None, [error]
     found = scopes(program) if after is None else scopes(program, after.scope, after.scopes)
+    if len(found) > MOST_FUNCTIONS:
+        head = found[MOST_FUNCTIONS].function
+        why = f"a program of {len(found)} functions is too long: the limit is {MOST_FUNCTIONS}"
+        return None, [ScriptError(head.line, head.column, why)]
     translator = Functions(known, report)
     trees = [made for scope in found for made in translator.function(scope)]
     if errors:

@@ -13,6 +13,8 @@ from tvist_urscript.values import LONGEST, Array, Pose
 
 MOST_OPERATIONS = 1000
 """Evaluations of one statement; beyond them nothing could interrupt it in time."""
+START = 20
+"""Evaluations that the start of a thread takes; they limit the threads that start in a tick."""
 
 ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "%": "remainder"}
 SCALING, SUMS = "*/", "+-"
@@ -234,7 +236,7 @@ class Expressions:
         return at.waiting(call) if signature.blocks else call
 
     def arguments(self, node: tree.Call, parameters: list[tuple[str, str | None]]) -> list[ast.expr]:
-        """Put the arguments of a call into the order of the parameters.
+        """Put the arguments of a call into the order of the parameters; they are computed in the order of the text.
 
         Args:
             node: The call.
@@ -243,6 +245,7 @@ class Expressions:
         at = Position.of(node)
         given: dict[str, ast.expr] = {}
         names = [name for name, _ in parameters]
+        known = set(names)
         for place, argument in enumerate(node.arguments):
             value = self.value(argument.value)
             name = argument.name
@@ -260,26 +263,24 @@ class Expressions:
                         argument.line, argument.column, "an argument without a name follows one with a name"
                     )
                 name = names[place]
-            elif name not in names:
+            elif name not in known:
                 self.report(argument.line, argument.column, f"{node.name} has no parameter {name}")
                 return []
             if name in given:
                 self.report(argument.line, argument.column, f"{node.name} is given {name} twice")
             given[name] = value
-        result = []
         for name, default in parameters:
-            if name in given:
-                result.append(given[name])
-            elif default is not None:
-                result.append(at.name(default))
-            else:
-                self.report(node.line, node.column, f"{node.name} needs a value for its parameter {name}")
-        return result
+            if name not in given:
+                if default is None:
+                    self.report(node.line, node.column, f"{node.name} needs a value for its parameter {name}")
+                    return []
+                given[name] = at.name(default)
+        return _arranged(at, given, names)
 
     def run(self, node: tree.Call) -> ast.expr:
         """Translate the start of a thread."""
         at = Position.of(node)
-        self.cost += 1
+        self.cost += START
         scope = self.scope.find(node.name)
         if scope is None and node.name not in self.signatures:
             self.report(node.line, node.column, name_not_found(node.name))
@@ -303,6 +304,16 @@ def first(node: tree.Expression) -> tuple[int, int]:
             node = node.value
         else:
             return node.line, node.column
+
+
+def _arranged(at: Position, given: dict[str, ast.expr], names: list[str]) -> list[ast.expr]:
+    """Return the arguments of a call, which Python computes in the order in which they are given."""
+    if list(given) == names or all(isinstance(value, ast.Constant | ast.Name) for value in given.values()):
+        return [given[name] for name in names]
+    places = {name: place for place, name in enumerate(given)}
+    order = at.tuple([at.constant(places[name]) for name in names])
+    values = at.call("arranged", order, at.tuple(list(given.values())))
+    return [ast.Starred(values, ast.Load(), **at.given)]
 
 
 def _counted(number: int) -> str:

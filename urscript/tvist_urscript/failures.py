@@ -10,6 +10,9 @@ from tvist_urscript.errors import Fault, ScriptError
 FILE = "<urscript>"
 """The file name of compiled code, by which a traceback's frames are known."""
 
+LONGEST_REASON = 200
+"""Characters that an error's text takes of an exception that is no fault of the script."""
+
 _KINDS = {
     "int": "an integer",
     "float": "a float",
@@ -73,9 +76,8 @@ def _words(error: Exception) -> str:  # noqa: PLR0911  one for each kind of exce
     match error:
         case Fault():
             return str(error)
-        case NameError():
-            found = re.search(r"'[gv]_(\w+)'", str(error))
-            return f"the variable {found[1] if found else '?'} has no value yet"
+        case NameError() if found := re.search(r"'[gv]_(\w+)'", str(error)):
+            return f"the variable {found[1]} has no value yet"
         case ZeroDivisionError():
             return "division by zero"
         case OverflowError():
@@ -88,5 +90,7 @@ def _words(error: Exception) -> str:  # noqa: PLR0911  one for each kind of exce
                 left, right = _KINDS.get(found[2], found[2]), _KINDS.get(found[3], found[3])
                 return f"{left} and {right} cannot be compared by {found[1]}"
             return f"a value does not fit here: {error}"
-        case _:
+        case ValueError() | ArithmeticError():
             return f"an argument does not fit: {error}"
+        case _:
+            return f"internal error: {type(error).__name__}: {str(error)[:LONGEST_REASON]}"

@@ -9,10 +9,16 @@ from tvist_urscript.statements import Statements
 
 DEEPEST_CALLS = 200
 """Calls of functions inside each other."""
+MOST_PARAMETERS = 255
+"""Parameters of one function."""
+MOST_FUNCTIONS = 2000
+"""Functions and threads of a program."""
 MOST_STATEMENTS = 4000
 """Statements of one function: while Python compiles it, no other thread of the process runs."""
-PART = 200
-"""Statements of one part of a long main function."""
+MOST_NODES = 10_000
+"""Operations, names, calls and statements of one function, for the same reason."""
+PART, PART_NODES = 200, 1000
+"""Statements, and all that MOST_NODES counts, of one part of a long main function."""
 
 
 class Functions(Statements):
@@ -29,7 +35,7 @@ class Functions(Statements):
             self.report(function.line, function.column, "only a whole program can be a sec")
         for twice in scope.twice:
             self.report(twice.line, twice.column, f"{twice.name} is defined twice")
-        if scope.outer is not None or _length(function.body) <= PART:
+        if scope.outer is not None or (_length(function.body) <= PART and _size(function.body) <= PART_NODES):
             return [self.definition(scope.code_name, function, function.body)]
         at = Position.of(function)
         self.is_part = True
@@ -56,6 +62,15 @@ class Functions(Statements):
                 f"{length} statements of {function.name} are too many in one function: the limit is {MOST_STATEMENTS}",
             )
             return _definition(at, name, [], [])
+        size = _size(body) + sum(default.size for _, default in function.parameters if default is not None)
+        if size > MOST_NODES:
+            self.report(
+                function.line,
+                function.column,
+                f"{size} operations and names of {function.name} are too many in one function: "
+                f"the limit is {MOST_NODES}",
+            )
+            return _definition(at, name, [], [])
         self.globals, self.loops = set(), 0
         parameters = self.parameters(function)
         defaults: list[ast.stmt] = []
@@ -77,8 +92,15 @@ class Functions(Statements):
 
     def parameters(self, function: tree.Function) -> list[str]:
         """Check the parameters of a function and return their names in Python."""
-        names: list[str] = []
+        names: dict[str, None] = {}
         needed = True
+        if (count := len(function.parameters)) > MOST_PARAMETERS:
+            self.report(
+                function.line,
+                function.column,
+                f"{count} parameters of {function.name} are too many: the limit is {MOST_PARAMETERS}",
+            )
+            return []
         for name, default in function.parameters:
             if function.kind == "thread":
                 self.report(name.line, name.column, f"the thread {function.name} cannot have parameters")
@@ -89,8 +111,8 @@ class Functions(Statements):
                     name.line, name.column, f"the parameter {name.name} needs a default as the one before it"
                 )
             needed = needed and default is None
-            names.append(f"v_{name.name}")
-        return names
+            names[f"v_{name.name}"] = None
+        return list(names)
 
 
 def _definition(at: Position, name: str, parameters: list[str], body: list[ast.stmt]) -> ast.FunctionDef:
@@ -120,14 +142,19 @@ def _length(body: list[tree.Statement]) -> int:
     return total
 
 
+def _size(body: list[tree.Statement]) -> int:
+    return sum(statement.size for statement in body if not isinstance(statement, tree.Function))
+
+
 def _parts(body: list[tree.Statement]) -> list[list[tree.Statement]]:
     parts: list[list[tree.Statement]] = [[]]
-    length = 0
+    length = size = 0
     for statement in body:
-        own = _length([statement])
-        if length + own > PART and parts[-1]:
+        own, more = _length([statement]), _size([statement])
+        if (length + own > PART or size + more > PART_NODES) and parts[-1]:
             parts.append([])
-            length = 0
+            length = size = 0
         parts[-1].append(statement)
         length += own
+        size += more
     return parts

@@ -68,6 +68,7 @@ _COSTS = {
     "inv": 100,
     "integer_to_binary_list": 8,
     "interpolate_pose": 15,
+    "point_dist": 4,
     "pose_add": 8,
     "pose_inv": 8,
     "pose_sub": 8,

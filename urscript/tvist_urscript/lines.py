@@ -4,6 +4,12 @@ from collections.abc import Iterator
 
 from lark import Token
 
+from tvist_urscript.errors import ScriptError, syntax_error
+
+LONGEST_NAME = 255
+"""Characters of a name."""
+MOST_BRACKETS = 100
+"""Brackets inside each other."""
 END = "_NEWLINE"
 
 _OPENS = frozenset(("LPAR", "LSQB"))
@@ -40,7 +46,11 @@ class Lines:
     always_accept = (END,)
 
     def process(self, tokens: Iterator[Token]) -> Iterator[Token]:  # noqa: C901  one pass, as a text is long
-        """Drop line breaks that end nothing, and add ends that no line break tells."""
+        """Drop line breaks that end nothing, and add ends that no line break tells.
+
+        Raises:
+            ScriptError: A name is too long, or brackets are nested too deep.
+        """
         brackets = 0
         last = END
         pending: Token | None = None
@@ -59,8 +69,14 @@ class Lines:
                 yield Token.new_borrow_pos(END, token, token)
             if kind in _OPENS:
                 brackets += 1
+                if brackets > MOST_BRACKETS:
+                    raise _wrong(token, f"more than {MOST_BRACKETS} levels are nested here")
             elif kind in _CLOSES and brackets > 0:
                 brackets -= 1
+            elif kind == "NAME" and len(token) > LONGEST_NAME:
+                raise _wrong(
+                    token, f"a name of {len(token)} characters is too long, the limit is {LONGEST_NAME}"
+                )
             yield token
             last = kind
             token_before = token
@@ -74,3 +90,9 @@ def _after(token: Token) -> Token:
     """An end without a text, where the text ends."""
     line, column = token.end_line, token.end_column
     return Token(END, "", token.end_pos, line, column, line, column)
+
+
+def _wrong(token: Token, why: str) -> ScriptError:
+    assert token.line is not None
+    assert token.column is not None
+    return ScriptError(token.line, token.column, syntax_error(token.line, why))

@@ -1,6 +1,7 @@
 """Runs a compiled script, a tick at a time."""
 
 from collections.abc import Callable, Generator, Mapping
+from contextlib import suppress
 from types import FunctionType
 from typing import Any
 
@@ -44,7 +45,8 @@ class Machine:
     Args:
         script: What it runs.
         functions: The built-in functions that the script calls, without those of `PURE`.
-        finish: Called as a blocking function at the regular end of each thread, before it ends.
+        finish: Called as a blocking function before a thread waits for another (`join`, `enter_critical`), and at
+            its regular end.
 
     Raises:
         ValueError: The script calls a function that is not given.
@@ -60,7 +62,7 @@ class Machine:
         self.script = script
         self.left = 0
         self.thread = 0
-        self._finish = finish
+        self._finish = finish or _nothing
         self._started = 0
         self._holder: Thread | None = None
         self._line = 1
@@ -102,7 +104,7 @@ class Machine:
             What is left of the budget; at least 0.
 
         Raises:
-            ScriptError: A thread has failed. All threads have ended.
+            ScriptError: A thread has failed, in the script or in a built-in function. All threads have ended.
         """
         self.left = budget
         missed, self._missed = self._missed, []
@@ -117,10 +119,20 @@ class Machine:
         return max(self.left, 0)
 
     def end(self) -> None:
-        """End all threads: GeneratorExit reaches the blocking functions in which they wait."""
-        for thread in reversed(self._threads):
-            self._close(thread)
-        self._threads = []
+        """End all threads: GeneratorExit reaches the blocking functions in which they wait.
+
+        Raises:
+            ScriptError: A blocking function has failed at that. All threads have ended.
+        """
+        threads, self._threads = self._threads, []
+        failed: Exception | None = None
+        for thread in reversed(threads):
+            try:
+                self._close(thread)
+            except Exception as error:  # noqa: BLE001  the others have to end as well
+                failed = failed or error
+        if failed is not None:
+            raise failure(failed) from failed
 
     def charge(self, work: int) -> None:
         """Take the elements of a list from the budget.
@@ -133,31 +145,28 @@ class Machine:
             raise Fault("a statement works on too many list elements at once")
 
     def _turn(self, thread: Thread) -> None:
+        try:
+            self._step(thread)
+        except Exception as error:
+            with suppress(ScriptError):  # what went wrong first is what the author has to know
+                self.end()
+            if isinstance(error, ScriptError):
+                raise
+            raise failure(error) from error
+        except BaseException:
+            self.end()
+            raise
+
+    def _step(self, thread: Thread) -> None:
+        assert thread.steps is not None
         self._running = thread
         self.thread = thread.number
         try:
             why = next(thread.steps)
-        except StopIteration:
-            self._ended(thread)
-        except Killed:
+        except (StopIteration, Killed):
             self._ended(thread)
         except Halted:
             self.end()
-        except (
-            Fault,
-            ScriptError,
-            NameError,
-            TypeError,
-            ValueError,
-            ArithmeticError,
-            RecursionError,
-        ) as error:
-            script_error = failure(error)
-            self.end()
-            raise script_error from error
-        except BaseException:
-            self.end()
-            raise
         else:
             self._waits(thread, spent=why is _SPENT)
 
@@ -170,7 +179,6 @@ class Machine:
         thread.spent += 1
         if thread.spent >= PATIENCE:
             line, column = position_of(thread.steps) or (1, 1)
-            self.end()
             raise ScriptError(
                 line,
                 column,
@@ -185,7 +193,7 @@ class Machine:
         return self._holder is thread
 
     def _ended(self, thread: Thread) -> None:
-        thread.ended = True
+        thread.leave(self._threads)
         if self._holder is thread:
             self._holder = None
         if thread is self._main:
@@ -194,17 +202,16 @@ class Machine:
             self._threads.remove(thread)
 
     def _close(self, thread: Thread) -> None:
-        if not thread.ended:
-            thread.ended = True
-            if thread is not self._running or not getattr(thread.steps, "gi_running", False):
-                thread.steps.close()
+        steps = thread.steps
+        thread.leave(self._threads)
         if self._holder is thread:
             self._holder = None
+        if steps is not None and (thread is not self._running or not getattr(steps, "gi_running", False)):
+            steps.close()
 
     def _body(self, function: Callable[[int], Steps]) -> Steps:
         yield from function(1)
-        if self._finish is not None:
-            yield from self._finish()
+        yield from self._finish()
 
     # Statements that are added to the program.
 
@@ -251,18 +258,23 @@ class Machine:
             if thread is self._running:
                 itself = True
             else:
-                self._close(thread)
                 self._threads.remove(thread)
+                self._close(thread)
         if itself:
             raise Killed
 
     def _join(self, handle: Value) -> Steps:
         thread = self._find(handle)
-        while thread is not None and not thread.ended:
+        if thread is None:
+            return
+        yield from self._finish()
+        while not thread.ended:
             yield
 
     def _enter(self) -> Steps:
         thread = self._running
+        if self._holder is not None and self._holder is not thread:
+            yield from self._finish()  # before it is in line, as it gets no turn then
         thread.critical += 1
         if self._holder is None:
             self._holder = thread
@@ -316,6 +328,10 @@ class Machine:
             return result
 
         return charged
+
+
+def _nothing() -> Steps:
+    yield from ()
 
 
 def _halt() -> None:

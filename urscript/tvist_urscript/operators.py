@@ -47,5 +47,6 @@ def operators(work: Work) -> Mapping[str, Callable[..., Any]]:
         "element_of_matrix": indexing.element_of_matrix,
         "replaced": lambda new, indices, value: indexing.replaced(new, indices, value, work),
         "listed": Array,
+        "arranged": lambda order, values: [values[place] for place in order],
         "posed": Pose,
     }

@@ -1,7 +1,7 @@
 """The threads of a running program."""
 
-from collections.abc import Generator
-from dataclasses import dataclass, field
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass
 from typing import Any
 
 MOST_THREADS = 100
@@ -14,25 +14,39 @@ class Thread:
 
     Attributes:
         number: 0 for the main thread; others count on, and a number never comes again.
-        steps: The generator that runs it.
-        parent: The thread that has started it, None for the main thread.
+        steps: The generator that runs it, None when it has ended.
+        parent: The thread that has started it, or the nearest thread before that which has not ended; None for the main
+            thread.
         critical: How many critical sections it is in.
         spent: Ticks one after the other in which it used up its budget.
-        ended: It has come to its end, or was killed.
     """
 
     number: int
-    steps: Generator[Any, None, Any]
+    steps: Generator[Any, None, Any] | None
     parent: "Thread | None"
     critical: int = 0
     spent: int = 0
-    ended: bool = field(default=False)
+
+    @property
+    def ended(self) -> bool:
+        """Whether it has come to its end, or was killed."""
+        return self.steps is None
 
     def descends_from(self, other: "Thread") -> bool:
-        """Whether the other has started it, or one of those that have."""
+        """Whether the other has started it, or one of those that have; neither has ended."""
         thread: Thread | None = self
         while thread is not None:
             if thread is other:
                 return True
             thread = thread.parent
         return False
+
+    def leave(self, others: "Iterable[Thread]") -> None:
+        """End it: nothing of it is kept, and its parent gets those that it has started.
+
+        As an ended thread cannot be killed, that is the same to `kill`.
+        """
+        self.steps = None
+        for other in others:
+            if other.parent is self:
+                other.parent = self.parent

@@ -12,11 +12,13 @@ class Node:
         line: Line of its token, from 1.
         column: Column of its token, from 1.
         depth: Levels of nodes below it.
+        size: Number of nodes with those below it, without constants and without functions.
     """
 
     line: int
     column: int
     depth: int = field(default=1, init=False)
+    size: int = field(default=1, init=False)
 
 
 @dataclass(slots=True)
