@@ -144,7 +144,8 @@ class Controller:
     def basis(self) -> PlanBasis:
         """The present state that plans for commands depend on."""
         on = self.filters.basis
-        return PlanBasis(on, self.motion.basis(on), ToolBasis(self.motion.tcp, self.cycle.reference))
+        tool = ToolBasis(self.motion.tcp, self.cycle.reference)
+        return PlanBasis(on, self.motion.basis(on), tool, self.programs.statements.basis)
 
     def receive(self, command: c.Command, plan: Plan | None = None, session: str | None = None) -> Reply:
         """Carry out a command between two ticks. A refused command changes nothing.

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from msgspec import Meta
+from msgspec import Meta, Struct
 
 from tvist_protocol.client_message import ClientMessage
 from tvist_protocol.values import PROGRAM_NAME_PATTERN, Token
@@ -39,6 +39,40 @@ class ProgramRun(ClientMessage, frozen=True, kw_only=True, tag="program.run"):
     """Token of the lease."""
     text: Script
     """Text of the program, which names it."""
+
+
+class ProgramInterpret(ClientMessage, frozen=True, kw_only=True, tag="program.interpret"):
+    """Add a statement to the program, which has to wait for statements in `interpreter_mode`.
+
+    The reply has its number; the program carries out statements in their order.
+    """
+
+    token: Token
+    """Token of the lease."""
+    text: Script
+    """Text of the statement, or of a function for later ones; it can use all that the program knows."""
+
+
+class ProgramSkip(ClientMessage, frozen=True, kw_only=True, tag="program.skip"):
+    """Skip something in a program that waits for statements."""
+
+    token: Token
+    """Token of the lease."""
+    what: Literal["statements", "move"]
+    """All statements that have not begun, or the rest of the planned motion that the program makes now."""
+
+
+class Interpreter(Struct, frozen=True, kw_only=True):
+    """Statements that clients have added to a program, by their numbers, which begin with 1."""
+
+    interpreted: int = 0
+    """Last statement that was accepted."""
+    executed: int = 0
+    """Last statement that has begun."""
+    cleared: int = 0
+    """Last statement that the program has forgotten, with the functions that it defined."""
+    waiting: int = 0
+    """Number of statements that have not begun."""
 
 
 class ProgramClosePopup(ClientMessage, frozen=True, kw_only=True, tag="program.close_popup"):

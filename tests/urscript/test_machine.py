@@ -459,10 +459,16 @@ def test_statements_that_are_added_use_the_program_and_what_was_added_before():
 
 
 def test_what_was_forgotten_is_unknown_to_later_statements_and_variables_keep_their_values():
-    added, first = Added(PROGRAM), None
+    added = Added(PROGRAM)
     first = added.last
     added.add("def sum(x):\n return x[0]\nend\na = [3]")
-    added.machine.forget()
+    added.add("def kept():\n return [5]\nend")
+    added.machine.forget(added.last.scope.number)
+    assert added.add("say(kept())") == ["[5]"]
+    with pytest.raises(ScriptError, match="the function sum has been forgotten"):
+        added.add("say(sum(a))")
+    added = Added(PROGRAM)
+    added.add("a = [3]")
     added.last = first
     with pytest.raises(ScriptError, match="name_not_found:sum"):
         added.add("say(sum(a))")

@@ -3,7 +3,7 @@
 import ast
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import CodeType, MappingProxyType
 
 from tvist_urscript import tree
@@ -40,6 +40,11 @@ class Script:
     used: frozenset[str]
     scope: Scope = field(repr=False)
     scopes: int
+
+    def forgetting(self, last: "Script") -> "Script":
+        """Return the program for later statements, which know the variables added up to the last one, not functions."""
+        scope = replace(self.scope, globals=set(last.scope.globals))
+        return replace(self, scope=scope, scopes=last.scopes)
 
 
 def compile_script(text: str, signatures: Signatures, after: Script | None = None) -> Script:

@@ -1,5 +1,6 @@
 """Runs a compiled script, a tick at a time."""
 
+import re
 from collections.abc import Callable, Generator, Mapping
 from contextlib import suppress
 from types import FunctionType
@@ -22,6 +23,8 @@ PATIENCE = 50
 OVERDRAFT = 5000
 """Evaluations by which one statement may exceed the budget."""
 
+_ADDED = re.compile(r"[fc](\d+)_")
+"""Names of functions and constants in compiled code, with the number of their scope."""
 _SPENT = object()
 _MISSING = object()
 Steps = Generator[Any, None, Any]
@@ -227,10 +230,15 @@ class Machine:
         self._include(script)
         return self._names[script.main](1)  # type: ignore[no-any-return]  # a generator function of compiled code
 
-    def forget(self) -> None:
-        """Forget all functions that have been added; variables keep their values."""
+    def forget(self, before: int) -> None:
+        """Forget functions that were added; variables keep their values.
+
+        Args:
+            before: Number of the first scope that is kept.
+        """
         for name in self._names.keys() - self._own:
-            if name.startswith(("f", "c")):
+            found = _ADDED.match(name)
+            if found is not None and int(found[1]) < before:
                 del self._names[name]
 
     # What compiled code calls.

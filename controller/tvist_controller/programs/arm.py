@@ -254,6 +254,12 @@ class ProgramArm:
             while self._motion.activity.moving:
                 yield
 
+    def abort(self) -> None:
+        """Stop the planned move that the program makes now, if there is one; it goes on as if the move had ended."""
+        if self._number is not None:
+            self.brake(lambda: self._access.guidance.stop_joints(BRAKING))
+            self._outcome = "motion_done"
+
     def brake(self, stop: Callable[[], None]) -> None:
         """Begin a stop of what moves, which is the program's own will."""
         self._own = True

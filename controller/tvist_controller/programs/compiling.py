@@ -34,16 +34,36 @@ class ScriptCompiler:
             text = self._built_in.get(command.name)
             if text is None:
                 return None
-        try:
-            script = compile_script(text, SIGNATURES)
-        except ScriptError as error:
-            raise _refusal(error.line, error.column, error.text) from error
+        script = _compiled(text)
         moves = script.used & MOVING
         if script.secondary and moves:
             raise _refusal(
                 1, 1, f"a secondary program cannot move the arm: it calls {', '.join(sorted(moves))}"
             )
         return script
+
+    @staticmethod
+    def compile_statement(text: str, after: Script | None) -> Script:
+        """Return a statement for a running program.
+
+        Args:
+            text: Its text.
+            after: The program, or what was added to it last; None if no program waits for statements.
+
+        Raises:
+            RefusalError: The text is not valid, or no program waits.
+        """
+        if after is None:
+            why = "no program waits for statements: it has to call interpreter_mode()"
+            raise RefusalError("wrong_mode", "", why)
+        return _compiled(text, after)
+
+
+def _compiled(text: str, after: Script | None = None) -> Script:
+    try:
+        return compile_script(text, SIGNATURES, after)
+    except ScriptError as error:
+        raise _refusal(error.line, error.column, error.text) from error
 
 
 def _refusal(line: int, column: int, text: str) -> RefusalError:

@@ -13,23 +13,25 @@ from tvist_controller.programs.functions import (
     safety,
     settings,
     state,
+    statements,
     terminals,
     unsimulated,
 )
+from tvist_controller.programs.interpreter import StatementQueue
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.programs.popups import Popups
 from tvist_controller.programs.watchdogs import Watchdogs
 
-_MODULES = (motions, poses, state, settings, registers, terminals, messages, safety, unsimulated)
+_MODULES = (motions, poses, state, settings, registers, terminals, messages, statements, safety, unsimulated)
 SIGNATURES = {name: one for module in _MODULES for name, one in module.SIGNATURES.items()}
 """Signature of each function; those of the language itself are in `tvist_urscript`."""
 
-MOVING = frozenset(motions.SIGNATURES)
-"""Functions that move the arm."""
+MOVING = frozenset(motions.SIGNATURES) | {"interpreter_mode"}
+"""Functions that move the arm, or let clients do so."""
 
 
 def functions(
-    access: Access, arm: ProgramArm, popups: Popups, watchdogs: Watchdogs
+    access: Access, arm: ProgramArm, popups: Popups, watchdogs: Watchdogs, queue: StatementQueue
 ) -> dict[str, Callable[..., Any]]:
     """Return the functions for the programs of one robot, by name."""
     kinematics = ProgramKinematics(access.description, access.motion)
@@ -41,6 +43,7 @@ def functions(
         registers: registers.RegisterFunctions(access, arm),
         terminals: terminals.TerminalFunctions(access, arm),
         messages: messages.MessageFunctions(access, arm, popups),
+        statements: statements.StatementFunctions(arm, queue),
         safety: safety.SafetyFunctions(access, arm, watchdogs),
         unsimulated: unsimulated.UnsimulatedFunctions(),
     }

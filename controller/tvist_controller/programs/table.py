@@ -12,6 +12,7 @@ from tvist_controller.programs.functions import (
     safety,
     settings,
     state,
+    statements,
     terminals,
     unsimulated,
 )
@@ -38,6 +39,7 @@ SUBJECTS: tuple[tuple[str, ModuleType, type], ...] = (
     ("Registers and flags", registers, registers.RegisterFunctions),
     ("Inputs and outputs", terminals, terminals.TerminalFunctions),
     ("Messages and time", messages, messages.MessageFunctions),
+    ("Statements from clients", statements, statements.StatementFunctions),
     ("Safety", safety, safety.SafetyFunctions),
 )
 

@@ -18,6 +18,7 @@ from tvist_protocol.programs import (
 )
 from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import Event
+from tvist_protocol.values import PROGRAM_NAME_PATTERN
 from tvist_server.gateways.ur import messages
 from tvist_server.gateways.ur.base import ControllerAccess
 
@@ -25,6 +26,7 @@ FOLDER: Final = "/programs"
 """Folder in which a controller keeps programs; every other folder is accepted too."""
 _SAVED: Final = (".urp", ".script")
 """How the names of files end. The name of a script that a client has sent has no ending."""
+_NAME: Final = re.compile(PROGRAM_NAME_PATTERN)
 _PLACE: Final = re.compile(r"text:(\d+):(\d+)")
 
 Heard = Callable[[bool], None]
@@ -102,7 +104,7 @@ class Programs:
                 self.path = path if "/" in path else _path_of(name)
             outcome(refused)
 
-        if name:
+        if _NAME.search(name):
             control.ask(ProgramLoad(name=name), then)
         else:
             outcome(Refused(code="out_of_range", where="name", why="the path does not name a file"))

@@ -1,0 +1,191 @@
+"""Statements that clients add to a program while it waits in `interpreter_mode`."""
+
+import pytest
+
+from tvist_protocol.programs import Interpreter, ProgramInterpret, ProgramSkip, ProgramStop
+from tvist_protocol.replies import Accepted, Done, Refused
+
+from .scripts import URSIM, a_robot, failure, finish, playing, said, start
+
+NEAR = [angle + 0.2 for angle in URSIM]
+
+
+def waiting(*before, mode="interpreter_mode()", after=()):
+    """A robot whose program waits for statements."""
+    robot = a_robot()
+    start(robot, *before, mode, *after)
+    robot.tick(2)
+    return robot
+
+
+def add(robot, text, ticks=3):
+    reply = robot.send(ProgramInterpret, text=text)
+    robot.tick(ticks)
+    return reply
+
+
+def state(robot):
+    return robot.controller.io().interpreter
+
+
+def test_statements_are_numbered_and_carried_out_in_their_order():
+    robot = waiting("a = 5")
+    replies = [robot.send(ProgramInterpret, text=f"textmsg({text})") for text in ("a", "a + 1", '"c"')]
+    assert replies == [Accepted(id=1), Accepted(id=2), Accepted(id=3)]
+    assert state(robot) == Interpreter(interpreted=3, executed=0, cleared=0, waiting=3)
+    robot.tick()
+    assert said(robot) == ["5", "6", "c"]
+    assert state(robot) == Interpreter(interpreted=3, executed=3, cleared=0, waiting=0)
+    assert playing(robot)
+
+
+def test_statements_define_functions_and_variables_for_later_ones():
+    robot = waiting("def twice(x):", "return 2 * x", "end")
+    add(robot, "def thrice(x):\n  return x + twice(x)\nend")
+    add(robot, "b = [thrice(1), 2]")
+    add(robot, "textmsg(b)")
+    assert said(robot) == ["[3, 2]"]
+
+
+def test_a_statement_waits_for_the_motion_before_it():
+    robot = waiting()
+    add(robot, f"movej({NEAR}, a=2, v=1)")
+    add(robot, 'textmsg("there")')
+    assert said(robot) == []
+    assert state(robot).waiting == 1
+    robot.until_rest()
+    robot.tick(3)
+    assert said(robot) == ["there"]
+    assert robot.states[-1].reference_q == pytest.approx(NEAR)
+
+
+def test_the_program_goes_on_after_end_interpreter():
+    robot = waiting(after=['textmsg("after")'])
+    add(robot, "end_interpreter()")
+    assert said(robot) == ["after"]
+    assert not playing(robot)
+    refused = robot.send(ProgramInterpret, text="sync()")
+    assert (refused.code, "interpreter_mode" in refused.why) == ("wrong_mode", True)
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "where"),
+    [
+        ("textmsg(nothing)", "script_error", "text:1:9"),
+        ("movej(", "script_error", "text:1:7"),
+        ("sec f():\nend", "script_error", "text:1:5"),
+    ],
+)
+def test_a_statement_that_is_not_valid_changes_nothing(text, code, where):
+    robot = waiting()
+    refused = add(robot, text)
+    assert isinstance(refused, Refused)
+    assert (refused.code, refused.where) == (code, where)
+    assert add(robot, "textmsg(1)") == Accepted(id=1)
+    assert said(robot) == ["1"]
+
+
+def test_an_error_in_a_statement_ends_the_program_at_its_place():
+    robot = waiting("a = [1]")
+    add(robot, "textmsg(a[7])")
+    assert not playing(robot)
+    assert (failure(robot).line, failure(robot).column) == (1, 11)
+
+
+def test_functions_are_forgotten_and_variables_are_kept():
+    robot = waiting()
+    add(robot, "def f():\n  return 7\nend")
+    add(robot, "c = f()")
+    add(robot, "clear_interpreter()")
+    assert state(robot) == Interpreter(interpreted=3, executed=3, cleared=3, waiting=0)
+    assert add(robot, "textmsg(f())").code == "script_error"
+    add(robot, "textmsg(c)")
+    add(robot, "def f():\n  return 8\nend")
+    add(robot, "textmsg(f())")
+    assert said(robot) == ["7", "8"]
+
+
+def test_statements_behind_a_clear_are_compiled_without_those_before_it():
+    robot = waiting()
+    robot.send(ProgramInterpret, text="def f():\n  return 7\nend")
+    robot.send(ProgramInterpret, text="clear_interpreter()")
+    assert robot.send(ProgramInterpret, text="textmsg(f())").code == "script_error"
+    robot.send(ProgramInterpret, text="def f():\n  return 8\nend")
+    robot.send(ProgramInterpret, text="textmsg(f())")
+    robot.tick(3)
+    assert said(robot) == ["8"]
+
+
+def test_a_program_is_not_given_statements_without_end():
+    robot = waiting()
+    replies = [robot.send(ProgramInterpret, text="x = 1") for _ in range(1001)]
+    assert isinstance(replies[999], Accepted)
+    assert replies[1000].code == "busy"
+    robot.send(ProgramInterpret, text="clear_interpreter()")
+    assert isinstance(robot.send(ProgramInterpret, text="x = 1"), Accepted)
+    robot.tick(100)
+    assert state(robot).waiting == 0
+
+
+def test_waiting_statements_are_skipped_and_the_present_move_goes_on():
+    robot = waiting()
+    add(robot, f"movej({NEAR}, a=2, v=1)")
+    add(robot, 'textmsg("there")')
+    assert robot.send(ProgramSkip, what="statements") == Done()
+    assert state(robot).waiting == 0
+    robot.until_rest()
+    robot.tick(3)
+    assert said(robot) == []
+    assert robot.states[-1].reference_q == pytest.approx(NEAR)
+    assert playing(robot)
+
+
+@pytest.mark.parametrize("move", ["movej", "movel"])
+def test_a_move_that_is_skipped_ends_where_it_stops_and_the_next_statement_follows(move):
+    robot = waiting()
+    add(robot, f"{move}({NEAR}, a=1, v=0.3)", 200)
+    add(robot, 'textmsg("on")')
+    assert robot.send(ProgramSkip, what="move") == Done()
+    robot.until_rest()
+    robot.tick(3)
+    assert said(robot) == ["on"]
+    assert robot.states[-1].reference_q != pytest.approx(NEAR)
+    assert playing(robot)
+
+
+def test_statements_that_are_left_over_wait_for_the_next_time_if_the_program_says_so():
+    robot = waiting(after=["interpreter_mode(clearQueueOnEnter=False)"])
+    robot.send(ProgramInterpret, text="end_interpreter()")
+    robot.send(ProgramInterpret, text='textmsg("later")')
+    robot.tick(3)
+    assert said(robot) == ["later"]
+    robot = waiting(after=["interpreter_mode()"])
+    robot.send(ProgramInterpret, text="end_interpreter()")
+    robot.send(ProgramInterpret, text='textmsg("later")')
+    robot.tick(3)
+    assert said(robot) == []
+
+
+def test_only_the_main_program_waits_for_statements_and_only_once():
+    robot = waiting()
+    add(robot, "interpreter_mode()")
+    assert "in a statement" in failure(robot).why
+    robot = a_robot()
+    start(robot, "thread t():", "interpreter_mode()", "end", "join run t()")
+    robot.tick(3)
+    assert "in a thread" in failure(robot).why
+
+
+def test_the_end_of_the_program_ends_the_statements():
+    robot = waiting()
+    add(robot, "sleep(10)")
+    add(robot, "textmsg(1)")
+    robot.send(ProgramStop)
+    robot.tick(3)
+    assert state(robot).waiting == 0
+    assert robot.send(ProgramInterpret, text="sync()").code == "wrong_mode"
+    start(robot, "interpreter_mode()")
+    robot.tick(2)
+    assert state(robot) == Interpreter()
+    assert add(robot, "end_interpreter()") == Accepted(id=1)
+    finish(robot)
