@@ -26,7 +26,7 @@ SHAPERS = {"none": ("without a shaper", "#D55E00"), "zv": ("with the shaper zv",
 START, TARGET = "Q1", [1.571, -1.571, 2.618, -1.571, 0.0, 0.0]
 GRAVITY = 9.81
 FROM, UNTIL = -0.1, 0.3
-"""What is drawn: times after the end of the commanded motion [s]."""
+"""First and last time that the figure shows, counted from the end of the commanded motion [s]."""
 LOUD = 0.2
 """The tool shakes where its acceleration exceeds this, which the sensor's noise does not [m/s²]."""
 

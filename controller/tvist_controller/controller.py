@@ -20,7 +20,7 @@ from tvist_controller.faults import Faults
 from tvist_controller.filters import Filters
 from tvist_controller.guided import Guidance
 from tvist_controller.guided_commands import GuidedCommands
-from tvist_controller.instruments.wrench import ToolWrench
+from tvist_controller.instruments.wrench import ToolWrench, since_zeroed
 from tvist_controller.motion import MotionControl
 from tvist_controller.motion_commands import MotionCommands
 from tvist_controller.peripherals import Peripherals
@@ -67,7 +67,6 @@ class Controller:
         self.counters = Counters()
         self._events: list[Event] = []
         self._stop_reasons = StopReasons()
-        self._io_changed = True
         planner = Planner(setup)
         self._commands = CommandTable(planner, lambda: self.basis)
         source, tvist = planner.filters.first()
@@ -165,7 +164,7 @@ class Controller:
         except (RefusalError, NoControlError) as refusal:
             self.counters.refused += 1
             return refusal.reply
-        self._io_changed |= row.changes_io
+        self.peripherals.changed |= row.changes_io
         return Done() if reply is None else reply
 
     def receive_setpoint(self, setpoint: c.Setpoint) -> None:
@@ -245,22 +244,17 @@ class Controller:
 
         It is computed on request.
         """
-        felt = self._felt()
-        zero = self.peripherals.wrench_zero
-        return felt if zero is None else [one - other for one, other in zip(felt, zero, strict=True)]
+        return since_zeroed(self._felt(), self.peripherals.wrench_zero)
 
     def _felt(self) -> list[float]:
         return self._wrench.of(self.latest, self.peripherals.tcp_offset)
 
     def changed_io(self) -> Io | None:
         """Return inputs, outputs and registers before a tick, if they changed since the last call; else None."""
-        program, peripherals = (
-            self.programs.progress,
-            self.peripherals,
-        )  # change in ticks, by events and commands
-        if not (self._io_changed or peripherals.changed) and program == self._told_program:
+        program, peripherals = self.programs.progress, self.peripherals
+        if not peripherals.changed and program == self._told_program:
             return None
-        self._io_changed, peripherals.changed, self._told_program = False, False, program
+        peripherals.changed, self._told_program = False, program
         return self.io(wrench=False)
 
     def truth(self) -> Truth:
@@ -314,7 +308,7 @@ class Controller:
     def _send(self, command: c.Command, plan: Plan | None) -> Reply | None:
         """Carry out a command of a program."""
         reply = self._commands.carry_out(command, self.tick_number + 1, self.now, plan)
-        self._io_changed |= self._commands.row(command).changes_io
+        self.peripherals.changed |= self._commands.row(command).changes_io
         return reply
 
     # ------------------------------------------------------------------ commands that concern the whole robot

@@ -73,7 +73,7 @@ class Filters:
 
     @property
     def _idle(self) -> bool:
-        """Whether there is no shaper, to which the modes would matter."""
+        """True if there is no shaper, so that the modes do not matter."""
         return self._cycle.tvist.name == "none"
 
     def _warn_of_payload(self) -> None:

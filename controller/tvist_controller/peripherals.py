@@ -88,8 +88,8 @@ class Peripherals:
         }
         self._written: dict[tuple[Bank, int], int] = {}
         self._tool_voltage = 0
-        self.changed = False
-        """Whether something has changed since `io` was published last; whoever publishes it resets this."""
+        self.changed = True
+        """True if `io` has to be published, since something in it has changed; whoever publishes it resets this."""
         self.wrench_zero: list[float] | None = None
         """Force and torque at the tool that count as zero, base frame [N, N m]."""
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6
@@ -103,9 +103,7 @@ class Peripherals:
         for number, ratio in enumerate((command.standard_analog_output_0, command.standard_analog_output_1)):
             if command.standard_analog_output_mask >> number & 1:
                 self._analog_ratios[number] = ratio
-                bit = 1 << (2 + number)
-                voltage = command.standard_analog_output_type >> number & 1
-                self._analog_types = self._analog_types & ~bit | bit * voltage
+                self.choose_output(number, voltage=bool(command.standard_analog_output_type >> number & 1))
 
     def set_inputs(self, command: SimulationSetInputs) -> None:
         """Apply signals to inputs."""
@@ -286,8 +284,7 @@ class Peripherals:
         )
 
     def _analog_output(self, number: int) -> float:
-        voltage = bool(self._analog_types >> (2 + number) & 1)
-        return analog_value(self._analog_ratios[number], voltage=voltage)
+        return analog_value(self._analog_ratios[number], voltage=self.output_is_voltage(number))
 
 
 def _with(values: list[Number], first: int, new: list[Number]) -> list[Number]:

@@ -16,7 +16,8 @@ STATE_FIELDS = {
     "type", "tick", "timestamp", "robot_mode", "safety_mode", "runtime_state", "setpoint_sequence", "reference_q",
     "target_q", "target_qd", "target_qdd", "target_moment", "actual_q", "actual_qd", "actual_moment",
     "actual_TCP_pose", "actual_TCP_speed", "actual_tool_accelerometer", "speed_scaling", "estimated_f_d",
-    "estimated_zeta", "shaper_delay", "missed_ticks", "shaper_clipped",
+    "estimated_zeta", "shaper_delay", "missed_ticks", "shaper_clipped", "unshaped_q",
+    "unshaped_qd", "unshaped_qdd",
 }  # fmt: skip
 Q1 = [0.0, -math.pi, 0.0, -math.pi / 2, 0.0, 0.0]
 STOPPED, PLAYING = 1, 2

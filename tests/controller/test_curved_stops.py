@@ -129,7 +129,7 @@ class OnCurves(Sequence):
 
 @pytest.mark.parametrize("number", range(6))
 def test_whatever_is_sent_the_promises_hold_on_curves(number, monkeypatch):
-    monkeypatch.setitem(sequences._SENT, "move", (14.0, OnCurves.move))
+    monkeypatch.setitem(sequences.SENT, "move", (14.0, OnCurves.move))
     OnCurves(UR5E, number).run()
 
 

@@ -22,7 +22,7 @@ from .spaces import BENT, away, begun, errors, tool_pose
 
 LEAD = 1e-8
 """A pause goes through a filter whose weights follow the posture, and so may lead by nanometres [m]."""
-QUICK, SLOW, ALL = 8, 24, 500
+QUICK, SLOW, ALL = 8, 16, 500
 
 
 @pytest.mark.parametrize("seed", range(QUICK))

@@ -26,7 +26,7 @@ from .paths import journey
 from .robots import Q1, UR5E, H
 from .spaces import BENT, NO_TOOL, TOOL, away, begun, errors, pose_of, tool_pose
 
-QUICK, SLOW, ALL = 11, 33, 1000
+QUICK, SLOW, ALL = 11, 22, 1000
 
 
 @pytest.mark.parametrize("seed", range(QUICK))

@@ -328,12 +328,12 @@ def test_a_controller_that_fails_ends_the_server_with_exit_code_1_and_a_readable
 import sys
 from tvist_cli.main import main
 from tvist_controller.controller import Controller
-tick = Controller.tick
+tick = Controller.complete_tick
 def failing(self):
     if self.tick_number == 100:
         raise ArithmeticError("on purpose")
     return tick(self)
-Controller.tick = failing
+Controller.complete_tick = failing
 sys.argv = ["tvist", "serve", *sys.argv[1:]]
 main()
 """

@@ -54,6 +54,7 @@ def test_a_hundred_idle_connections_lock_nobody_out(served, operator, ring):
     assert operator.state()["tick"] > tick  # and the connected stay so
 
 
+@pytest.mark.nightly
 def test_nor_do_they_where_there_is_no_security():
     with Served() as plain:
         idle = idle_connections(plain.endpoint)
@@ -65,6 +66,7 @@ def test_nor_do_they_where_there_is_no_security():
             connection.close()
 
 
+@pytest.mark.nightly
 def test_a_hundred_that_shake_hands_half_way_lock_nobody_out_either(served, ring):
     hello, nothing = ssl.MemoryBIO(), ssl.MemoryBIO()
     half = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).wrap_bio(nothing, hello, server_hostname="localhost")

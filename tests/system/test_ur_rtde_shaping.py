@@ -10,7 +10,7 @@ from tests.conformance.served import PATIENCE
 
 EXAMPLE = Path(__file__).parents[2] / "clients" / "examples" / "03_ur_rtde_shaping.py"
 
-pytestmark = pytest.mark.realtime
+pytestmark = [pytest.mark.realtime, pytest.mark.nightly]
 
 
 def test_the_same_ur_rtde_program_lets_the_tool_shake_for_a_shorter_time_with_a_shaper(tmp_path):

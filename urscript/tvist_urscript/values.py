@@ -5,7 +5,7 @@ variable a new list.
 """
 
 from collections.abc import Iterable, Iterator
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from tvist_urscript.errors import Fault
 
@@ -100,6 +100,7 @@ class Pose(Array):
         return self.items  # type: ignore[return-value]
 
 
+T = TypeVar("T")
 Value: TypeAlias = int | float | bool | str | Array | None
 
 KINDS: dict[type, str] = {
@@ -144,15 +145,20 @@ def integer(value: Any, what: str) -> int:
     raise Fault(f"{what} has to be an integer, not {kind(value)}")
 
 
+def _exactly(wanted: type[T], value: Any, what: str, called: str) -> T:
+    """Return a value that has to be of a type, and of none derived from it."""
+    if type(value) is wanted:
+        return value
+    raise Fault(f"{what} has to be {called}, not {kind(value)}")
+
+
 def text(value: Any, what: str) -> str:
     """Return a value that has to be a text.
 
     Raises:
         Fault: It is none; the message calls it `what`.
     """
-    if type(value) is str:
-        return value
-    raise Fault(f"{what} has to be a text, not {kind(value)}")
+    return _exactly(str, value, what, "a text")
 
 
 def array(value: Any, what: str) -> Array:
@@ -161,9 +167,7 @@ def array(value: Any, what: str) -> Array:
     Raises:
         Fault: It is none; the message calls it `what`.
     """
-    if type(value) is Array:
-        return value
-    raise Fault(f"{what} has to be a list, not {kind(value)}")
+    return _exactly(Array, value, what, "a list")
 
 
 def pose(value: Any, what: str) -> Pose:
@@ -172,9 +176,7 @@ def pose(value: Any, what: str) -> Pose:
     Raises:
         Fault: It is none; the message calls it `what`.
     """
-    if type(value) is Pose:
-        return value
-    raise Fault(f"{what} has to be a pose, not {kind(value)}")
+    return _exactly(Pose, value, what, "a pose")
 
 
 def vector(value: Any, what: str) -> tuple[float, ...]:

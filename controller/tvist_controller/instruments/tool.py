@@ -7,6 +7,7 @@ import numpy as np
 
 from tvist_controller.instruments.reading import Reading
 from tvist_controller.instruments.rigid_body import Tool, add, carried, cross
+from tvist_controller.instruments.wrench import since_zeroed
 from tvist_plant.model import Floats
 from tvist_plant.plant import GRAVITY
 
@@ -72,8 +73,7 @@ class ToolValues(Reading):
         measured and is left out. It is zero while the arm is braked.
         """
         force: list[float] = self._force.tolist()
-        zero = self.io.tcp_force_zero
-        return force if zero is None else [felt - none for felt, none in zip(force, zero, strict=True)]
+        return since_zeroed(force, self.io.tcp_force_zero)
 
     @cached_property
     def tcp_force_scalar(self) -> float:

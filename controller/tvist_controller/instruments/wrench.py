@@ -19,6 +19,11 @@ RUNNING = int(RobotMode.RUNNING)
 """Robot mode in which the drives hold the arm, as a plain integer, since it is compared often."""
 
 
+def since_zeroed(wrench: list[float], zero: list[float] | None) -> list[float]:
+    """Return a wrench relative to the one that a program has taken as zero, if there is one [N, N m]."""
+    return wrench if zero is None else [felt - none for felt, none in zip(wrench, zero, strict=True)]
+
+
 class ToolWrench:
     """Estimates the force at the tool centre point that explains the measured torques.
 

@@ -1,4 +1,4 @@
-"""What is wrong with a program, without a robot."""
+"""Checks programs without a robot."""
 
 import re
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class Finding:
     level: Literal["error", "warning"]
     """An error keeps the program from starting; a warning ends it when the place is reached."""
     text: str
-    """What is wrong."""
+    """A sentence that says what is wrong."""
 
 
 def check_program(text: str) -> list[Finding]:

@@ -37,10 +37,6 @@ class ProgramKinematics:
             self._tcp, self._tool = wanted, self._flange.with_tool(wanted)
         return self._tool
 
-    def prepare(self) -> None:
-        """Compile what the functions use, before any is needed."""
-        self._inverse.prepare()
-
     def tool_pose(self, q: Floats, tcp: Sequence[float] | None = None) -> PoseNumbers:
         """Return the pose of the tool at joint positions, x y z [m] and rotation vector [rad].
 

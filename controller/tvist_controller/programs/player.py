@@ -213,7 +213,10 @@ class ProgramPlayer:
     def _close(self, running: _Running, why: str | None = None) -> None:
         self._all.remove(running)
         self._starved.discard(running)
-        running.machine.end()
+        try:
+            running.machine.end()
+        except ScriptError as error:
+            self._fail(running, error)
         self._popups.close(running.machine)
         secondary = running.script.secondary or None
         self._emit("program_stopped", program=running.name, why=why, secondary=secondary)
@@ -230,14 +233,12 @@ class ProgramPlayer:
 
     def _thread(self) -> object:
         """What identifies the thread that runs now."""
-        assert self._now is not None, "only programs call their functions"
-        return id(self._now.machine), self._now.machine.thread
+        machine = self._machine()
+        return machine, machine.thread
 
     def _lives(self, thread: object) -> bool:
         return any(
-            (id(running.machine), number) == thread
-            for running in self._all
-            for number in running.machine.living
+            (running.machine, number) == thread for running in self._all for number in running.machine.living
         )
 
     # ------------------------------------------------------------------ commands

@@ -50,8 +50,7 @@ class PoseFunctions:
     ) -> bool:
         """Return whether `get_inverse_kin` has an answer."""
         del position_error, orientation_error
-        goal, near, tool = pose("x", x), self._near(qnear), _tool(tcp)
-        return self._reaches(goal, near, tool)
+        return self._solution(pose("x", x), self._near(qnear), _tool(tcp)) is not None
 
     def get_forward_kin(self, q: object, tcp: object) -> Pose:
         """Return the pose of the tool at joint positions, or at the measured ones."""
@@ -60,12 +59,11 @@ class PoseFunctions:
     def is_within_safety_limits(self, target: object, near: object) -> bool:
         """Return whether the arm can be at a pose or at joint positions: within their range, without a collision."""
         if is_pose(target):
-            goal, start = pose("pose", target), self._near(near)
-            if not self._reaches(goal, start, None):
-                return False
-            q: Sequence[float] = self._kinematics.posture(goal, start)
+            q = self._solution(pose("pose", target), self._near(near))
         else:
             q = numbers("pose", target, self._joints)
+        if q is None:
+            return False
         try:
             check_joints(q, self._access.description)
         except RefusalError:
@@ -86,12 +84,14 @@ class PoseFunctions:
             matrix = matrix + np.diag(self._access.description.drives.rotor_inertia)
         return Array(tuple(a_list(row) for row in matrix.tolist()))
 
-    def _reaches(self, goal: Sequence[float], near: Sequence[float], tcp: Sequence[float] | None) -> bool:
+    def _solution(
+        self, goal: Sequence[float], near: Sequence[float], tcp: Sequence[float] | None = None
+    ) -> tuple[float, ...] | None:
+        """Joint positions nearest to others at which the tool has a pose; None if there are none."""
         try:
-            self._kinematics.posture(goal, near, tcp)
+            return self._kinematics.posture(goal, near, tcp)
         except Fault:
-            return False
-        return True
+            return None
 
     def _near(self, near: object) -> Sequence[float]:
         if near is None:

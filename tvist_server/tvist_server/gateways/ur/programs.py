@@ -18,7 +18,7 @@ from tvist_protocol.programs import (
 )
 from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import Event
-from tvist_protocol.values import PROGRAM_NAME_PATTERN
+from tvist_protocol.values import PATTERN_MEANINGS, PROGRAM_NAME_PATTERN
 from tvist_server.gateways.ur import messages
 from tvist_server.gateways.ur.base import ControllerAccess
 
@@ -26,7 +26,6 @@ FOLDER: Final = "/programs"
 """Folder in which a controller keeps programs; every other folder is accepted too."""
 _SAVED: Final = (".urp", ".script")
 """How the names of files end. The name of a script that a client has sent has no ending."""
-_NAME: Final = re.compile(PROGRAM_NAME_PATTERN)
 _PLACE: Final = re.compile(r"text:(\d+):(\d+)")
 
 Heard = Callable[[bool], None]
@@ -104,10 +103,11 @@ class Programs:
                 self.path = path if "/" in path else _path_of(name)
             outcome(refused)
 
-        if _NAME.search(name):
+        if re.match(PROGRAM_NAME_PATTERN, name):
             control.ask(ProgramLoad(name=name), then)
         else:
-            outcome(Refused(code="out_of_range", where="name", why="the path does not name a file"))
+            why = f"the path does not name a file, which has {PATTERN_MEANINGS[PROGRAM_NAME_PATTERN]}"
+            outcome(Refused(code="out_of_range", where="name", why=why))
 
     def run(self, text: str, control: ControllerAccess, outcome: Outcome, *, secondary: bool) -> None:
         """Start a script that a client has sent.
