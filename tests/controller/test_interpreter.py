@@ -92,13 +92,14 @@ def test_an_error_in_a_statement_ends_the_program_at_its_place():
     assert (failure(robot).line, failure(robot).column) == (1, 11)
 
 
-def test_functions_are_forgotten_and_variables_are_kept():
-    robot = waiting()
+def test_functions_and_variables_of_statements_are_forgotten_and_those_of_the_program_are_kept():
+    robot = waiting("c = 0")
     add(robot, "def f():\n  return 7\nend")
-    add(robot, "c = f()")
+    add(robot, "c = f() d = 1")
     add(robot, "clear_interpreter()")
     assert state(robot) == Interpreter(interpreted=3, executed=3, cleared=3, waiting=0)
     assert add(robot, "textmsg(f())").code == "script_error"
+    assert add(robot, "textmsg(d)").code == "script_error"
     add(robot, "textmsg(c)")
     add(robot, "def f():\n  return 8\nend")
     add(robot, "textmsg(f())")
@@ -167,8 +168,10 @@ def test_statements_that_are_left_over_wait_for_the_next_time_if_the_program_say
 
 
 def test_only_the_main_program_waits_for_statements_and_only_once():
-    robot = waiting()
-    add(robot, "interpreter_mode()")
+    robot = waiting("def again():", "interpreter_mode()", "end")
+    refused = add(robot, "interpreter_mode()")
+    assert (refused.code, "in a statement" in refused.why) == ("script_error", True)
+    add(robot, "again()")
     assert "in a statement" in failure(robot).why
     robot = a_robot()
     start(robot, "thread t():", "interpreter_mode()", "end", "join run t()")

@@ -433,7 +433,7 @@ class Added:
     def interpret(self):
         while True:
             while self.waiting:
-                yield from self.machine.add(self.waiting.pop(0))
+                yield from self.machine.add(self.waiting.pop(0), "the statement")
             yield
 
     def add(self, text):
@@ -458,7 +458,7 @@ def test_statements_that_are_added_use_the_program_and_what_was_added_before():
     assert added.add("def sum(x):\n return 0\nend\nsay(sum(b))")[-1] == "0"
 
 
-def test_what_was_forgotten_is_unknown_to_later_statements_and_variables_keep_their_values():
+def test_what_was_forgotten_is_unknown_to_later_statements():
     added = Added(PROGRAM)
     first = added.last
     added.add("def sum(x):\n return x[0]\nend\na = [3]")
@@ -473,6 +473,47 @@ def test_what_was_forgotten_is_unknown_to_later_statements_and_variables_keep_th
     with pytest.raises(ScriptError, match="name_not_found:sum"):
         added.add("say(sum(a))")
     assert added.add("say(a)\nsay(twice(2))") == ["[3]", "4"]
+
+
+def test_forgetting_ends_threads_and_variables_of_statements_and_not_those_of_the_program():
+    beside = " def count():\n  while True:\n   b = b + 1\n   sync()\n  end\n end\n"
+    added = Added(f"def main():\n b = 0\n{beside} thread t():\n  count()\n end\n run t()\n interpret()\nend")
+    added.add("thread u():\n say(1)\n run t()\n while True:\n  sync()\n end\nend\nc = 7\nrun u()\nrun t()")
+    assert len(added.machine.living) == 5
+    added.machine.forget(added.last.scopes)
+    assert added.machine.living == [0, 1]
+    with pytest.raises(ScriptError, match="the variable c has no value yet"):
+        added.add("say(c)")
+
+
+def test_many_short_statements_one_after_the_other_are_no_endless_loop():
+    added = Added(PROGRAM)
+    for number in range(200):
+        text = f"i = 0\nwhile i < 200:\n i = i + 1\nend\nsay({number})"
+        added.last = compile_script(text, added.signatures, added.last)
+        added.waiting.append(added.last)
+    while len(added.said) < 200:
+        assert added.machine.resume() >= 0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'a = 1 b = 2 say(b) say([a, b])',
+        'def f(): c = "h" say(c) end f()',
+        "if True: say(1) say(2) end",
+        "thread t(): i = 3 while i > 0: i = i - 1 sync() end end run t() say(1)",
+        "x = (1 + 2) y = -x say(y) pass z = True say(z)",
+    ],
+)
+def test_one_line_has_several_statements(text):
+    assert Added(PROGRAM).add(text)
+
+
+@pytest.mark.parametrize("text", ["a = 1 2", 'say "h"', "if True b = 1 end", "say(1 b)", "a = [1 b]", "a = b = 1"])
+def test_not_every_line_is_several_statements(text):
+    with pytest.raises(ScriptError, match="syntax_error"):
+        Added(PROGRAM).add(text)
 
 
 @pytest.mark.parametrize(

@@ -42,9 +42,8 @@ class Script:
     scopes: int
 
     def forgetting(self, last: "Script") -> "Script":
-        """Return the program for later statements, which know the variables added up to the last one, not functions."""
-        scope = replace(self.scope, globals=set(last.scope.globals))
-        return replace(self, scope=scope, scopes=last.scopes)
+        """Return the program for later statements, which know nothing of what was added up to the last one."""
+        return replace(self, scopes=last.scopes)
 
 
 def compile_script(text: str, signatures: Signatures, after: Script | None = None) -> Script:
@@ -129,15 +128,15 @@ def _program(text: str) -> tree.Function:
 
 def _statements(text: str) -> tree.Function:
     """Statements and functions that are added to a program."""
-    statements = _parsed(text)
+    statements = _parsed(text, several=True)
     for statement in statements:
         if isinstance(statement, tree.Function) and statement.kind == "sec":
             raise ScriptError(statement.line, statement.column, "only a whole program can be a sec")
     return _together(text, statements)
 
 
-def _parsed(text: str) -> list[tree.Statement]:
-    statements = parse(text)
+def _parsed(text: str, *, several: bool = False) -> list[tree.Statement]:
+    statements = parse(text, several=several)
     if not statements:
         raise ScriptError(1, 1, syntax_error(1, "the text has no statement"))
     return statements

@@ -218,27 +218,43 @@ class Machine:
 
     # Statements that are added to the program.
 
-    def add(self, script: Script) -> Steps:
-        """Add statements to the program, and return what runs them.
+    def add(self, script: Script, title: str) -> Steps:
+        """Add statements to the program and run them in its main thread, which calls this.
 
         Args:
             script: Statements that were compiled after the program and what has been added to it so far.
+            title: What they are called in errors.
 
         Raises:
+            ScriptError: They have failed.
             ValueError: They call a function that is not given.
         """
         self._include(script)
-        return self._names[script.main](1)  # type: ignore[no-any-return]  # a generator function of compiled code
+        self._main.added = True
+        try:
+            yield from self._names[script.main](1)
+        except (Halted, Killed):
+            raise
+        except Exception as error:
+            wrong = failure(error)
+            raise ScriptError(wrong.line, wrong.column, f"{wrong.text} (in {title})") from error
+        finally:
+            self._main.added = False
+        self._main.spent = 0  # many short statements are no endless loop
 
     def forget(self, before: int) -> None:
-        """Forget functions that were added; variables keep their values.
+        """Forget what was added: threads end, functions and variables that the program does not have are unknown.
 
         Args:
             before: Number of the first scope that is kept.
         """
+        for thread in [one for one in self._threads if one.added and one is not self._main]:
+            self._threads.remove(thread)
+            self._close(thread)
         for name in self._names.keys() - self._own:
             found = _ADDED.match(name)
-            if found is not None and int(found[1]) < before:
+            of_variable = name.startswith("g_") and name[2:] not in self.script.scope.globals
+            if of_variable or (found is not None and int(found[1]) < before):
                 del self._names[name]
 
     # What compiled code calls.
@@ -247,7 +263,9 @@ class Machine:
         if len(self._threads) >= MOST_THREADS:
             raise Fault(f"a program has at most {MOST_THREADS} threads")
         self._started += 1
-        thread = Thread(self._started, self._body(function), self._running)
+        thread = Thread(
+            self._started, self._body(function), self._running, added=self._running.added
+        )
         self._threads.append(thread)
         self._turns.append(thread)
         return self._started

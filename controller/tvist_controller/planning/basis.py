@@ -74,7 +74,7 @@ class StatementBasis(NamedTuple):
     """The state that a statement for a running program depends on."""
 
     after: Script | None
-    """The program, or the last statement that was added to it; None if no program waits for statements."""
+    """The program, or the last statement that was added to it; None if no program takes statements."""
 
 
 class PlanBasis(NamedTuple):

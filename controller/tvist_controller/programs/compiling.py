@@ -1,6 +1,7 @@
 """Programs of one robot, compiled from their text."""
 
 from tvist_controller.programs.built_in import built_in
+from tvist_controller.programs.interpreter import WAITS
 from tvist_controller.programs.library import MOVING, SIGNATURES
 from tvist_controller.refusal import RefusalError
 from tvist_plant.description import RobotDescription
@@ -48,15 +49,18 @@ class ScriptCompiler:
 
         Args:
             text: Its text.
-            after: The program, or what was added to it last; None if no program waits for statements.
+            after: The program, or what was added to it last; None if no program takes statements.
 
         Raises:
-            RefusalError: The text is not valid, or no program waits.
+            RefusalError: The text is not valid, or no program takes statements.
         """
         if after is None:
-            why = "no program waits for statements: it has to call interpreter_mode()"
+            why = f"no program is running that waits for statements: it has to call {WAITS}()"
             raise RefusalError("wrong_mode", "", why)
-        return _compiled(text, after)
+        script = _compiled(text, after)
+        if WAITS in script.used:
+            raise _refusal(1, 1, f"{WAITS} cannot be called in a statement: only the program can wait for statements")
+        return script
 
 
 def _compiled(text: str, after: Script | None = None) -> Script:

@@ -62,7 +62,7 @@ class ProgramPlayer:
         self.arm = ProgramArm(access, self._thread)
         self._popups = Popups(access.emit, self._machine)
         self._watchdogs = Watchdogs(access.peripherals)
-        self.statements = StatementQueue(self._machine, self.arm, access.peripherals)
+        self.statements = StatementQueue(self._machine, self.arm, access.peripherals, access.emit)
         self._functions = functions(access, self.arm, self._popups, self._watchdogs, self.statements)
         self._built_in = frozenset(built_in(access.description))
         self._kept: dict[str, Script] = {}
@@ -327,6 +327,7 @@ class ProgramPlayer:
 
     def _start(self, script: Script) -> None:
         self._main, self.state, self.line = self._begin(script, self.name or script.name), "PLAYING", 1
+        self.statements.open(self._main.machine)
 
     def _begin(self, script: Script, name: str) -> _Running:
         machine = Machine(script, self._functions, finish=self.arm.finish)

@@ -38,5 +38,5 @@ class StatementFunctions:
         self._queue.end()
 
     def clear_interpreter(self) -> None:
-        """Forget all statements so far and the functions that they have defined; variables keep their values."""
+        """Forget all statements so far: the variables and functions that they have defined, and the threads they started."""
         self._queue.clear()
