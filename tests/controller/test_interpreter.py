@@ -2,8 +2,18 @@
 
 import pytest
 
-from tvist_protocol.programs import Interpreter, ProgramInterpret, ProgramSkip, ProgramStop
+from tvist_protocol.commands import UnlockProtectiveStop
+from tvist_protocol.programs import (
+    MAX_SCRIPT,
+    Interpreter,
+    ProgramInterpret,
+    ProgramPause,
+    ProgramPlay,
+    ProgramSkip,
+    ProgramStop,
+)
 from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.simulation import SimulationInject
 
 from .scripts import URSIM, a_robot, failure, finish, playing, said, start
 
@@ -177,6 +187,172 @@ def test_only_the_main_program_waits_for_statements_and_only_once():
     start(robot, "thread t():", "interpreter_mode()", "end", "join run t()")
     robot.tick(3)
     assert "in a thread" in failure(robot).why
+
+
+def test_statements_that_come_before_the_program_waits_are_kept_if_it_says_so():
+    robot = a_robot()
+    start(robot, "sleep(0.1)", "interpreter_mode(clearQueueOnEnter=False)")
+    assert add(robot, 'textmsg("kept")') == Accepted(id=1)
+    assert said(robot) == []
+    robot.tick(60)
+    assert said(robot) == ["kept"]
+
+
+def test_statements_that_come_before_the_program_waits_are_dropped_with_a_warning():
+    robot = a_robot()
+    start(robot, "sleep(0.1)", "interpreter_mode()")
+    add(robot, 'textmsg("early")')
+    add(robot, 'textmsg("early")')
+    robot.tick(60)
+    add(robot, 'textmsg("late")')
+    assert said(robot) == ["late"]
+    (warning,) = [event.why for event in robot.events if event.kind == "warning"]
+    assert "statements 1 to 2" in warning
+
+
+def test_a_program_that_never_waits_takes_no_statements():
+    robot = a_robot()
+    start(robot, "sleep(1)")
+    robot.tick(2)
+    assert add(robot, "a = 1").code == "wrong_mode"
+    assert state(robot) is None
+
+
+def test_threads_of_statements_end_when_they_are_forgotten():
+    robot = waiting("global n = 0")
+    add(robot, "thread t(): while True: n = n + 1 sync() end end")
+    add(robot, "run t()", 20)
+    add(robot, "clear_interpreter()")
+    add(robot, "textmsg(n)")
+    robot.tick(20)
+    add(robot, "textmsg(n)")
+    first, second = said(robot)
+    assert first == second != "0"
+    assert playing(robot)
+
+
+def test_end_interpreter_leaves_statements_that_wait_and_they_do_not_run_later():
+    robot = waiting(after=["sleep(0.1)", "interpreter_mode()", 'textmsg("over")'])
+    for text in ("sleep(0.02)", "end_interpreter()", 'textmsg("behind")', 'textmsg("behind")'):
+        robot.send(ProgramInterpret, text=text)
+    robot.tick(100)
+    assert state(robot) == Interpreter(interpreted=4, executed=2, cleared=2, waiting=0)
+    add(robot, "end_interpreter()")
+    assert said(robot) == ["over"]
+
+
+def test_a_thread_of_the_program_ends_the_interpreter_mode():
+    robot = a_robot()
+    start(robot, "thread t():", "sleep(0.1)", "end_interpreter()", "end", "run t()", "interpreter_mode()", "textmsg(7)")
+    finish(robot)
+    assert said(robot) == ["7"]
+
+
+def test_only_a_program_that_waits_can_forget_statements():
+    robot = a_robot()
+    start(robot, "clear_interpreter()", "interpreter_mode()")
+    robot.tick(2)
+    assert "can only be called while" in failure(robot).why
+
+
+def test_a_program_is_paused_and_played_with_its_statements():
+    robot = waiting()
+    add(robot, f"movej({NEAR}, a=2, v=1)", 100)
+    assert robot.send(ProgramPause) == Done()
+    robot.tick(500)
+    assert add(robot, 'textmsg("there")') == Accepted(id=2)
+    robot.tick(200)
+    assert said(robot) == []
+    assert robot.send(ProgramPlay) == Done()
+    robot.until_rest()
+    robot.tick(3)
+    assert said(robot) == ["there"]
+    assert robot.states[-1].reference_q == pytest.approx(NEAR)
+
+
+def test_after_a_protective_stop_the_statement_is_resumed_and_later_ones_follow():
+    robot = waiting()
+    add(robot, f"movej({NEAR}, a=2, v=1)", 100)
+    robot.send(SimulationInject, fault="protective_stop")
+    robot.until_rest()
+    assert add(robot, 'textmsg("there")') == Accepted(id=2)
+    assert robot.controller.programs.state == "PAUSED"
+    assert said(robot) == []
+    robot.tick(3000)
+    assert robot.send(UnlockProtectiveStop) == Done()
+    assert robot.send(ProgramPlay) == Done()
+    robot.until_rest()
+    robot.tick(5)
+    assert said(robot) == ["there"]
+    assert robot.states[-1].reference_q == pytest.approx(NEAR)
+    assert add(robot, "end_interpreter()") == Accepted(id=3)
+    finish(robot)
+
+
+def test_a_move_is_skipped_before_it_has_begun():
+    """A line is planned for some ticks after it was called."""
+    robot = waiting()
+    before = robot.states[-1].reference_q
+    add(robot, f"movel({NEAR}, a=1, v=0.3)", 2)
+    assert robot.send(ProgramSkip, what="move") == Done()
+    add(robot, 'textmsg("on")')
+    robot.tick(100)
+    assert said(robot) == ["on"]
+    assert robot.states[-1].reference_q == before
+    add(robot, f"movel({NEAR}, a=1, v=0.3)", 20)
+    robot.until_rest()
+    assert robot.states[-1].reference_q == pytest.approx(NEAR)
+
+
+def test_a_move_that_waits_for_one_to_blend_into_is_skipped_with_it():
+    robot = waiting()
+    for share, radius in ((0.1, 0.02), (0.2, 0.0)):
+        near = [angle + share for angle in URSIM]
+        robot.send(ProgramInterpret, text=f"movel({near}, a=1, v=0.3, r={radius})")
+    add(robot, 'textmsg("on")', 150)
+    assert said(robot) == []
+    assert robot.send(ProgramSkip, what="move") == Done()
+    robot.until_rest()
+    robot.tick(3)
+    assert said(robot) == ["on"]
+    assert playing(robot)
+
+
+def test_nothing_is_skipped_where_nothing_moves():
+    robot = a_robot()
+    assert robot.send(ProgramSkip, what="move") == Done()
+    robot = waiting()
+    assert robot.send(ProgramSkip, what="move") == Done()
+    add(robot, f"servoj({NEAR}, t=0.5, lookahead_time=0.2)", 20)
+    assert robot.send(ProgramSkip, what="move") == Done()
+    assert playing(robot)
+    add(robot, "textmsg(1)", 300)
+    assert said(robot) == ["1"]
+
+
+def test_a_paused_move_is_skipped():
+    robot = waiting()
+    add(robot, f"movej({NEAR}, a=1, v=0.5)", 100)
+    add(robot, "textmsg(1)")
+    robot.send(ProgramPause)
+    robot.tick(500)
+    assert robot.send(ProgramSkip, what="move") == Done()
+    robot.tick(5)
+    assert robot.send(ProgramPlay) == Done()
+    robot.tick(5)
+    assert said(robot) == ["1"]
+    assert robot.states[-1].reference_q != pytest.approx(NEAR)
+
+
+def test_long_statements_are_limited_together():
+    robot = waiting()
+    text = "# " + "x" * (MAX_SCRIPT // 2 - 50) + "\na = 1"
+    replies = [robot.send(ProgramInterpret, text=text) for _ in range(3)]
+    assert [getattr(reply, "code", None) for reply in replies] == [None, None, "busy"]
+    assert robot.send(ProgramInterpret, text=text + "\nclear_interpreter()") == Accepted(id=3)
+    assert robot.send(ProgramInterpret, text=text) == Accepted(id=4)
+    robot.tick(5)
+    assert state(robot).cleared == 3
 
 
 def test_the_end_of_the_program_ends_the_statements():

@@ -21,7 +21,7 @@ class ScriptCompiler:
 
     def rehearse(self) -> None:
         """Build what compiling uses, before any program comes."""
-        compile_script("sync()", SIGNATURES)
+        compile_script("sync()", SIGNATURES, compile_script("sync()", SIGNATURES))
 
     def compile(self, command: ProgramLoad | ProgramRun) -> Script | None:
         """Return the program of a command; None if it names a program without giving its text that is not built in.
