@@ -60,7 +60,7 @@ class Io(Struct, frozen=True, kw_only=True, tag_field="type", tag="io"):
     program_line: int = 0
     """Line that is being carried out, or will be when the program continues, counted from 1; 0 if there is none."""
     interpreter: Interpreter | None = None
-    """Statements that clients have added to the program; null if it has not waited for any."""
+    """Statements that clients have added to the program; null before the first program that takes some."""
     watched: list[str] = []
     """RTDE's names of the input registers that the program watches: it counts how often they are written, even with the
     same value."""

@@ -42,15 +42,16 @@ class ProgramRun(ClientMessage, frozen=True, kw_only=True, tag="program.run"):
 
 
 class ProgramInterpret(ClientMessage, frozen=True, kw_only=True, tag="program.interpret"):
-    """Add a statement to the program, which has to wait for statements in `interpreter_mode`.
+    """Add a statement to the running program, which has to call `interpreter_mode` somewhere.
 
-    The reply has its number; the program carries out statements in their order.
+    The reply has its number. The program carries out statements in their order while it waits in that function. Several
+    statements may follow each other on a line.
     """
 
     token: Token
     """Token of the lease."""
     text: Script
-    """Text of the statement, or of a function for later ones; it can use all that the program knows."""
+    """Text of the statement, or of a function for later ones; it can use what the program and its statements define."""
 
 
 class ProgramSkip(ClientMessage, frozen=True, kw_only=True, tag="program.skip"):
@@ -70,7 +71,7 @@ class Interpreter(Struct, frozen=True, kw_only=True):
     executed: int = 0
     """Last statement that has begun."""
     cleared: int = 0
-    """Last statement that the program has forgotten, with the functions that it defined."""
+    """Last statement that the program has forgotten, with the variables and functions that it defined."""
     waiting: int = 0
     """Number of statements that have not begun."""
 

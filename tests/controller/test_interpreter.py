@@ -243,7 +243,16 @@ def test_end_interpreter_leaves_statements_that_wait_and_they_do_not_run_later()
 
 def test_a_thread_of_the_program_ends_the_interpreter_mode():
     robot = a_robot()
-    start(robot, "thread t():", "sleep(0.1)", "end_interpreter()", "end", "run t()", "interpreter_mode()", "textmsg(7)")
+    start(
+        robot,
+        "thread t():",
+        "sleep(0.1)",
+        "end_interpreter()",
+        "end",
+        "run t()",
+        "interpreter_mode()",
+        "textmsg(7)",
+    )
     finish(robot)
     assert said(robot) == ["7"]
 

@@ -499,7 +499,7 @@ def test_many_short_statements_one_after_the_other_are_no_endless_loop():
 @pytest.mark.parametrize(
     "text",
     [
-        'a = 1 b = 2 say(b) say([a, b])',
+        "a = 1 b = 2 say(b) say([a, b])",
         'def f(): c = "h" say(c) end f()',
         "if True: say(1) say(2) end",
         "thread t(): i = 3 while i > 0: i = i - 1 sync() end end run t() say(1)",
@@ -510,7 +510,9 @@ def test_one_line_has_several_statements(text):
     assert Added(PROGRAM).add(text)
 
 
-@pytest.mark.parametrize("text", ["a = 1 2", 'say "h"', "if True b = 1 end", "say(1 b)", "a = [1 b]", "a = b = 1"])
+@pytest.mark.parametrize(
+    "text", ["a = 1 2", 'say "h"', "if True b = 1 end", "say(1 b)", "a = [1 b]", "a = b = 1"]
+)
 def test_not_every_line_is_several_statements(text):
     with pytest.raises(ScriptError, match="syntax_error"):
         Added(PROGRAM).add(text)

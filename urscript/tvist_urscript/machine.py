@@ -1,20 +1,17 @@
 """Runs a compiled script, a tick at a time."""
 
-import re
 from collections.abc import Callable, Generator, Mapping
 from contextlib import suppress
-from types import FunctionType
 from typing import Any
 
 from tvist_urscript.compiler import Script
 from tvist_urscript.errors import Fault, ScriptError
 from tvist_urscript.failures import TooDeep, failure, line_of, position_of
 from tvist_urscript.functions import DEEPEST_CALLS
-from tvist_urscript.library import PURE
-from tvist_urscript.operators import operators
+from tvist_urscript.namespace import Namespace
 from tvist_urscript.pieces import HERE, MISSING, SPENT
 from tvist_urscript.threads import MOST_THREADS, Thread
-from tvist_urscript.values import Array, Value
+from tvist_urscript.values import Value
 
 EVALUATIONS = 500
 """Evaluations of all threads in a tick."""
@@ -23,8 +20,6 @@ PATIENCE = 50
 OVERDRAFT = 5000
 """Evaluations by which one statement may exceed the budget."""
 
-_ADDED = re.compile(r"[fc](\d+)_")
-"""Names of functions and constants in compiled code, with the number of their scope."""
 _SPENT = object()
 _MISSING = object()
 Steps = Generator[Any, None, Any]
@@ -69,10 +64,7 @@ class Machine:
         self._started = 0
         self._holder: Thread | None = None
         self._line = 1
-        self._functions = functions
-        self._names = self._surroundings()
-        self._include(script)
-        self._own = frozenset(self._names)
+        self._names = Namespace(script, functions, self.charge, self._called())
         self._main = Thread(0, self._body(self._names[script.main]), None)
         self._running = self._main
         self._threads: list[Thread] = [self._main]
@@ -229,7 +221,7 @@ class Machine:
             ScriptError: They have failed.
             ValueError: They call a function that is not given.
         """
-        self._include(script)
+        self._names.include(script)
         self._main.added = True
         try:
             yield from self._names[script.main](1)
@@ -251,11 +243,7 @@ class Machine:
         for thread in [one for one in self._threads if one.added and one is not self._main]:
             self._threads.remove(thread)
             self._close(thread)
-        for name in self._names.keys() - self._own:
-            found = _ADDED.match(name)
-            of_variable = name.startswith("g_") and name[2:] not in self.script.scope.globals
-            if of_variable or (found is not None and int(found[1]) < before):
-                del self._names[name]
+        self._names.forget(before, self.script.scope.globals)
 
     # What compiled code calls.
 
@@ -263,9 +251,7 @@ class Machine:
         if len(self._threads) >= MOST_THREADS:
             raise Fault(f"a program has at most {MOST_THREADS} threads")
         self._started += 1
-        thread = Thread(
-            self._started, self._body(function), self._running, added=self._running.added
-        )
+        thread = Thread(self._started, self._body(function), self._running, added=self._running.added)
         self._threads.append(thread)
         self._turns.append(thread)
         return self._started
@@ -313,13 +299,11 @@ class Machine:
         if not thread.critical and self._holder is thread:
             self._holder = None
 
-    def _surroundings(self) -> dict[str, Any]:
+    def _called(self) -> dict[str, Any]:
         return {
-            "__builtins__": {},
             HERE: self,
             SPENT: _SPENT,
             MISSING: _MISSING,
-            **operators(self.charge),
             "run": self._run,
             "kill": self._kill,
             "join": self._join,
@@ -328,32 +312,6 @@ class Machine:
             "halt": _halt,
             "too_deep": _too_deep,
         }
-
-    def _include(self, script: Script) -> None:
-        """Make the functions of a script, and what they use, known to compiled code."""
-        self._names |= script.constants
-        for name in script.used:
-            self._names[f"b_{name}"] = self._built_in(name)
-        for code in script.functions:
-            self._names[code.co_name] = FunctionType(code, self._names)
-
-    def _built_in(self, name: str) -> Callable[..., Any]:
-        if name in self._functions:
-            return self._functions[name]
-        if name not in PURE:
-            raise ValueError(f"the script calls {name}, which is not given")
-        signature, function = PURE[name]
-        if not signature.linear:
-            return function
-
-        def charged(*arguments: Any) -> Any:
-            self.charge(sum(argument.size for argument in arguments if isinstance(argument, Array)))
-            result = function(*arguments)
-            if isinstance(result, Array):
-                self.charge(result.size)
-            return result
-
-        return charged
 
 
 def _nothing() -> Steps:

@@ -59,7 +59,9 @@ class ScriptCompiler:
             raise RefusalError("wrong_mode", "", why)
         script = _compiled(text, after)
         if WAITS in script.used:
-            raise _refusal(1, 1, f"{WAITS} cannot be called in a statement: only the program can wait for statements")
+            raise _refusal(
+                1, 1, f"{WAITS} cannot be called in a statement: only the program can wait for statements"
+            )
         return script
 
 

@@ -186,7 +186,7 @@ class StatementQueue:
         added = self._interpreted - self._forgotten >= MOST or self._added + length > MAX_SCRIPT
         held = len(self._lengths) >= HELD * MOST or self._held + length > HELD * MAX_SCRIPT
         if held or (added and not clears):
-            why = f"the program has taken {MOST} statements or {MAX_SCRIPT} characters: it must forget them, by {CLEAR}()"
+            why = f"the program has taken {MOST} statements or {MAX_SCRIPT} characters: clear them with {CLEAR}()"
             raise RefusalError("busy", "text", why, MOST)
 
     def _skip(self, call: Call[ProgramSkip]) -> None:

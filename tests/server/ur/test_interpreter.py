@@ -69,9 +69,13 @@ def test_a_line_that_is_too_long_is_discarded_and_not_passed_on(client, control)
 
 def test_a_statement_that_is_refused_is_discarded_with_the_reason(client, control):
     control.refuse("script_error", why="compile_error_name_not_found:f:", where="text:1:3")
-    assert client.say("a=f()\n") == ["discard: Compile error: column 3, compile_error_name_not_found:f:: a=f()"]
+    assert client.say("a=f()\n") == [
+        "discard: Compile error: column 3, compile_error_name_not_found:f:: a=f()"
+    ]
     control.refuse("script_error", why="syntax_error_on_line:1:unexpected ')':", where="text:1:3")
-    assert client.say("f))\n") == ["discard: Syntax error: column 3, syntax_error_on_line:1:unexpected ')':: f))"]
+    assert client.say("f))\n") == [
+        "discard: Syntax error: column 3, syntax_error_on_line:1:unexpected ')':: f))"
+    ]
     control.refuse("wrong_mode", why="no program waits")
     assert client.say("f()\n") == ["discard: Program is in an invalid state: no program waits: f()"]
     control.refuse("busy", why="it is full", where="text")
@@ -139,7 +143,7 @@ def test_no_bytes_break_it(data, cut):
 async def waiting(desk, program="interpreter_mode()\n"):
     """Have a program wait for statements; what speaks to it."""
     await desk.tick()
-    reader, script = await connect(desk, "secondary")
+    _, script = await connect(desk, "secondary")
     script.write(program.encode())
     await until(lambda: desk.controller.programs.state == "PLAYING")
     await desk.tick(2)
@@ -201,7 +205,9 @@ async def test_lines_may_arrive_in_pieces_or_all_at_once(desk):
     assert await lines(reader, writer, "executed") == ["state: 1: stateunexecuted"]
     writer.write(b"".join(b"write_output_integer_register(3, %d)\n" % number for number in range(200)))
     answers = [await asyncio.wait_for(reader.readline(), PATIENCE) for _ in range(200)]
-    assert [answer.split(b":")[1].strip() for answer in answers] == [b"%d" % number for number in range(2, 202)]
+    assert [answer.split(b":")[1].strip() for answer in answers] == [
+        b"%d" % number for number in range(2, 202)
+    ]
     await desk.tick(10)
     assert desk.interfaces.robot.latest.output_int_register_3 == 199
 
@@ -221,7 +227,10 @@ async def test_what_has_arrived_is_carried_out_though_its_client_leaves(desk):
 async def test_two_clients_of_a_host_add_to_one_program_and_see_each_others_statements(desk):
     first = await waiting(desk)
     second = await connect(desk, "interpreter")
-    assert await lines(*first, "a = 1", "def f(): return 2 end") == ["ack: 1: a = 1", "ack: 2: def f(): return 2 end"]
+    assert await lines(*first, "a = 1", "def f(): return 2 end") == [
+        "ack: 1: a = 1",
+        "ack: 2: def f(): return 2 end",
+    ]
     assert await lines(*second, "stateunexecuted", "write_output_integer_register(3, a + f())") == [
         "state: 2: stateunexecuted",
         "ack: 3: write_output_integer_register(3, a + f())",
@@ -251,7 +260,10 @@ async def test_an_error_of_a_statement_is_told_with_its_number(desk):
     reader, writer = await waiting(desk)
     listener, _ = await connect(desk, "primary")
     await desk.tick()
-    assert await lines(reader, writer, "a = 1", "a = [1] b = a[4]") == ["ack: 1: a = 1", "ack: 2: a = [1] b = a[4]"]
+    assert await lines(reader, writer, "a = 1", "a = [1] b = a[4]") == [
+        "ack: 1: a = 1",
+        "ack: 2: a = [1] b = a[4]",
+    ]
     await desk.tick(3)
     assert desk.controller.programs.state == "STOPPED"
     seen = b""

@@ -26,7 +26,7 @@ class StatementFunctions:
     def interpreter_mode(self, clearQueueOnEnter: object, clearOnEnd: object) -> Turns:
         """Carry out the statements that clients send to port 30020, until one of them calls `end_interpreter`.
 
-        They see the program's functions and its global variables, and may define functions.
+        They see the program's functions and its variables, and may define both.
         """
         clear_queue = flag("clearQueueOnEnter", clearQueueOnEnter)
         clear_at_end = flag("clearOnEnd", clearOnEnd)
@@ -38,5 +38,5 @@ class StatementFunctions:
         self._queue.end()
 
     def clear_interpreter(self) -> None:
-        """Forget all statements so far: the variables and functions that they have defined, and the threads they started."""
+        """Forget all statements so far, with the variables and functions that they define, and end their threads."""
         self._queue.clear()
