@@ -23,12 +23,14 @@ from tvist_protocol.commands import Command, ReleaseClock, SetEstimator, Setpoin
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.explain import EXPLAINED_BYTES
 from tvist_protocol.motions import MovePath
-from tvist_protocol.programs import ProgramLoad, ProgramRun
+from tvist_protocol.programs import ProgramInterpret, ProgramLoad, ProgramRun
 from tvist_protocol.replies import Refused
 from tvist_protocol.simulation import SimulationStep
 
 STEP = tag(SimulationStep)
-LONG = frozenset((tag(SetEstimator), tag(MovePath), tag(ProgramLoad), tag(ProgramRun), STEP))
+LONG = frozenset(
+    (tag(SetEstimator), tag(MovePath), tag(ProgramLoad), tag(ProgramRun), tag(ProgramInterpret), STEP)
+)
 """Types of commands that may be longer than `EXPLAINED_BYTES`."""
 
 

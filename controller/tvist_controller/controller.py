@@ -142,7 +142,8 @@ class Controller:
     def basis(self) -> PlanBasis:
         """The present state that plans for commands depend on."""
         on = self.filters.basis
-        return PlanBasis(on, self.motion.basis(on), ToolBasis(self.motion.tcp, self.cycle.reference))
+        tool = ToolBasis(self.motion.tcp, self.cycle.reference)
+        return PlanBasis(on, self.motion.basis(on), tool, self.programs.statements.basis)
 
     def receive(
         self,

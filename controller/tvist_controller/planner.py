@@ -1,6 +1,13 @@
 """Planner of all commands that take longer than a tick can wait."""
 
-from tvist_controller.planning.basis import FilterBasis, MotionBasis, PlanBasis, ScriptBasis, ToolBasis
+from tvist_controller.planning.basis import (
+    FilterBasis,
+    MotionBasis,
+    PlanBasis,
+    ScriptBasis,
+    StatementBasis,
+    ToolBasis,
+)
 from tvist_controller.planning.filter_planner import FilterPlanner, PlannedFilter
 from tvist_controller.planning.move_planner import MovePlanner
 from tvist_controller.planning.path_planner import PathPlanner
@@ -12,7 +19,7 @@ from tvist_controller.setup import Setup
 from tvist_protocol import commands as c
 from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
 from tvist_protocol.motions import MoveC, MoveL, MovePath
-from tvist_protocol.programs import ProgramLoad, ProgramRun
+from tvist_protocol.programs import ProgramInterpret, ProgramLoad, ProgramRun
 from tvist_protocol.simulation import SimulationReset
 from tvist_shaping.base import Filter
 
@@ -45,6 +52,8 @@ class Planner:
             on = basis.motion
         elif isinstance(command, QUESTIONS):
             on = basis.tool
+        elif isinstance(command, ProgramInterpret):
+            on = basis.statement
         elif isinstance(command, SCRIPTS):
             on = ScriptBasis()
         try:
@@ -66,6 +75,8 @@ class Planner:
                 found = self._reachable.pose(command, on)
             case ScriptBasis() if isinstance(command, ProgramLoad | ProgramRun):
                 found = self._scripts.compile(command)
+            case StatementBasis() if isinstance(command, ProgramInterpret):
+                found = self._scripts.compile_statement(command.text, on.after)
             case FilterBasis():
                 found = self._filter(command, on)
         return found

@@ -13,10 +13,12 @@ from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
 from tvist_protocol.motions import MoveC, MoveL, MovePath, ServoJ, SpeedJ, SpeedL, StopJ, StopL
 from tvist_protocol.programs import (
     ProgramClosePopup,
+    ProgramInterpret,
     ProgramLoad,
     ProgramPause,
     ProgramPlay,
     ProgramRun,
+    ProgramSkip,
     ProgramStop,
 )
 from tvist_protocol.simulation import SimulationInject, SimulationReset, SimulationStep
@@ -287,6 +289,8 @@ Command = (
     | ProgramPause
     | ProgramStop
     | ProgramClosePopup
+    | ProgramInterpret
+    | ProgramSkip
     | PowerOn
     | PowerOff
     | UnlockProtectiveStop

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from msgspec import Meta
+from msgspec import Meta, Struct
 
 from tvist_protocol.client_message import ClientMessage
 from tvist_protocol.values import PROGRAM_NAME_PATTERN, Token
@@ -39,6 +39,41 @@ class ProgramRun(ClientMessage, frozen=True, kw_only=True, tag="program.run"):
     """Token of the lease."""
     text: Script
     """Text of the program, which names it."""
+
+
+class ProgramInterpret(ClientMessage, frozen=True, kw_only=True, tag="program.interpret"):
+    """Add a statement to the running program, which has to call `interpreter_mode` somewhere.
+
+    The reply has its number. The program carries out statements in their order while it waits in that function. Several
+    statements may follow each other on a line.
+    """
+
+    token: Token
+    """Token of the lease."""
+    text: Script
+    """Text of the statement, or of a function for later ones; it can use what the program and its statements define."""
+
+
+class ProgramSkip(ClientMessage, frozen=True, kw_only=True, tag="program.skip"):
+    """Skip something in a program that waits for statements."""
+
+    token: Token
+    """Token of the lease."""
+    what: Literal["statements", "move"]
+    """All statements that have not begun, or the rest of the planned motion that the program makes now."""
+
+
+class Interpreter(Struct, frozen=True, kw_only=True):
+    """Statements that clients have added to a program, by their numbers, which begin with 1."""
+
+    interpreted: int = 0
+    """Last statement that was accepted."""
+    executed: int = 0
+    """Last statement that has begun."""
+    cleared: int = 0
+    """Last statement that the program has forgotten, with the variables and functions that it defined."""
+    waiting: int = 0
+    """Number of statements that have not begun."""
 
 
 class ProgramClosePopup(ClientMessage, frozen=True, kw_only=True, tag="program.close_popup"):

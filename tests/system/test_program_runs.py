@@ -9,6 +9,8 @@ from tvist_client.robot import Robot
 from tvist_lab.collect import collect
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_lab.mcap_file import read
+from tvist_protocol.errors import RefusedError
+from tvist_protocol.programs import ProgramInterpret, ProgramSkip
 
 from .test_determinism import assert_equal
 from .test_live_replay import tvist
@@ -72,6 +74,24 @@ ALONE = f"""def alone():
 end
 """
 """Waits for nothing from outside."""
+WAITING = """def waiting():
+  global n = 0
+  interpreter_mode(clearQueueOnEnter=False)
+  write_output_integer_register(0, n)
+end
+"""
+STATEMENTS = (
+    "def turn(angle): movej([-1.60 + angle, -1.727, -2.203, -0.808, 1.595, -0.031], a=2, v=1) n = n + 1 end",
+    "turn(0)",
+    "turn(0.4) turn(-0.2)",
+    "movel(pose_add(get_target_tcp_pose(), p[0, 0.1, 0, 0, 0, 0]), a=0.8, v=0.3, r=0.03)",
+    "movel(pose_add(get_target_tcp_pose(), p[0, 0.1, 0.1, 0, 0, 0]), a=0.8, v=0.3)",
+    "thread count(): while True: n = n + 1 sync() end end run count()",
+    "speedj([0.2, 0, 0, 0, 0, 0], 1, 0.2) clear_interpreter()",
+    "movej([-1.60, -1.727, -2.203, -0.808, 1.595, -0.031], a=0.5 + 0.001 * n)",
+    "turn(0)",
+)
+"""The last one is not valid, as the function has been forgotten."""
 
 
 async def with_a_client(robot):
@@ -94,6 +114,31 @@ async def with_a_client(robot):
             await robot.advance(50)
             (stopped,) = (event for event in told.events if event.kind == "program_stopped")
             assert stopped.why is None
+            assert not [event for event in told.events if event.line is not None]
+    return told
+
+
+async def with_statements(robot):
+    """Add statements to a program while it moves, skip some, and let it end; what the robot told."""
+    with collect(robot) as told:
+        async with robot.control("programs") as arm:
+            await arm.run_program(WAITING)
+            for text in STATEMENTS[:-1]:
+                await robot.request(ProgramInterpret(token=arm.token, text=text))
+                await robot.advance(37)
+            with pytest.raises(RefusedError, match="turn"):
+                await robot.request(ProgramInterpret(token=arm.token, text=STATEMENTS[-1]))
+            await robot.advance(600)
+            await robot.request(ProgramSkip(token=arm.token, what="move"))
+            await robot.advance(2500)
+            await robot.request(ProgramInterpret(token=arm.token, text="sleep(9)"))
+            await robot.request(ProgramInterpret(token=arm.token, text="halt"))
+            await robot.request(ProgramSkip(token=arm.token, what="statements"))
+            await robot.request(ProgramInterpret(token=arm.token, text="end_interpreter()"))
+            while not any(event.kind == "program_stopped" for event in told.events):
+                await robot.advance(50)
+            kinds = [event.kind for event in told.events]
+            assert kinds.count("motion_started") == 6
             assert not [event for event in told.events if event.line is not None]
     return told
 
@@ -161,6 +206,15 @@ def test_the_live_run_did_all_that_may_differ(live):
 async def test_two_runs_with_a_client_in_lockstep_give_bit_equal_states():
     one, other = [await served(with_a_client, "--clock", "lockstep", "--truth") for _ in range(2)]
     assert_equal(one, other)
+
+
+async def test_a_run_with_statements_in_lockstep_is_the_same_again_and_in_its_replay(tmp_path):
+    path = tmp_path / "run.mcap"
+    one = await served(with_statements, "--clock", "lockstep", "--truth", "--record", str(path))
+    other = await served(with_statements, "--clock", "lockstep", "--truth")
+    assert_equal(one, other)
+    code, said, _ = tvist("replay", path)
+    assert (code, said["equal"], said["first_difference"]) == (0, True, None)
 
 
 @pytest.mark.realtime

@@ -409,3 +409,128 @@ def test_arguments_are_computed_in_the_order_of_the_text():
         )
         robot.ticks(5)
         assert robot.said == ["first", "second", "356" if call[0] == "f" else "30"]
+
+
+class Added:
+    """A program that runs statements as they are added to it."""
+
+    def __init__(self, text):
+        self.signatures = SIGNATURES | {"interpret": signature("", blocks=True)}
+        self.said, self.waiting = [], []
+        self.last = compile_script(text, self.signatures)
+        self.machine = Machine(
+            self.last,
+            {
+                "say": lambda value: self.said.append(to_str(value)),
+                "sync": self.sync,
+                "interpret": self.interpret,
+            },
+        )
+
+    def sync(self):
+        yield
+
+    def interpret(self):
+        while True:
+            while self.waiting:
+                yield from self.machine.add(self.waiting.pop(0), "the statement")
+            yield
+
+    def add(self, text):
+        """Compile statements after what was added before, and run a few ticks."""
+        self.last = compile_script(text, self.signatures, self.last)
+        self.waiting.append(self.last)
+        for _ in range(3):
+            self.machine.resume()
+        return self.said
+
+
+PROGRAM = "def main():\n a = [1, 2]\n def twice(x, y=2):\n  return x * y\n end\n interpret()\nend"
+
+
+def test_statements_that_are_added_use_the_program_and_what_was_added_before():
+    added = Added(PROGRAM)
+    assert added.add("say(a)") == ["[1, 2]"]
+    assert added.add("a[0] = twice(4)\nb = [7, 8]") == ["[1, 2]"]
+    assert added.add("def sum(x):\n c = [0]\n c[0] = x[0] + x[1]\n return c[0]\nend")
+    assert added.add("if True:\n sync()\n say(sum(a))\nend\nsay(sum(b))")[1:] == ["10", "15"]
+    assert added.add("thread t():\n say(7)\nend\njoin run t()")[3:] == ["7"]
+    assert added.add("def sum(x):\n return 0\nend\nsay(sum(b))")[-1] == "0"
+
+
+def test_what_was_forgotten_is_unknown_to_later_statements():
+    added = Added(PROGRAM)
+    first = added.last
+    added.add("def sum(x):\n return x[0]\nend\na = [3]")
+    added.add("def kept():\n return [5]\nend")
+    added.machine.forget(added.last.scope.number)
+    assert added.add("say(kept())") == ["[5]"]
+    with pytest.raises(ScriptError, match="the function sum has been forgotten"):
+        added.add("say(sum(a))")
+    added = Added(PROGRAM)
+    added.add("a = [3]")
+    added.last = first
+    with pytest.raises(ScriptError, match="name_not_found:sum"):
+        added.add("say(sum(a))")
+    assert added.add("say(a)\nsay(twice(2))") == ["[3]", "4"]
+
+
+def test_forgetting_ends_threads_and_variables_of_statements_and_not_those_of_the_program():
+    beside = " def count():\n  while True:\n   b = b + 1\n   sync()\n  end\n end\n"
+    added = Added(f"def main():\n b = 0\n{beside} thread t():\n  count()\n end\n run t()\n interpret()\nend")
+    added.add("thread u():\n say(1)\n run t()\n while True:\n  sync()\n end\nend\nc = 7\nrun u()\nrun t()")
+    assert len(added.machine.living) == 5
+    added.machine.forget(added.last.scopes)
+    assert added.machine.living == [0, 1]
+    with pytest.raises(ScriptError, match="the variable c has no value yet"):
+        added.add("say(c)")
+
+
+def test_many_short_statements_one_after_the_other_are_no_endless_loop():
+    added = Added(PROGRAM)
+    for number in range(200):
+        text = f"i = 0\nwhile i < 200:\n i = i + 1\nend\nsay({number})"
+        added.last = compile_script(text, added.signatures, added.last)
+        added.waiting.append(added.last)
+    while len(added.said) < 200:
+        assert added.machine.resume() >= 0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a = 1 b = 2 say(b) say([a, b])",
+        'def f(): c = "h" say(c) end f()',
+        "if True: say(1) say(2) end",
+        "thread t(): i = 3 while i > 0: i = i - 1 sync() end end run t() say(1)",
+        "x = (1 + 2) y = -x say(y) pass z = True say(z)",
+    ],
+)
+def test_one_line_has_several_statements(text):
+    assert Added(PROGRAM).add(text)
+
+
+@pytest.mark.parametrize(
+    "text", ["a = 1 2", 'say "h"', "if True b = 1 end", "say(1 b)", "a = [1 b]", "a = b = 1"]
+)
+def test_not_every_line_is_several_statements(text):
+    with pytest.raises(ScriptError, match="syntax_error"):
+        Added(PROGRAM).add(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "place"), [("say(nothing)", (1, 5)), ("x = (1", (1, 7)), ("sec f():\nend", (1, 5)), ("", (1, 1))]
+)
+def test_statements_that_are_not_valid_are_refused_at_their_own_place(text, place):
+    added = Added(PROGRAM)
+    with pytest.raises(ScriptError) as caught:
+        added.add(text)
+    assert (caught.value.line, caught.value.column) == place
+
+
+def test_an_error_of_an_added_statement_has_its_place_in_the_statement():
+    added = Added(PROGRAM)
+    with pytest.raises(ScriptError) as caught:
+        added.add("b = 1\nsay(a[9])")
+    assert (caught.value.line, caught.value.column) == (2, 7)
+    assert not added.machine.running

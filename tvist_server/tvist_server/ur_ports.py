@@ -6,7 +6,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 InterfaceName = Literal[
-    "dashboard", "primary", "secondary", "realtime", "rtde",
+    "dashboard", "primary", "secondary", "realtime", "rtde", "interpreter",
     "primary_read_only", "secondary_read_only", "realtime_read_only",
 ]  # fmt: skip
 """Name of one of UR's interfaces."""
@@ -21,6 +21,7 @@ class UrPorts(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     secondary: Port = 30002
     realtime: Port = 30003
     rtde: Port = 30004
+    interpreter: Port = 30020
     primary_read_only: Port = 30011
     secondary_read_only: Port = 30012
     realtime_read_only: Port = 30013

@@ -3,14 +3,14 @@
 import ast
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from types import CodeType, MappingProxyType
 
 from tvist_urscript import tree
 from tvist_urscript.errors import ScriptError, syntax_error
 from tvist_urscript.failures import FILE
 from tvist_urscript.functions import MOST_FUNCTIONS, Functions
-from tvist_urscript.names import scopes
+from tvist_urscript.names import Scope, outline, scopes
 from tvist_urscript.parsing import parse
 from tvist_urscript.signatures import Signatures
 
@@ -27,6 +27,8 @@ class Script:
         functions: The code of its functions.
         constants: Values that the code uses by name.
         used: The built-in functions that it calls.
+        scope: What names mean on its outermost level.
+        scopes: Number of its scopes, with those of the program that it is added to.
     """
 
     name: str
@@ -36,26 +38,36 @@ class Script:
     functions: tuple[CodeType, ...]
     constants: Mapping[str, object]
     used: frozenset[str]
+    scope: Scope = field(repr=False)
+    scopes: int
+
+    def forgetting(self, last: "Script") -> "Script":
+        """Return the program for later statements, which know nothing of what was added up to the last one."""
+        return replace(self, scopes=last.scopes)
 
 
-def compile_script(text: str, signatures: Signatures) -> Script:
+def compile_script(text: str, signatures: Signatures, after: Script | None = None) -> Script:
     """Compile a program: a `def` or `sec` with its `end`, or statements without.
 
     Args:
         text: The script as it was sent.
         signatures: The built-in functions of the controller; the language's own are known.
+        after: Program, or the last statements added to it, that the text is added to, see `Machine.add`. Then it may
+            have statements and functions, and it can use all that was defined before.
 
     Raises:
         ScriptError: The first thing that is wrong in the order of the text.
     """
-    script, errors = translate(text, signatures)
+    script, errors = translate(text, signatures, after)
     if errors:
         raise errors[0]
     assert script is not None
     return script
 
 
-def translate(text: str, signatures: Signatures) -> tuple[Script | None, list[ScriptError]]:
+def translate(
+    text: str, signatures: Signatures, after: Script | None = None
+) -> tuple[Script | None, list[ScriptError]]:
     """Compile a program and return it, or what is wrong with it in the order of the text."""
     from tvist_urscript.library import PURE
 
@@ -66,10 +78,10 @@ def translate(text: str, signatures: Signatures) -> tuple[Script | None, list[Sc
         errors.setdefault((line, column, why), ScriptError(line, column, why))
 
     try:
-        program = _program(text)
+        program = _program(text) if after is None else _statements(text)
     except ScriptError as error:
         return None, [error]
-    found = scopes(program)
+    found = scopes(program) if after is None else scopes(program, after.scope, after.scopes)
     if len(found) > MOST_FUNCTIONS:
         head = found[MOST_FUNCTIONS].function
         why = f"a program of {len(found)} functions is too long: the limit is {MOST_FUNCTIONS}"
@@ -87,15 +99,15 @@ def translate(text: str, signatures: Signatures) -> tuple[Script | None, list[Sc
             tuple(map(_code, trees)),
             MappingProxyType(translator.constants),
             frozenset(translator.used),
+            outline(found[0]),
+            found[0].number + len(found),
         ),
         [],
     )
 
 
 def _program(text: str) -> tree.Function:
-    statements = parse(text)
-    if not statements:
-        raise ScriptError(1, 1, syntax_error(1, "the text has no statement"))
+    statements = _parsed(text)
     head = statements[0]
     if isinstance(head, tree.Function):
         if head.kind == "thread":
@@ -111,6 +123,28 @@ def _program(text: str) -> tree.Function:
             name, _ = head.parameters[0]
             raise ScriptError(name.line, name.column, f"the program {head.name} cannot have parameters")
         return head
+    return _together(text, statements)
+
+
+def _statements(text: str) -> tree.Function:
+    """Statements and functions that are added to a program."""
+    statements = _parsed(text, several=True)
+    for statement in statements:
+        if isinstance(statement, tree.Function) and statement.kind == "sec":
+            raise ScriptError(statement.line, statement.column, "only a whole program can be a sec")
+    return _together(text, statements)
+
+
+def _parsed(text: str, *, several: bool = False) -> list[tree.Statement]:
+    statements = parse(text, several=several)
+    if not statements:
+        raise ScriptError(1, 1, syntax_error(1, "the text has no statement"))
+    return statements
+
+
+def _together(text: str, statements: list[tree.Statement]) -> tree.Function:
+    """Statements without `def` as a program, which the first word names."""
+    head = statements[0]
     word = re.search(r"^[ \t]*([A-Za-z_]\w*)", text, re.MULTILINE)
     return tree.Function(head.line, head.column, "def", word[1] if word else "program", [], statements)
 

@@ -139,7 +139,7 @@ class Expressions:
 
     def keep(self, value: object) -> str:
         """Return a name for a value that compiled functions use."""
-        name = f"c{len(self.constants)}"
+        name = f"c{self.scope.number}_{len(self.constants)}"
         self.constants[name] = value
         return name
 

@@ -78,6 +78,8 @@ def _words(error: Exception) -> str:  # noqa: PLR0911  one for each kind of exce
             return str(error)
         case NameError() if found := re.search(r"'[gv]_(\w+)'", str(error)):
             return f"the variable {found[1]} has no value yet"
+        case NameError() if found := re.search(r"'f\d+_(\w+)'", str(error)):
+            return f"the function {found[1]} has been forgotten"
         case ZeroDivisionError():
             return "division by zero"
         case OverflowError():

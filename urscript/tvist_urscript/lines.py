@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from lark import Token
+from lark import Token, UnexpectedInput
 
 from tvist_urscript.errors import ScriptError, syntax_error
 
@@ -38,12 +38,26 @@ _BEGINS = frozenset(
      "ENTER_CRITICAL", "EXIT_CRITICAL", "GLOBAL", "LOCAL", "END", "ELIF", "ELSE")
 )  # fmt: skip
 """Before these a statement ends without a line break: ur_rtde sends `global a =`, then `0  global b = 1`."""
+_COMPLETE = frozenset(
+    ("NAME", "NUMBER", "TEXT", "TRUE", "FALSE", "NONE", "RPAR", "RSQB", "PASS", "BREAK", "CONTINUE", "HALT",
+     "ENTER_CRITICAL", "EXIT_CRITICAL", "END")
+)  # fmt: skip
+"""After these, no expression goes on with a name or `run`: it can only begin the next statement of the line."""
+_AFTER_NAME = frozenset(("LPAR", "LSQB", "EQUAL"))
+"""What follows the name with which a statement begins."""
 
 
 class Lines:
-    """Turns the tokens of a text into those of the grammar, where each statement has one end."""
+    """Turns the tokens of a text into those of the grammar, where each statement has one end.
+
+    Args:
+        several: Whether several statements may follow each other on a line.
+    """
 
     always_accept = (END,)
+
+    def __init__(self, *, several: bool) -> None:
+        self._several = several
 
     def process(self, tokens: Iterator[Token]) -> Iterator[Token]:  # noqa: C901  one pass, as a text is long
         """Drop line breaks that end nothing, and add ends that no line break tells.
@@ -54,7 +68,7 @@ class Lines:
         brackets = 0
         last = END
         pending: Token | None = None
-        for token in tokens:
+        for token in _parted(tokens) if self._several else tokens:
             kind = token.type
             if kind == END:
                 if brackets == 0 and last != END and last not in _GOES_ON and pending is None:
@@ -84,6 +98,32 @@ class Lines:
             yield pending
         elif last != END:
             yield _after(token_before)
+
+
+def _parted(tokens: Iterator[Token]) -> Iterator[Token]:
+    """Add an end between two statements of a line, as UR's interpreter mode has them: `a = 1 textmsg(a)`."""
+    last = END
+    name: Token | None = None
+    try:
+        for token in tokens:
+            if name is not None:
+                if token.type in _AFTER_NAME:
+                    yield Token.new_borrow_pos(END, name, name)
+                yield name
+                name = None
+            if token.type == "NAME" and last in _COMPLETE:
+                name = token
+            else:
+                if token.type == "RUN" and last in _COMPLETE:
+                    yield Token.new_borrow_pos(END, token, token)
+                yield token
+            last = token.type
+    except UnexpectedInput:
+        if name is not None:  # it is the first thing that is wrong
+            yield name
+        raise
+    if name is not None:
+        yield name
 
 
 def _after(token: Token) -> Token:

@@ -2,18 +2,16 @@
 
 from collections.abc import Callable, Generator, Mapping
 from contextlib import suppress
-from types import FunctionType
 from typing import Any
 
 from tvist_urscript.compiler import Script
 from tvist_urscript.errors import Fault, ScriptError
 from tvist_urscript.failures import TooDeep, failure, line_of, position_of
 from tvist_urscript.functions import DEEPEST_CALLS
-from tvist_urscript.library import PURE
-from tvist_urscript.operators import operators
+from tvist_urscript.namespace import Namespace
 from tvist_urscript.pieces import HERE, MISSING, SPENT
 from tvist_urscript.threads import MOST_THREADS, Thread
-from tvist_urscript.values import Array, Value
+from tvist_urscript.values import Value
 
 EVALUATIONS = 500
 """Evaluations of all threads in a tick."""
@@ -66,7 +64,7 @@ class Machine:
         self._started = 0
         self._holder: Thread | None = None
         self._line = 1
-        self._names = self._surroundings(functions)
+        self._names = Namespace(script, functions, self.charge, self._called())
         self._main = Thread(0, self._body(self._names[script.main]), None)
         self._running = self._main
         self._threads: list[Thread] = [self._main]
@@ -210,13 +208,50 @@ class Machine:
         yield from function(1)
         yield from self._finish()
 
+    # Statements that are added to the program.
+
+    def add(self, script: Script, title: str) -> Steps:
+        """Add statements to the program and run them in its main thread, which calls this.
+
+        Args:
+            script: Statements that were compiled after the program and what has been added to it so far.
+            title: What they are called in errors.
+
+        Raises:
+            ScriptError: They have failed.
+            ValueError: They call a function that is not given.
+        """
+        self._names.include(script)
+        self._main.added = True
+        try:
+            yield from self._names[script.main](1)
+        except (Halted, Killed):
+            raise
+        except Exception as error:
+            wrong = failure(error)
+            raise ScriptError(wrong.line, wrong.column, f"{wrong.text} (in {title})") from error
+        finally:
+            self._main.added = False
+        self._main.spent = 0  # many short statements are no endless loop
+
+    def forget(self, before: int) -> None:
+        """Forget what was added: threads end, functions and variables that the program does not have are unknown.
+
+        Args:
+            before: Number of the first scope that is kept.
+        """
+        for thread in [one for one in self._threads if one.added and one is not self._main]:
+            self._threads.remove(thread)
+            self._close(thread)
+        self._names.forget(before, self.script.scope.globals)
+
     # What compiled code calls.
 
     def _run(self, function: Callable[[int], Steps]) -> int:
         if len(self._threads) >= MOST_THREADS:
             raise Fault(f"a program has at most {MOST_THREADS} threads")
         self._started += 1
-        thread = Thread(self._started, self._body(function), self._running)
+        thread = Thread(self._started, self._body(function), self._running, added=self._running.added)
         self._threads.append(thread)
         self._turns.append(thread)
         return self._started
@@ -264,13 +299,11 @@ class Machine:
         if not thread.critical and self._holder is thread:
             self._holder = None
 
-    def _surroundings(self, functions: Mapping[str, Callable[..., Any]]) -> dict[str, Any]:
-        names: dict[str, Any] = {
-            "__builtins__": {},
+    def _called(self) -> dict[str, Any]:
+        return {
             HERE: self,
             SPENT: _SPENT,
             MISSING: _MISSING,
-            **operators(self.charge),
             "run": self._run,
             "kill": self._kill,
             "join": self._join,
@@ -278,31 +311,7 @@ class Machine:
             "exit_critical": self._exit,
             "halt": _halt,
             "too_deep": _too_deep,
-            **self.script.constants,
         }
-        for name in self.script.used:
-            names[f"b_{name}"] = self._built_in(name, functions)
-        for code in self.script.functions:
-            names[code.co_name] = FunctionType(code, names)
-        return names
-
-    def _built_in(self, name: str, functions: Mapping[str, Callable[..., Any]]) -> Callable[..., Any]:
-        if name in functions:
-            return functions[name]
-        if name not in PURE:
-            raise ValueError(f"the script calls {name}, which is not given")
-        signature, function = PURE[name]
-        if not signature.linear:
-            return function
-
-        def charged(*arguments: Any) -> Any:
-            self.charge(sum(argument.size for argument in arguments if isinstance(argument, Array)))
-            result = function(*arguments)
-            if isinstance(result, Array):
-                self.charge(result.size)
-            return result
-
-        return charged
 
 
 def _nothing() -> Steps:

@@ -1,7 +1,7 @@
 """Which variable and which function a name means."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from tvist_urscript import tree
@@ -64,18 +64,36 @@ class Scope:
         return None
 
 
-def scopes(program: tree.Function) -> list[Scope]:
-    """Return the scopes of a program, its own first, then those of its functions in the order of the text."""
-    shared: set[str] = set()
+def outline(scope: Scope) -> Scope:
+    """Return what later statements have to know of an outermost level, without the bodies of its functions."""
+    known = {
+        name: Scope(replace(inner.function, body=[]), None, inner.number, set())
+        for name, inner in scope.functions.items()
+    }
+    return Scope(replace(scope.function, body=[]), None, scope.number, set(scope.globals), known)
+
+
+def scopes(program: tree.Function, before: Scope | None = None, number: int = 0) -> list[Scope]:
+    """Return the scopes of a program, its own first, then those of its functions in the order of the text.
+
+    Args:
+        program: The program, or statements that are added to one.
+        before: The scope of the program that they are added to.
+        number: Number of the first scope.
+    """
+    shared: set[str] = set() if before is None else set(before.globals)
     found: list[Scope] = []
     waiting: list[tuple[tree.Function, Scope | None]] = [(program, None)]
     while waiting:
         function, outer = waiting.pop()
-        scope = Scope(function, outer, len(found), shared)
+        scope = Scope(function, outer, number + len(found), shared)
+        if not found and before is not None:
+            scope.functions.update(before.functions)
         found.append(scope)
         scope.local.update(parameter.name for parameter, _ in function.parameters)
         if outer is not None:
-            if function.name in outer.functions:
+            earlier = outer.functions.get(function.name)
+            if earlier is not None and earlier.number >= number:
                 outer.twice.append(function)
             outer.functions[function.name] = scope
         inner: list[tree.Function] = []

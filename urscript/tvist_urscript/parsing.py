@@ -14,25 +14,29 @@ from tvist_urscript.lines import Lines
 
 
 @cache
-def _parser() -> Lark:
+def _parser(*, several: bool) -> Lark:
     return Lark(
         GRAMMAR,
         parser="lalr",
         lexer="basic",
-        postlex=cast("Any", Lines()),
+        postlex=cast("Any", Lines(several=several)),
         transformer=Builder(),
         maybe_placeholders=False,
     )
 
 
-def parse(text: str) -> list[tree.Statement]:
+def parse(text: str, *, several: bool = False) -> list[tree.Statement]:
     """Return the statements of a text on its outermost level.
+
+    Args:
+        text: The text.
+        several: Whether several statements may follow each other on a line, as in UR's interpreter mode.
 
     Raises:
         ScriptError: The text is no script; the position is that of the first token that does not fit.
     """
     try:
-        return cast("list[tree.Statement]", _parser().parse(text))
+        return cast("list[tree.Statement]", _parser(several=several).parse(text))
     except VisitError as error:
         if isinstance(error.orig_exc, ScriptError):
             raise error.orig_exc from None

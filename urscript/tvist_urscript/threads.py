@@ -19,6 +19,8 @@ class Thread:
             thread.
         critical: How many critical sections it is in.
         spent: Ticks one after the other in which it used up its budget.
+        added: Whether it was started by statements that were added to the program, or is the main thread and runs such
+            statements now.
     """
 
     number: int
@@ -26,6 +28,7 @@ class Thread:
     parent: "Thread | None"
     critical: int = 0
     spent: int = 0
+    added: bool = False
 
     @property
     def ended(self) -> bool:

@@ -95,11 +95,12 @@ def serve(
             angles at rest are the target angles [off].
         programs: Folder with programs in URScript, NAME.script or NAME.urp, that clients load by their names. With
             several robots, a robot uses the folder of its name in it, if there is one.
-        ur: Open UR's own interfaces as well: RTDE, real-time client, dashboard, primary and secondary. The profile is
-            then ursim, if you give no other.
+        ur: Open UR's own interfaces as well: RTDE, real-time client, dashboard, primary and secondary, interpreter
+            mode. The profile is then ursim, if you give no other.
         ur_address: IP address on which UR's interfaces listen; each further robot uses the next address [127.0.0.1].
         ur_port: Change the port of one UR interface, repeatable: rtde=31004, or dashboard=off to close it. The others
-            are primary, secondary, realtime, primary_read_only, secondary_read_only and realtime_read_only.
+            are primary, secondary, realtime, interpreter, primary_read_only, secondary_read_only and
+            realtime_read_only.
         ur_allow: Let programs open sockets to this machine too, repeatable: an IP address, a network such as
             192.168.1.0/24, or a name as programs write it [only the machine that sent the program].
         config: TOML file with any of these options; options on the command line take precedence.

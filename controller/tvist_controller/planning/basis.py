@@ -9,6 +9,7 @@ from tvist_controller.control.differentiator import Floats
 from tvist_controller.mode_source import ModeSource
 from tvist_plant.description import Payload as Body
 from tvist_protocol.values import Payload
+from tvist_urscript import Script
 
 
 class FilterBasis(NamedTuple):
@@ -69,6 +70,13 @@ class ScriptBasis(NamedTuple):
     """The state that the text of a program depends on: none."""
 
 
+class StatementBasis(NamedTuple):
+    """The state that a statement for a running program depends on."""
+
+    after: Script | None
+    """The program, or the last statement that was added to it; None if no program takes statements."""
+
+
 class PlanBasis(NamedTuple):
     """The state that any plan depends on."""
 
@@ -76,3 +84,4 @@ class PlanBasis(NamedTuple):
     motion: MotionBasis | None
     """Basis of a planned motion; None while none may begin."""
     tool: ToolBasis
+    statement: StatementBasis = StatementBasis(None)

@@ -2,14 +2,21 @@
 
 from dataclasses import dataclass
 
-from tvist_controller.planning.basis import FilterBasis, MotionBasis, PlanBasis, ScriptBasis, ToolBasis
+from tvist_controller.planning.basis import (
+    FilterBasis,
+    MotionBasis,
+    PlanBasis,
+    ScriptBasis,
+    StatementBasis,
+    ToolBasis,
+)
 from tvist_controller.planning.filter_planner import PlannedFilter
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.refusal import RefusalError
 from tvist_protocol import commands as c
 from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
 from tvist_protocol.motions import MoveC, MoveL, MovePath
-from tvist_protocol.programs import ProgramLoad, ProgramRun
+from tvist_protocol.programs import ProgramInterpret, ProgramLoad, ProgramRun
 from tvist_protocol.replies import Posture, ToolPose
 from tvist_protocol.simulation import SimulationReset
 from tvist_shaping.base import Filter
@@ -19,7 +26,7 @@ MOTIONS = (c.MoveJ, MoveL, MoveC, MovePath)
 """Commands for motions, which are planned on the state at rest."""
 QUESTIONS = (InverseKinematics, ForwardKinematics)
 """Questions about the tool's kinematics."""
-SCRIPTS = (ProgramLoad, ProgramRun)
+SCRIPTS = (ProgramLoad, ProgramRun, ProgramInterpret)
 """Commands with the text of a program, which is compiled."""
 PLANNED = (*MOTIONS, *QUESTIONS, *SCRIPTS, c.SetShaper, c.SetEstimator, c.SetPayload, SimulationReset)
 """Commands that are planned."""
@@ -28,7 +35,7 @@ Found = PlannedMove | PlannedFilter | Filter | Posture | ToolPose | Script | Non
 """What a plan may contain; None if nothing has to change."""
 
 
-Basis = FilterBasis | MotionBasis | ToolBasis | ScriptBasis
+Basis = FilterBasis | MotionBasis | ToolBasis | ScriptBasis | StatementBasis
 """State that a plan was made on."""
 
 
@@ -48,6 +55,8 @@ class Plan:
                 return now.motion is None
             case ScriptBasis():
                 return True
+            case StatementBasis() as planned:
+                return planned.after is now.statement.after
             case FilterBasis() as planned:
                 return planned == now.filter
             case ToolBasis() as planned:

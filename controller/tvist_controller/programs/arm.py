@@ -64,6 +64,8 @@ class ProgramArm:
         self._outcome: str | None = None
         self._abandoned = False
         self._own = False
+        self._skipped = False
+        """Whether the motion that is being planned is to be left out."""
         self.waypoint: Segment | None = None
         """Target of the present move, or of the last one."""
 
@@ -105,12 +107,16 @@ class ProgramArm:
 
     def _travel(self, path: _Path) -> Turns:
         while path.legs:
-            self.waypoint = path.legs[-1]
+            self.waypoint, self._skipped = path.legs[-1], False
             yield from self._come_to_rest()
             self._check_ready()
             plan = yield from self._planned(path.legs)
             if self._motion.activity.protective:
                 continue
+            if self._skipped:
+                for effects in path.effects:
+                    self._pass(effects)
+                return
             if isinstance(plan.found, RefusalError):
                 self._refused(
                     plan.found, path.legs
@@ -253,6 +259,13 @@ class ProgramArm:
             yield
             while self._motion.activity.moving:
                 yield
+
+    def abort(self) -> None:
+        """Stop the planned move that the program makes now, if there is one; it goes on as if the move had ended."""
+        self._skipped = True
+        if self._number is not None:
+            self.brake(lambda: self._access.guidance.stop_joints(BRAKING))
+            self._outcome = "motion_done"
 
     def brake(self, stop: Callable[[], None]) -> None:
         """Begin a stop of what moves, which is the program's own will."""

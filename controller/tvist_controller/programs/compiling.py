@@ -3,6 +3,7 @@
 from functools import lru_cache
 
 from tvist_controller.programs.built_in import built_in
+from tvist_controller.programs.interpreter import WAITS
 from tvist_controller.programs.library import MOVING, SIGNATURES
 from tvist_controller.refusal import RefusalError
 from tvist_plant.description import RobotDescription
@@ -22,11 +23,11 @@ class ScriptCompiler:
 
     def __init__(self, description: RobotDescription) -> None:
         self._built_in = built_in(description)
-        self._compile = lru_cache(KEPT)(_compile)
+        self._compile = lru_cache(KEPT)(_program)
 
     def rehearse(self) -> None:
         """Build what compiling uses, before any program comes."""
-        compile_script("sync()", SIGNATURES)
+        compile_script("sync()", SIGNATURES, compile_script("sync()", SIGNATURES))
 
     def compile(self, command: ProgramLoad | ProgramRun) -> Script | None:
         """Return the program of a command; None if it names a program without giving its text that is not built in.
@@ -42,16 +43,41 @@ class ScriptCompiler:
                 return None
         return self._compile(text)
 
+    @staticmethod
+    def compile_statement(text: str, after: Script | None) -> Script:
+        """Return a statement for a running program.
 
-def _compile(text: str) -> Script:
-    try:
-        script = compile_script(text, SIGNATURES)
-    except ScriptError as error:
-        raise _refusal(error.line, error.column, error.text) from error
+        Args:
+            text: Its text.
+            after: The program, or what was added to it last; None if no program takes statements.
+
+        Raises:
+            RefusalError: The text is not valid, or no program takes statements.
+        """
+        if after is None:
+            why = f"no program is running that waits for statements: it has to call {WAITS}()"
+            raise RefusalError("wrong_mode", "", why)
+        script = _compiled(text, after)
+        if WAITS in script.used:
+            raise _refusal(
+                1, 1, f"{WAITS} cannot be called in a statement: only the program can wait for statements"
+            )
+        return script
+
+
+def _program(text: str) -> Script:
+    script = _compiled(text)
     moves = script.used & MOVING
     if script.secondary and moves:
         raise _refusal(1, 1, f"a secondary program cannot move the arm: it calls {', '.join(sorted(moves))}")
     return script
+
+
+def _compiled(text: str, after: Script | None = None) -> Script:
+    try:
+        return compile_script(text, SIGNATURES, after)
+    except ScriptError as error:
+        raise _refusal(error.line, error.column, error.text) from error
 
 
 def _refusal(line: int, column: int, text: str) -> RefusalError:

@@ -7,6 +7,7 @@ from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import readable
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.built_in import built_in
+from tvist_controller.programs.interpreter import StatementQueue
 from tvist_controller.programs.library import MOVING, functions
 from tvist_controller.programs.popups import Popups
 from tvist_controller.programs.sockets import Sockets
@@ -16,6 +17,7 @@ from tvist_controller.refusal import RefusalError, out_of_turn
 from tvist_controller.safety_control import SafetyControl
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.programs import (
+    Interpreter,
     ProgramLoad,
     ProgramPause,
     ProgramPlay,
@@ -64,7 +66,10 @@ class ProgramPlayer:
         self._popups = Popups(access.emit, self._machine)
         self._watchdogs = Watchdogs(access.peripherals)
         self.sockets = Sockets(access.emit, self._machine, lambda: self._now.origin if self._now else None)
-        self._functions = functions(access, self.arm, self._popups, self._watchdogs, self.sockets)
+        self.statements = StatementQueue(self._machine, self.arm, access.peripherals, access.emit)
+        self._functions = functions(
+            access, self.arm, self._popups, self._watchdogs, self.sockets, self.statements
+        )
         self._built_in = frozenset(built_in(access.description))
         self._kept: dict[str, Script] = {}
         """Programs that were loaded with their text, by name."""
@@ -88,6 +93,7 @@ class ProgramPlayer:
             Row(ProgramPause, self._pause, changes_io=True),
             Row(ProgramStop, self._stop, lease="if named", changes_io=True),
             *self._popups.rows,
+            *self.statements.rows,
         )
 
     @property
@@ -99,6 +105,11 @@ class ProgramPlayer:
     def watched(self) -> list[str]:
         """Names of the input registers that the program watches."""
         return self._watchdogs.names
+
+    @property
+    def interpreter(self) -> Interpreter | None:
+        """State of the statements that clients have added to the program."""
+        return self.statements.published
 
     @property
     def progress(self) -> tuple[str | None, ProgramState, int]:
@@ -219,6 +230,7 @@ class ProgramPlayer:
         if running is self._main:
             self._main, self.state, self.line = None, "STOPPED", 0
             self._watchdogs.clear()
+            self.statements.close()
             self.arm.forget()
 
     def _machine(self) -> Machine:
@@ -323,6 +335,7 @@ class ProgramPlayer:
     def _start(self, script: Script, origin: str | None) -> None:
         self._main = self._begin(script, self.name or script.name, origin)
         self.state, self.line = "PLAYING", 1
+        self.statements.open(self._main.machine)
 
     def _begin(self, script: Script, name: str, origin: str | None) -> _Running:
         machine = Machine(script, self._functions, finish=self.arm.finish)

@@ -13,6 +13,7 @@ from tvist_controller.programs.functions import (
     settings,
     sockets,
     state,
+    statements,
     terminals,
     unsimulated,
 )
@@ -40,6 +41,7 @@ SUBJECTS: tuple[tuple[str, ModuleType, type], ...] = (
     ("Inputs and outputs", terminals, terminals.TerminalFunctions),
     ("Messages and time", messages, messages.MessageFunctions),
     ("Sockets", sockets, sockets.SocketFunctions),
+    ("Statements from clients", statements, statements.StatementFunctions),
     ("Safety", safety, safety.SafetyFunctions),
 )
 

@@ -22,6 +22,7 @@ from tvist_server.gateways.ur.base import PortSession, Send
 from tvist_server.gateways.ur.connection import Connection
 from tvist_server.gateways.ur.dashboard.session import DashboardSession
 from tvist_server.gateways.ur.external_control import ExternalControl
+from tvist_server.gateways.ur.interpreter import InterpreterSession
 from tvist_server.gateways.ur.lease import ALIVE, ConnectionControl, HostLease
 from tvist_server.gateways.ur.notices import Notices
 from tvist_server.gateways.ur.places import Places
@@ -270,6 +271,8 @@ def _session(interface: InterfaceName, robot: UrRobot, control: ConnectionContro
             return DashboardSession(robot, control, send)
         case "rtde":
             return RtdeSession(robot, control, send)
+        case "interpreter":
+            return InterpreterSession(robot, control, send)
         case "realtime" | "realtime_read_only":
             return RealtimeSession(robot, control, send, read_only=interface == "realtime_read_only")
         case _:

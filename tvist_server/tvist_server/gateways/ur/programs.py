@@ -8,6 +8,7 @@ from typing import Final, Protocol
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.io import Io
 from tvist_protocol.programs import (
+    Interpreter,
     ProgramClosePopup,
     ProgramLoad,
     ProgramPause,
@@ -61,6 +62,8 @@ class Programs:
         self.path: str | None = None
         """Path of the loaded program; only its name if a client has sent it as a script; None before the first."""
         self.state: ProgramState = "STOPPED"
+        self.interpreter = Interpreter()
+        """Statements of the interpreter mode, with those that were accepted since the robot has told of them."""
         self._control: ControllerAccess | None = None
         """Access of the client that plays the program. It lasts as long as the program, even after the client
         disconnects.
@@ -217,6 +220,7 @@ class Programs:
         if io.program is not None and io.program != self.name:
             self.path = _path_of(io.program)
         self._become(io.program_state)
+        self.interpreter = io.interpreter or Interpreter()
 
     def event(self, event: Event) -> None:
         """Handle an event of the robot: tell the clients if it concerns a program."""

@@ -1,12 +1,12 @@
 """Commands and programs from clients of the primary, secondary or real-time interface."""
 
-from collections import deque
 from collections.abc import Callable
 from typing import Final
 
 from tvist_protocol.replies import Refused
 from tvist_server.gateways.ur import messages, power
 from tvist_server.gateways.ur.base import ControllerAccess
+from tvist_server.gateways.ur.in_turn import Done, InTurn
 from tvist_server.gateways.ur.messages import ErrorLevel
 from tvist_server.gateways.ur.primary.scripts import LONGEST, Unit
 from tvist_server.gateways.ur.robot import UrRobot
@@ -15,9 +15,6 @@ TOO_LONG: Final = f"program_too_long: it has more than {LONGEST} bytes and was t
 READ_ONLY: Final = (
     "this interface is read-only: somebody else controls the robot, or the port takes no commands"
 )
-
-Done = Callable[[], None]
-"""Called once when a unit was carried out or refused."""
 
 
 class Orders:
@@ -36,22 +33,18 @@ class Orders:
         self._robot = robot
         self._control = control
         self._answer = answer
-        self._units: deque[Unit] = deque()
-        self._begun = self._ended = 0
-        """Number of units begun, and answered."""
-        self._working = False
+        self._units = InTurn(self._begin, self._idle)
         self._lasting: ControllerAccess | None = None
         """Access for what is left to do after the connection was closed."""
 
     @property
     def waiting(self) -> int:
         """Number of units that are not yet answered."""
-        return len(self._units) + self._begun - self._ended
+        return self._units.waiting
 
     def carry_out(self, unit: Unit) -> None:
         """Carry out a unit in its turn."""
-        self._units.append(unit)
-        self._work()
+        self._units.add(unit)
 
     def leave(self, unfinished: Unit | None) -> None:
         """Take note that the connection was closed; its complete units are still carried out.
@@ -69,25 +62,13 @@ class Orders:
         self._read_only()
         self._report_refusal(unit, "this port is read-only")
 
-    def _work(self) -> None:
-        """Carry out the waiting units, until one has to wait for its answer."""
-        if self._working:
-            return
-        self._working = True
-        while self._units and self._begun == self._ended:
-            self._begin(self._units.popleft())
-        self._working = False
-        if self._lasting is not None and not self.waiting:
+    def _idle(self) -> None:
+        """Give back control that lasted longer than the connection."""
+        if self._lasting is not None:
             self._lasting.leave()
             self._lasting = None
 
-    def _begin(self, unit: Unit) -> None:
-        self._begun += 1
-
-        def done() -> None:
-            self._ended += 1
-            self._work()
-
+    def _begin(self, unit: Unit, done: Done) -> None:
         if unit.too_long:
             stamp = messages.stamp(self._robot.latest)
             self._robot.tell(messages.runtime_exception(stamp, unit.line, unit.column, TOO_LONG))

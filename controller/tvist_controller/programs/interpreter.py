@@ -1,0 +1,196 @@
+"""Statements that clients add to a program while it waits for them."""
+
+from collections import deque
+from collections.abc import Callable
+
+from tvist_controller.command_row import Call, Row
+from tvist_controller.events import Emit
+from tvist_controller.peripherals import Peripherals
+from tvist_controller.planning.basis import StatementBasis
+from tvist_controller.programs.arm import ProgramArm, Turns
+from tvist_controller.refusal import RefusalError
+from tvist_protocol.programs import MAX_SCRIPT, Interpreter, ProgramInterpret, ProgramSkip
+from tvist_protocol.replies import Accepted
+from tvist_urscript import Fault, Machine, Script
+
+MOST = 1000
+"""Statements, of `MAX_SCRIPT` characters together, that a program takes before it is told to forget them."""
+HELD = 2
+"""Statements that a program holds until it has forgotten the first ones, in units of the limits above."""
+WAITS, CLEAR = "interpreter_mode", "clear_interpreter"
+"""Functions that wait for statements, and that forget them."""
+
+
+class StatementQueue:
+    """The statements for one robot's program.
+
+    A program that calls `interpreter_mode` anywhere takes statements from its start on; they are carried out while it
+    waits in that function.
+
+    Args:
+        machine: Returns the program that runs now.
+        arm: Its arm.
+        peripherals: What is published with the state of the statements.
+        emit: Emits events.
+    """
+
+    def __init__(
+        self, machine: Callable[[], Machine], arm: ProgramArm, peripherals: Peripherals, emit: Emit
+    ) -> None:
+        self._machine, self._arm, self._peripherals, self._emit = machine, arm, peripherals, emit
+        self._program: Machine | None = None
+        """The main program if it takes statements."""
+        self._queue: deque[tuple[int, Script]] = deque()
+        self._last: Script | None = None
+        """The last statement that was added, or the program."""
+        self._lengths: deque[tuple[int, int]] = deque()
+        """Number and length of each statement that is held."""
+        self._held = self._added = 0
+        """Characters of the statements that are held, and of those since the last that forgets."""
+        self._waiting = self._ending = self._clearing = self._published = False
+        self._interpreted = self._executed = self._cleared = self._forgotten = 0
+        self.rows = (
+            Row(ProgramInterpret, self._interpret, changes_io=True),
+            Row(ProgramSkip, self._skip, changes_io=True),
+        )
+
+    @property
+    def basis(self) -> StatementBasis:
+        """What the next statement is compiled after."""
+        return StatementBasis(self._last)
+
+    @property
+    def published(self) -> Interpreter | None:
+        """State of the statements; None before the first program that takes some."""
+        if not self._published:
+            return None
+        return Interpreter(
+            interpreted=self._interpreted,
+            executed=self._executed,
+            cleared=self._cleared,
+            waiting=len(self._queue),
+        )
+
+    # ------------------------------------------------------------------ for programs
+
+    def open(self, machine: Machine) -> None:
+        """Handle the start of the main program."""
+        self.close()
+        if WAITS in machine.script.used:
+            self._program, self._last, self._published = machine, machine.script, True
+            self._lengths.clear()
+            self._held = self._added = 0
+            self._waiting = self._clearing = False
+            self._interpreted = self._executed = self._cleared = self._forgotten = 0
+
+    def close(self) -> None:
+        """Handle the end of the main program."""
+        self._queue.clear()
+        self._program = self._last = None
+
+    def carry_out(self, *, clear_queue: bool, clear_at_end: bool) -> Turns:
+        """Carry out statements until `end` is called.
+
+        Args:
+            clear_queue: Whether statements that came before are dropped.
+            clear_at_end: Whether the program forgets its statements at the end.
+
+        Raises:
+            Fault: The program carries out statements already, or this is not its main thread.
+        """
+        machine = self._machine()
+        if machine is not self._program or self._waiting or machine.thread != 0:
+            where = "in a statement" if self._waiting and machine.thread == 0 else "in a thread"
+            raise Fault(f"{WAITS} cannot be called {where}: only the main program can wait for statements")
+        if clear_queue and self._queue:
+            first, last = self._queue[0][0], self._queue[-1][0]
+            why = f"{WAITS}() has dropped the statements {first} to {last}, which were sent before it was called"
+            self._emit("warning", why=why)
+            self._queue.clear()
+        self._waiting, self._ending, self._peripherals.changed = True, False, True
+        try:
+            while not self._ending:
+                if self._queue:
+                    yield from self._carry_out_next(machine)
+                else:
+                    yield from self._arm.finish()
+                    if not self._queue:
+                        yield
+        finally:
+            self._waiting, self._peripherals.changed = False, True
+        if clear_at_end and self._last is not None:
+            self._forget(machine, self._last.scopes)
+            self._restart(machine)
+
+    def end(self) -> None:
+        """Carry out no further statements."""
+        self._ending = True
+
+    def clear(self) -> None:
+        """Forget all statements so far and what they have defined, when the one that calls this has ended.
+
+        Raises:
+            Fault: The program does not wait for statements.
+        """
+        if not self._waiting or self._machine() is not self._program:
+            raise Fault(f"{CLEAR} can only be called while the program waits in {WAITS}()")
+        self._clearing = True
+
+    def _carry_out_next(self, machine: Machine) -> Turns:
+        self._executed, script = self._queue.popleft()
+        self._peripherals.changed = True
+        yield from machine.add(script, f"statement {self._executed}")
+        if self._clearing:
+            self._forget(machine, script.scope.number)
+            if CLEAR not in script.used:  # otherwise this was done when it was added
+                self._restart(machine)
+        if machine.left <= 0:
+            yield
+
+    def _forget(self, machine: Machine, before: int) -> None:
+        """Forget what was carried out; functions are forgotten if their scopes have smaller numbers."""
+        self._clearing = False
+        self._cleared, self._peripherals.changed = self._executed, True
+        while self._lengths and self._lengths[0][0] <= self._cleared:
+            self._held -= self._lengths.popleft()[1]
+        machine.forget(before)
+
+    def _restart(self, machine: Machine) -> None:
+        """Compile later statements after the program alone."""
+        if self._last is not None:
+            self._last = machine.script.forgetting(self._last)
+            self._forgotten, self._added = self._interpreted, 0
+
+    # ------------------------------------------------------------------ for clients
+
+    def _interpret(self, call: Call[ProgramInterpret]) -> Accepted:
+        script: Script = call.planned()
+        assert self._program is not None, "the statement was compiled after a program"
+        clears = CLEAR in script.used
+        self._check_room(len(script.text), clears=clears)
+        self._interpreted += 1
+        self._queue.append((self._interpreted, script))
+        self._lengths.append((self._interpreted, len(script.text)))
+        self._held += len(script.text)
+        self._added += len(script.text)
+        self._last = script
+        if clears:
+            self._restart(self._program)
+        return Accepted(id=self._interpreted)
+
+    def _check_room(self, length: int, *, clears: bool) -> None:
+        """Refuse a statement that makes the program too large, unless it makes room for later ones.
+
+        Those that are held until they are forgotten have room for twice as many, since a client need not wait for that.
+        """
+        added = self._interpreted - self._forgotten >= MOST or self._added + length > MAX_SCRIPT
+        held = len(self._lengths) >= HELD * MOST or self._held + length > HELD * MAX_SCRIPT
+        if held or (added and not clears):
+            why = f"the program has taken {MOST} statements or {MAX_SCRIPT} characters: clear them with {CLEAR}()"
+            raise RefusalError("busy", "text", why, MOST)
+
+    def _skip(self, call: Call[ProgramSkip]) -> None:
+        if call.command.what == "statements":
+            self._queue.clear()
+        else:
+            self._arm.abort()

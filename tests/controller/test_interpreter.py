@@ -1,0 +1,379 @@
+"""Statements that clients add to a program while it waits in `interpreter_mode`."""
+
+import pytest
+
+from tvist_protocol.commands import UnlockProtectiveStop
+from tvist_protocol.programs import (
+    MAX_SCRIPT,
+    Interpreter,
+    ProgramInterpret,
+    ProgramPause,
+    ProgramPlay,
+    ProgramSkip,
+    ProgramStop,
+)
+from tvist_protocol.replies import Accepted, Done, Refused
+from tvist_protocol.simulation import SimulationInject
+
+from .scripts import URSIM, a_robot, failure, finish, playing, said, start
+
+NEAR = [angle + 0.2 for angle in URSIM]
+
+
+def waiting(*before, mode="interpreter_mode()", after=()):
+    """A robot whose program waits for statements."""
+    robot = a_robot()
+    start(robot, *before, mode, *after)
+    robot.tick(2)
+    return robot
+
+
+def add(robot, text, ticks=3):
+    reply = robot.send(ProgramInterpret, text=text)
+    robot.tick(ticks)
+    return reply
+
+
+def state(robot):
+    return robot.controller.io().interpreter
+
+
+def test_statements_are_numbered_and_carried_out_in_their_order():
+    robot = waiting("a = 5")
+    replies = [robot.send(ProgramInterpret, text=f"textmsg({text})") for text in ("a", "a + 1", '"c"')]
+    assert replies == [Accepted(id=1), Accepted(id=2), Accepted(id=3)]
+    assert state(robot) == Interpreter(interpreted=3, executed=0, cleared=0, waiting=3)
+    robot.tick()
+    assert said(robot) == ["5", "6", "c"]
+    assert state(robot) == Interpreter(interpreted=3, executed=3, cleared=0, waiting=0)
+    assert playing(robot)
+
+
+def test_statements_define_functions_and_variables_for_later_ones():
+    robot = waiting("def twice(x):", "return 2 * x", "end")
+    add(robot, "def thrice(x):\n  return x + twice(x)\nend")
+    add(robot, "b = [thrice(1), 2]")
+    add(robot, "textmsg(b)")
+    assert said(robot) == ["[3, 2]"]
+
+
+def test_a_statement_waits_for_the_motion_before_it():
+    robot = waiting()
+    add(robot, f"movej({NEAR}, a=2, v=1)")
+    add(robot, 'textmsg("there")')
+    assert said(robot) == []
+    assert state(robot).waiting == 1
+    robot.until_rest()
+    robot.tick(3)
+    assert said(robot) == ["there"]
+    assert robot.states[-1].reference_q == pytest.approx(NEAR)
+
+
+def test_the_program_goes_on_after_end_interpreter():
+    robot = waiting(after=['textmsg("after")'])
+    add(robot, "end_interpreter()")
+    assert said(robot) == ["after"]
+    assert not playing(robot)
+    refused = robot.send(ProgramInterpret, text="sync()")
+    assert (refused.code, "interpreter_mode" in refused.why) == ("wrong_mode", True)
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "where"),
+    [
+        ("textmsg(nothing)", "script_error", "text:1:9"),
+        ("movej(", "script_error", "text:1:7"),
+        ("sec f():\nend", "script_error", "text:1:5"),
+    ],
+)
+def test_a_statement_that_is_not_valid_changes_nothing(text, code, where):
+    robot = waiting()
+    refused = add(robot, text)
+    assert isinstance(refused, Refused)
+    assert (refused.code, refused.where) == (code, where)
+    assert add(robot, "textmsg(1)") == Accepted(id=1)
+    assert said(robot) == ["1"]
+
+
+def test_an_error_in_a_statement_ends_the_program_at_its_place():
+    robot = waiting("a = [1]")
+    add(robot, "textmsg(a[7])")
+    assert not playing(robot)
+    assert (failure(robot).line, failure(robot).column) == (1, 11)
+
+
+def test_functions_and_variables_of_statements_are_forgotten_and_those_of_the_program_are_kept():
+    robot = waiting("c = 0")
+    add(robot, "def f():\n  return 7\nend")
+    add(robot, "c = f() d = 1")
+    add(robot, "clear_interpreter()")
+    assert state(robot) == Interpreter(interpreted=3, executed=3, cleared=3, waiting=0)
+    assert add(robot, "textmsg(f())").code == "script_error"
+    assert add(robot, "textmsg(d)").code == "script_error"
+    add(robot, "textmsg(c)")
+    add(robot, "def f():\n  return 8\nend")
+    add(robot, "textmsg(f())")
+    assert said(robot) == ["7", "8"]
+
+
+def test_statements_behind_a_clear_are_compiled_without_those_before_it():
+    robot = waiting()
+    robot.send(ProgramInterpret, text="def f():\n  return 7\nend")
+    robot.send(ProgramInterpret, text="clear_interpreter()")
+    assert robot.send(ProgramInterpret, text="textmsg(f())").code == "script_error"
+    robot.send(ProgramInterpret, text="def f():\n  return 8\nend")
+    robot.send(ProgramInterpret, text="textmsg(f())")
+    robot.tick(3)
+    assert said(robot) == ["8"]
+
+
+def test_a_program_is_not_given_statements_without_end():
+    robot = waiting()
+    replies = [robot.send(ProgramInterpret, text="x = 1") for _ in range(1001)]
+    assert isinstance(replies[999], Accepted)
+    assert replies[1000].code == "busy"
+    robot.send(ProgramInterpret, text="clear_interpreter()")
+    assert isinstance(robot.send(ProgramInterpret, text="x = 1"), Accepted)
+    robot.tick(100)
+    assert state(robot).waiting == 0
+
+
+def test_waiting_statements_are_skipped_and_the_present_move_goes_on():
+    robot = waiting()
+    add(robot, f"movej({NEAR}, a=2, v=1)")
+    add(robot, 'textmsg("there")')
+    assert robot.send(ProgramSkip, what="statements") == Done()
+    assert state(robot).waiting == 0
+    robot.until_rest()
+    robot.tick(3)
+    assert said(robot) == []
+    assert robot.states[-1].reference_q == pytest.approx(NEAR)
+    assert playing(robot)
+
+
+@pytest.mark.parametrize("move", ["movej", "movel"])
+def test_a_move_that_is_skipped_ends_where_it_stops_and_the_next_statement_follows(move):
+    robot = waiting()
+    add(robot, f"{move}({NEAR}, a=1, v=0.3)", 200)
+    add(robot, 'textmsg("on")')
+    assert robot.send(ProgramSkip, what="move") == Done()
+    robot.until_rest()
+    robot.tick(3)
+    assert said(robot) == ["on"]
+    assert robot.states[-1].reference_q != pytest.approx(NEAR)
+    assert playing(robot)
+
+
+def test_statements_that_are_left_over_wait_for_the_next_time_if_the_program_says_so():
+    robot = waiting(after=["interpreter_mode(clearQueueOnEnter=False)"])
+    robot.send(ProgramInterpret, text="end_interpreter()")
+    robot.send(ProgramInterpret, text='textmsg("later")')
+    robot.tick(3)
+    assert said(robot) == ["later"]
+    robot = waiting(after=["interpreter_mode()"])
+    robot.send(ProgramInterpret, text="end_interpreter()")
+    robot.send(ProgramInterpret, text='textmsg("later")')
+    robot.tick(3)
+    assert said(robot) == []
+
+
+def test_only_the_main_program_waits_for_statements_and_only_once():
+    robot = waiting("def again():", "interpreter_mode()", "end")
+    refused = add(robot, "interpreter_mode()")
+    assert (refused.code, "in a statement" in refused.why) == ("script_error", True)
+    add(robot, "again()")
+    assert "in a statement" in failure(robot).why
+    robot = a_robot()
+    start(robot, "thread t():", "interpreter_mode()", "end", "join run t()")
+    robot.tick(3)
+    assert "in a thread" in failure(robot).why
+
+
+def test_statements_that_come_before_the_program_waits_are_kept_if_it_says_so():
+    robot = a_robot()
+    start(robot, "sleep(0.1)", "interpreter_mode(clearQueueOnEnter=False)")
+    assert add(robot, 'textmsg("kept")') == Accepted(id=1)
+    assert said(robot) == []
+    robot.tick(60)
+    assert said(robot) == ["kept"]
+
+
+def test_statements_that_come_before_the_program_waits_are_dropped_with_a_warning():
+    robot = a_robot()
+    start(robot, "sleep(0.1)", "interpreter_mode()")
+    add(robot, 'textmsg("early")')
+    add(robot, 'textmsg("early")')
+    robot.tick(60)
+    add(robot, 'textmsg("late")')
+    assert said(robot) == ["late"]
+    (warning,) = [event.why for event in robot.events if event.kind == "warning"]
+    assert "statements 1 to 2" in warning
+
+
+def test_a_program_that_never_waits_takes_no_statements():
+    robot = a_robot()
+    start(robot, "sleep(1)")
+    robot.tick(2)
+    assert add(robot, "a = 1").code == "wrong_mode"
+    assert state(robot) is None
+
+
+def test_threads_of_statements_end_when_they_are_forgotten():
+    robot = waiting("global n = 0")
+    add(robot, "thread t(): while True: n = n + 1 sync() end end")
+    add(robot, "run t()", 20)
+    add(robot, "clear_interpreter()")
+    add(robot, "textmsg(n)")
+    robot.tick(20)
+    add(robot, "textmsg(n)")
+    first, second = said(robot)
+    assert first == second != "0"
+    assert playing(robot)
+
+
+def test_end_interpreter_leaves_statements_that_wait_and_they_do_not_run_later():
+    robot = waiting(after=["sleep(0.1)", "interpreter_mode()", 'textmsg("over")'])
+    for text in ("sleep(0.02)", "end_interpreter()", 'textmsg("behind")', 'textmsg("behind")'):
+        robot.send(ProgramInterpret, text=text)
+    robot.tick(100)
+    assert state(robot) == Interpreter(interpreted=4, executed=2, cleared=2, waiting=0)
+    add(robot, "end_interpreter()")
+    assert said(robot) == ["over"]
+
+
+def test_a_thread_of_the_program_ends_the_interpreter_mode():
+    robot = a_robot()
+    start(
+        robot,
+        "thread t():",
+        "sleep(0.1)",
+        "end_interpreter()",
+        "end",
+        "run t()",
+        "interpreter_mode()",
+        "textmsg(7)",
+    )
+    finish(robot)
+    assert said(robot) == ["7"]
+
+
+def test_only_a_program_that_waits_can_forget_statements():
+    robot = a_robot()
+    start(robot, "clear_interpreter()", "interpreter_mode()")
+    robot.tick(2)
+    assert "can only be called while" in failure(robot).why
+
+
+def test_a_program_is_paused_and_played_with_its_statements():
+    robot = waiting()
+    add(robot, f"movej({NEAR}, a=2, v=1)", 100)
+    assert robot.send(ProgramPause) == Done()
+    robot.tick(500)
+    assert add(robot, 'textmsg("there")') == Accepted(id=2)
+    robot.tick(200)
+    assert said(robot) == []
+    assert robot.send(ProgramPlay) == Done()
+    robot.until_rest()
+    robot.tick(3)
+    assert said(robot) == ["there"]
+    assert robot.states[-1].reference_q == pytest.approx(NEAR)
+
+
+def test_after_a_protective_stop_the_statement_is_resumed_and_later_ones_follow():
+    robot = waiting()
+    add(robot, f"movej({NEAR}, a=2, v=1)", 100)
+    robot.send(SimulationInject, fault="protective_stop")
+    robot.until_rest()
+    assert add(robot, 'textmsg("there")') == Accepted(id=2)
+    assert robot.controller.programs.state == "PAUSED"
+    assert said(robot) == []
+    robot.tick(3000)
+    assert robot.send(UnlockProtectiveStop) == Done()
+    assert robot.send(ProgramPlay) == Done()
+    robot.until_rest()
+    robot.tick(5)
+    assert said(robot) == ["there"]
+    assert robot.states[-1].reference_q == pytest.approx(NEAR)
+    assert add(robot, "end_interpreter()") == Accepted(id=3)
+    finish(robot)
+
+
+def test_a_move_is_skipped_before_it_has_begun():
+    """A line is planned for some ticks after it was called."""
+    robot = waiting()
+    before = robot.states[-1].reference_q
+    add(robot, f"movel({NEAR}, a=1, v=0.3)", 2)
+    assert robot.send(ProgramSkip, what="move") == Done()
+    add(robot, 'textmsg("on")')
+    robot.tick(100)
+    assert said(robot) == ["on"]
+    assert robot.states[-1].reference_q == before
+    add(robot, f"movel({NEAR}, a=1, v=0.3)", 20)
+    robot.until_rest()
+    assert robot.states[-1].reference_q == pytest.approx(NEAR)
+
+
+def test_a_move_that_waits_for_one_to_blend_into_is_skipped_with_it():
+    robot = waiting()
+    for share, radius in ((0.1, 0.02), (0.2, 0.0)):
+        near = [angle + share for angle in URSIM]
+        robot.send(ProgramInterpret, text=f"movel({near}, a=1, v=0.3, r={radius})")
+    add(robot, 'textmsg("on")', 150)
+    assert said(robot) == []
+    assert robot.send(ProgramSkip, what="move") == Done()
+    robot.until_rest()
+    robot.tick(3)
+    assert said(robot) == ["on"]
+    assert playing(robot)
+
+
+def test_nothing_is_skipped_where_nothing_moves():
+    robot = a_robot()
+    assert robot.send(ProgramSkip, what="move") == Done()
+    robot = waiting()
+    assert robot.send(ProgramSkip, what="move") == Done()
+    add(robot, f"servoj({NEAR}, t=0.5, lookahead_time=0.2)", 20)
+    assert robot.send(ProgramSkip, what="move") == Done()
+    assert playing(robot)
+    add(robot, "textmsg(1)", 300)
+    assert said(robot) == ["1"]
+
+
+def test_a_paused_move_is_skipped():
+    robot = waiting()
+    add(robot, f"movej({NEAR}, a=1, v=0.5)", 100)
+    add(robot, "textmsg(1)")
+    robot.send(ProgramPause)
+    robot.tick(500)
+    assert robot.send(ProgramSkip, what="move") == Done()
+    robot.tick(5)
+    assert robot.send(ProgramPlay) == Done()
+    robot.tick(5)
+    assert said(robot) == ["1"]
+    assert robot.states[-1].reference_q != pytest.approx(NEAR)
+
+
+def test_long_statements_are_limited_together():
+    robot = waiting()
+    text = "# " + "x" * (MAX_SCRIPT // 2 - 50) + "\na = 1"
+    replies = [robot.send(ProgramInterpret, text=text) for _ in range(3)]
+    assert [getattr(reply, "code", None) for reply in replies] == [None, None, "busy"]
+    assert robot.send(ProgramInterpret, text=text + "\nclear_interpreter()") == Accepted(id=3)
+    assert robot.send(ProgramInterpret, text=text) == Accepted(id=4)
+    robot.tick(5)
+    assert state(robot).cleared == 3
+
+
+def test_the_end_of_the_program_ends_the_statements():
+    robot = waiting()
+    add(robot, "sleep(10)")
+    add(robot, "textmsg(1)")
+    robot.send(ProgramStop)
+    robot.tick(3)
+    assert state(robot).waiting == 0
+    assert robot.send(ProgramInterpret, text="sync()").code == "wrong_mode"
+    start(robot, "interpreter_mode()")
+    robot.tick(2)
+    assert state(robot) == Interpreter()
+    assert add(robot, "end_interpreter()") == Accepted(id=1)
+    finish(robot)
