@@ -245,7 +245,7 @@ async def test_what_a_client_sends_waits_with_the_client_until_the_controller_ha
 ):
     await desk.tick()
     due = []
-    monkeypatch.setattr(desk, "command", lambda command, answer: due.append((command, answer)))
+    monkeypatch.setattr(desk, "command", lambda command, answer, _origin=None: due.append((command, answer)))
     _, writer = await connect(desk, "realtime")
     writer.write(b"stop program\n" * 1000)
     await until(lambda: due)

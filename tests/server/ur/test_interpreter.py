@@ -9,11 +9,13 @@ from hypothesis import strategies as st
 
 from tvist_protocol.programs import Interpreter, ProgramInterpret, ProgramSkip
 from tvist_protocol.replies import Accepted, Done
+from tvist_server.gateways.ur.external_control import ExternalControl
 from tvist_server.gateways.ur.interpreter import LONGEST, InterpreterSession
 from tvist_server.gateways.ur.programs import Programs
 
 from .conftest import FakeControl, io
 from .desks import PATIENCE, connect, lines, until
+from .hosts import nobody
 
 TOKEN = "the-token"
 
@@ -31,7 +33,7 @@ class Client:
 
 @pytest.fixture
 def robot():
-    return SimpleNamespace(programs=Programs(None))
+    return SimpleNamespace(programs=Programs(None, ExternalControl(None, nobody)))
 
 
 @pytest.fixture
@@ -132,7 +134,7 @@ def test_statements_are_passed_on_one_after_the_other(client, control):
 
 @given(data=st.binary(max_size=300), cut=st.integers(0, 300))
 def test_no_bytes_break_it(data, cut):
-    client = Client(SimpleNamespace(programs=Programs(None)), FakeControl())
+    client = Client(SimpleNamespace(programs=Programs(None, ExternalControl(None, nobody))), FakeControl())
     client.session.receive(data[:cut])
     client.session.receive(data[cut:])
     client.session.receive(b"\nstateunexecuted\n")
