@@ -33,8 +33,8 @@ test: setup
 	$(BIN)/pytest --hypothesis-profile quick -m "realtime and not (slow or nightly)"
 
 test-all: setup
-	$(BESIDE) -m "not (nightly or realtime)"
-	$(BIN)/pytest -m "realtime and not nightly"
+	$(BESIDE) -m "not (nightly or realtime)" --durations 20
+	$(BIN)/pytest -m "realtime and not nightly" --durations 20
 
 lint: setup
 	$(BIN)/ruff check

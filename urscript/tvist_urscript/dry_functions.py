@@ -1,4 +1,4 @@
-"""The controller's functions without a robot: motions are noted and take one tick, registers and outputs are memory."""
+"""The controller's functions without a robot: motions are noted, registers are memory, and no socket can be opened."""
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
@@ -45,6 +45,25 @@ _SETTINGS = {
     "teach_mode": "",
     "zero_ftsensor": "",
 }
+_SOCKETS: dict[str, tuple[str, Value]] = {
+    "socket_open": ('address, port, socket_name="socket_0"', False),
+    "socket_close": ('socket_name="socket_0"', None),
+    "socket_get_var": ('name, socket_name="socket_0"', 0),
+    "socket_read_ascii_float": ('number, socket_name="socket_0", timeout=2', Array((0,))),
+    "socket_read_binary_integer": ('number, socket_name="socket_0", timeout=2', Array((0,))),
+    "socket_read_byte_list": ('number, socket_name="socket_0", timeout=2', Array((0,))),
+    "socket_read_line": ('socket_name="socket_0", timeout=2', ""),
+    "socket_read_string": (
+        'socket_name="socket_0", prefix="", suffix="", interpret_escape=False, timeout=2',
+        "",
+    ),
+    "socket_send_byte": ('value, socket_name="socket_0"', False),
+    "socket_send_int": ('value, socket_name="socket_0"', False),
+    "socket_send_line": ('str, socket_name="socket_0"', False),
+    "socket_send_string": ('str, socket_name="socket_0"', False),
+    "socket_set_var": ('name, value, socket_name="socket_0"', None),
+}
+"""Signature of each, and its value where nothing can be reached; the lists are those of a failed read of any length."""
 _JOINTS = Array((0.0,) * 6)
 _STATE: dict[str, Value] = {
     "get_actual_joint_positions": _JOINTS,
@@ -100,6 +119,8 @@ class Memory:
         for name, text in _SETTINGS.items():
             setting = signature(text)
             table[name] = (setting, self._note(name, setting))
+        for name, (text, value) in _SOCKETS.items():
+            table[name] = (signature(text, blocks=True), _failing(value))
         for name, value in _STATE.items():
             table[name] = (signature(""), lambda value=value: value)
         for kind, word in (("int", "integer"), ("double", "float"), ("bit", "boolean")):
@@ -184,6 +205,14 @@ def _false(n: Value) -> bool:
 def _zero(n: Value) -> float:
     integer(n, "the number of an input")
     return 0.0
+
+
+def _failing(value: Value) -> Callable[..., Generator[None, None, Value]]:
+    def fail(*_: Value) -> Generator[None, None, Value]:
+        yield
+        return value
+
+    return fail
 
 
 def _sync() -> Generator[None, None, None]:

@@ -55,7 +55,7 @@ def run(
     Args:
         file: Program to run; - reads the standard input.
         lockstep: Run as fast as this machine computes, without network; the arm moves exactly as in real time. A
-            program that waits for a client then waits for ever: see --input and --timeout.
+            program that waits for a client then waits for ever: see --input and --timeout. It cannot open sockets.
         robot: Name of a robot that comes with the package, or path of a robot file [ur5e].
         profile: Set of defaults, see tvist serve: ursim, which is like UR's simulator, or real, which has a payload,
             noise, a floor, sag and shaper zv [ursim].
