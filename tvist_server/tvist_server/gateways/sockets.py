@@ -182,11 +182,10 @@ class ProgramSockets(Gateway, SocketPorts):
         return max(0.0, max(begun for _, begun in waits) + PATIENCE - now)
 
     def _after(self, seconds: float, news: SocketNews) -> None:
+        loop = self._loop
         if seconds <= 0.0:
             self._tell_controller(news)
-        else:
-            loop = self._loop
-            assert loop is not None, "only an open socket has something to wait for"
+        elif loop is not None:  # otherwise the server is ending
             self._soon(lambda: loop.call_later(seconds, self._tell_controller, news))
 
     def _soon(self, action: Callable[[], object]) -> None:
