@@ -42,7 +42,11 @@ def follow():
 end
 """
 """What the library's program does in its servo mode, with registers in place of the socket: one thread takes the
-positions that arrive, another passes the latest ones to `servoj`."""
+positions that arrive, another passes the latest ones to `servoj`.
+
+The library's own also extrapolates in ticks in which nothing arrives, which does not happen here. Its critical sections
+are left out, since they change nothing.
+"""
 BEFORE = 5
 """Ticks at rest before the first position is sent."""
 
