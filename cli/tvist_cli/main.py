@@ -30,6 +30,7 @@ COMMANDS = {
     "identify": "Calibrate a robot from its own accelerometer.",
     "evaluate": "Compare the vibration of any moves unshaped and shaped.",
     "paths": "Compare paths shaped along the path with the same paths shaped joint by joint.",
+    "tracking": "Measure how closely the arm follows positions sent to servoj, with every shaper.",
     "shaperbench": "Rank shapers, your own included, on eight simulated arms.",
     "search": "Search for cases in which a robot breaks its promises.",
     "bench": "Measure how fast tvist runs on this machine.",

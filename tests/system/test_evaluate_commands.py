@@ -219,3 +219,20 @@ class TestShaperBench:
     )
     def test_misuse_is_said(self, arguments, words):
         assert_misuse(shaperbench, arguments, words)
+
+
+class TestTracking:
+    def test_each_shaper_has_errors_at_each_speed_and_the_page_the_same(self, tmp_path):
+        made = tmp_path / "page.md"
+        told = tvist(
+            "tracking", "--shapers", "auto", "--speeds", 1, 0.5, "--markdown", made, "--json"
+        ).assert_done().json  # fmt: skip
+        assert told["speeds_rad_s"] == [0.5, 1.0]
+        assert [(one["name"], one["shaped"]) for one in told["shapers"]] == [("none", False), ("auto", True)]
+        for one in told["shapers"]:
+            assert {"error_rad", "within", "speed_at_tolerance_rad_s", "lag_ms"} <= set(one["ramp"])
+            assert one["ramp"]["within"] == one["jump"]["within"] == [True, True]
+            assert one["ramp"]["error_rad"][1] > one["ramp"]["error_rad"][0] > 0.0
+        page = made.read_text(encoding="utf-8")
+        assert told["command"] in page
+        assert all(f"{error:.3f}" in page for one in told["shapers"] for error in one["jump"]["error_rad"])
