@@ -557,3 +557,14 @@ def test_the_history_of_the_joints_has_the_present_from_the_first_tick():
     robot = a_robot()
     run(robot, "textmsg(norm(get_actual_joint_positions_history(0) - get_actual_joint_positions()))")
     assert said(robot) == ["0"]
+
+
+def test_a_servoj_to_where_the_arm_rests_is_no_motion():
+    """Clients that hold a posture repeat it 500 times a second."""
+    robot = run(a_robot(), "q = get_target_joint_positions()", *["servoj(q)"] * 50, "textmsg(get_steptime())")
+    assert robot.kinds().count("motion_started") == 0
+    moved = run(
+        a_robot(),
+        f"while True:\n servoj({NEAR})\n if get_target_joint_positions() == {NEAR}:\n halt\n end\n end",
+    )
+    assert moved.kinds().count("motion_started") == 1

@@ -9,7 +9,7 @@ from tvist_lab.safety.subject import RigidArm
 from tvist_lab.tracking.following import BEFORE, LOOKAHEAD, TrackingError, follow
 from tvist_lab.tracking.report import columns, page, report, rows
 from tvist_lab.tracking.study import UNSHAPED, Tracked, TrackingJob, compare, refusal, speed_at, track
-from tvist_lab.tracking.ways import CONSTANT, RAMP, WAYS, jump, level_end, ramp
+from tvist_lab.tracking.ways import CONSTANT, RAMP, WAYS, jump, level_end, ramp, turn
 from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD
 
@@ -43,6 +43,13 @@ class TestWays:
         end = level_end(speed)
         assert qd[end - 1, 0] == pytest.approx(speed)
         assert qd[end + 1, 0] < speed - 1e-3
+
+    def test_a_turn_is_the_same_for_all_joints_from_wherever_they_are(self):
+        q = turn(START, 2.0)
+        assert q[0] == pytest.approx(START)
+        assert q[125] == pytest.approx(START + 0.5)
+        assert q[-1] == pytest.approx(START + 1.0)
+        assert np.flatnonzero(np.diff(q[:, 0]))[-1] == 249
 
     def test_the_jump_is_the_drivers_test(self):
         q = jump(START, 2.0)
@@ -88,6 +95,11 @@ class TestLag:
 
 
 class TestDriversTest:
+    def test_from_the_start_posture_its_motion_is_inside_its_tolerance(self):
+        found = track(TrackingJob(UNSHAPED, 0.0, "turn", 2.0))
+        assert found.error > 2.0 * LAG
+        assert found.within(0.2)
+
     def test_the_stretched_arm_falls_further_behind_than_the_lag(self):
         found = track(TrackingJob(UNSHAPED, 0.0, "jump", 2.0))
         assert found.lag is None

@@ -28,10 +28,11 @@ def tracking(
 ) -> None:
     """Measure how closely a UR5e follows joint positions that a client sends to servoj 500 times a second.
 
-    Each shaper follows two trajectories at several speeds: a motion of the first joint that the arm can make, and that
-    of the ROS 2 driver's test test_trajectory_scaled, which moves all joints at once and begins with a jump of their
-    velocity. Reported are the largest difference between wanted and actual position, and the speed at which it reaches
-    the path tolerance. The robot is that of tvist serve --ur, once without --shape-servo and then with it.
+    Each shaper follows three trajectories at several speeds: a motion of the first joint that the arm can make, one of
+    all joints at once that begins with a jump of their velocity, and that of the ROS 2 driver's test
+    test_trajectory_scaled, which does the same with the arm stretched out. Reported are the largest difference between
+    wanted and actual position, and the speed at which it reaches the path tolerance. The robot is that of
+    tvist serve --ur, once without --shape-servo and then with it.
 
     Args:
         shapers: Names of the shapers to compare, or FILE.py:NAME [all that the robot can use].

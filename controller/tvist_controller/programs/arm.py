@@ -195,11 +195,11 @@ class ProgramArm:
 
     # ------------------------------------------------------------------ guided motions
 
-    def guide(self, start: Callable[[bool], int], wait: Callable[[], Iterator[None]]) -> Turns:
+    def guide(self, start: Callable[[bool], int | None], wait: Callable[[], Iterator[None]]) -> Turns:
         """Begin or change a guided motion, which goes on when the call returns.
 
         Args:
-            start: Begins it, shaped or not; returns its number.
+            start: Begins it, shaped or not; returns its number, or None if there is nothing to move.
             wait: Lets time pass until the call returns.
 
         Raises:
@@ -218,7 +218,7 @@ class ProgramArm:
         activity = self._motion.activity
         return (activity.moving or activity.protective) and after(activity, "speed_j") is None
 
-    def steer(self, start: Callable[[bool], int]) -> None:
+    def steer(self, start: Callable[[bool], int | None]) -> None:
         """Begin or change a guided motion within a call of `guide`; see there. In a protective stop nothing happens."""
         motion = self._motion
         if motion.activity.protective:
@@ -229,7 +229,8 @@ class ProgramArm:
         )
         self._number, self._outcome, self._own = None, None, True
         try:
-            self._guided, self._driver = start(shaped), self._thread()
+            self._guided = start(shaped)
+            self._driver = None if self._guided is None else self._thread()
         except RefusalError as refusal:
             raise Fault(refusal.reply.why) from refusal
         finally:

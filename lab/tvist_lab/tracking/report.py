@@ -8,6 +8,7 @@ from tvist_lab.tracking.ways import APPROACH, CONSTANT, DISTANCE, RAMP, WayName
 
 TITLES: Mapping[WayName, str] = {
     "ramp": f"first joint alone, speeding up and slowing down with {RAMP:g} rad/s²",
+    "turn": "all joints by 1 rad at once from the start posture, the velocity jumps",
     "jump": "test_trajectory_scaled: all joints at once, the velocity jumps",
 }
 """Titles of the tables."""
@@ -105,6 +106,14 @@ calibration of the package, which was made with 5 kg, and so do their mean delay
 {_table(result, "ramp")}
 
 Without shaping the lag is {lag:.1f} ms: the lookahead of {1e3 * ahead:g} ms and two ticks.
+
+## All joints at once
+
+From the posture in which the robot starts, all joints turn by {DISTANCE:g} rad at once, with a velocity that jumps at
+both ends. 2 rad/s is {DISTANCE:g} rad in 0.5 s, as in the driver's test `test_trajectory_scaled`. The acceleration
+that the joints' torques permit adds to the lag.
+
+{_table(result, "turn")}
 
 ## The driver's test
 

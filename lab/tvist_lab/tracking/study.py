@@ -61,7 +61,7 @@ class Tracked:
     error: float
     """Largest |wanted - actual| over joints and time [rad]."""
     lag: float | None
-    """Time by which the first joint is late where a ramp is at constant speed [s]; None for a jump."""
+    """Time by which the first joint is late where a ramp is at constant speed [s]; None for other trajectories."""
     mean_delay: float
     """Mean delay of the shaper [s]."""
 

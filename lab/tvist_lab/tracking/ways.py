@@ -9,7 +9,7 @@ import numpy as np
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
 
-WayName = Literal["ramp", "jump"]
+WayName = Literal["ramp", "turn", "jump"]
 
 APPROACH = 6.0
 """Time in which the trajectory of the driver's test reaches its first point [s]."""
@@ -42,6 +42,20 @@ def jump(start: Floats, speed: float) -> Floats:
     return np.column_stack([np.interp(t, points, (q, 0.0, -DISTANCE)) for q in start])
 
 
+def turn(start: Floats, speed: float) -> Floats:
+    """The fast part of that test from where the arm is at the start: every joint by 1 rad at once, at constant speed.
+
+    Args:
+        start: Joint positions at rest, shape (n,) [rad].
+        speed: Speed of every joint [rad/s].
+
+    Returns:
+        Wanted positions, one for each tick, the first at the start, shape (T, n) [rad].
+    """
+    duration = DISTANCE / speed
+    return start + DISTANCE * np.clip(_ticks(duration) / duration, 0.0, 1.0)[:, np.newaxis]
+
+
 def ramp(start: Floats, speed: float) -> Floats:
     """Trajectory of the first joint alone: speed up with 4 rad/s², 0.5 s at constant speed, and slow down likewise.
 
@@ -66,7 +80,9 @@ def level_end(speed: float) -> int:
     return int((speed / RAMP + CONSTANT) / PERIOD + 1e-9)
 
 
-WAYS: Mapping[WayName, Callable[[Floats, float], Floats]] = MappingProxyType({"ramp": ramp, "jump": jump})
+WAYS: Mapping[WayName, Callable[[Floats, float], Floats]] = MappingProxyType(
+    {"ramp": ramp, "turn": turn, "jump": jump}
+)
 """The trajectories by name."""
 
 

@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from tvist_controller.control.differentiator import Floats
+from tvist_controller.cycle import STILL
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import integer, is_pose, number, numbers, pose, positive, shown
 from tvist_controller.programs.arm import ProgramArm, Turns
@@ -14,6 +15,7 @@ from tvist_controller.refusal import SLOWEST, RefusalError, check_joints
 from tvist_controller.trajectory import Guided, JointSpeed, ToolSpeed
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment
+from tvist_protocol.transitions import Activity
 from tvist_urscript import Array, Fault, signature
 
 MAX_BLEND: Final = 10.0
@@ -124,7 +126,10 @@ class MotionFunctions:
         ticks = _ticks("t", t)
         lookahead, abruptness = positive("lookahead_time", lookahead_time), positive("gain", gain)
 
-        def start(shaped: bool) -> int:
+        def start(shaped: bool) -> int | None:
+            rests = self._access.motion.activity is Activity.REST
+            if rests and np.abs(posture - self._reference).max() <= STILL:
+                return None  # clients repeat where the arm is: no motion of a tick for each
             return self._access.guidance.servo(posture, lookahead, abruptness, shaped=shaped)
 
         yield from self._arm.guide(start, lambda: iter([None] * max(ticks, 1)))
