@@ -509,6 +509,17 @@ def test_the_bench_gives_the_figures_of_served_robots():
     assert said["robots_at_500_hz"] >= 0
 
 
+def test_a_program_that_is_steered_over_a_socket_reads_what_the_client_sends():
+    said = tvist("bench", "--reverse", 1, "--json").assert_done().json
+    assert said.keys() == {
+        "seconds", "ticks", "missed", "messages", "timeouts", "timeouts_alone", "longest_gap_ms",
+        "echo_messages", "echo_timeouts", "echo_longest_gap_ms",
+    }  # fmt: skip
+    assert said["messages"] > 0
+    assert said["echo_messages"] > 0
+    assert said["timeouts_alone"] <= said["timeouts"]
+
+
 @pytest.mark.slow
 def test_a_short_soak_loses_nothing_and_says_what_it_saw():
     said = tvist("bench", "--soak", 0.1, "--json").assert_done().json

@@ -13,6 +13,7 @@ def bench(
     soak: float | None = None,
     hostile: int | None = None,
     viewed: int | None = None,
+    reverse: float | None = None,
     json: bool = False,
 ) -> None:
     """Measure the plant, the filter, the whole control cycle, a served robot, and how many robots one core can run.
@@ -24,28 +25,37 @@ def bench(
             type and size, valid and invalid, in this many pairs of runs of --seconds each.
         viewed: Instead, compare how late a served robot's ticks are with and without a page of tvist view, in this
             many pairs of runs of --seconds each, and report the page's pictures per second and its memory.
+        reverse: Instead, for this many seconds, let a client steer the program of a served robot over a socket at
+            500 Hz, as a driver does, and count the program's time-outs; two bare processes do the same meanwhile.
         json: Print one JSON object.
     """
-    if seconds < 0.0:
-        raise Failure(f"seconds is {seconds:g}: must be at least 0", code=2)
-    if soak is not None and soak <= 0.0:
-        raise Failure(f"soak is {soak:g} minutes: must be more than 0", code=2)
-    for name, pairs in (("hostile", hostile), ("viewed", viewed)):
-        if pairs is not None and not (pairs >= 2 and seconds > 0.0):
-            raise Failure(
-                f"{name} is {pairs}: must be at least 2 pairs of runs, of more than 0 seconds", code=2
-            )
+    _check(seconds, {"soak": soak, "reverse": reverse}, {"hostile": hostile, "viewed": viewed})
     try:
         if hostile is not None:
             _hostile(hostile, seconds, json)
         elif viewed is not None:
             _viewed(viewed, seconds, json)
+        elif reverse is not None:
+            _reverse(reverse, json)
         elif soak is not None:
             _soak(soak, json)
         else:
             _all(seconds, json)
     except KeyboardInterrupt:
         raise interrupted("the measurements so far are lost; the served robots have stopped") from None
+
+
+def _check(seconds: float, durations: dict[str, float | None], runs: dict[str, int | None]) -> None:
+    if seconds < 0.0:
+        raise Failure(f"seconds is {seconds:g}: must be at least 0", code=2)
+    for name, duration in durations.items():
+        if duration is not None and not duration > 0.0:
+            raise Failure(f"{name} is {duration:g}: must be more than 0", code=2)
+    for name, pairs in runs.items():
+        if pairs is not None and not (pairs >= 2 and seconds > 0.0):
+            raise Failure(
+                f"{name} is {pairs}: must be at least 2 pairs of runs, of more than 0 seconds", code=2
+            )
 
 
 def _all(seconds: float, json: bool) -> None:
@@ -83,6 +93,17 @@ def _viewed(pairs: int, seconds: float, json: bool) -> None:
     _pairs(result, f"{pairs} pairs of {seconds:g} s, without and with a page")
     figures = {key: value for key, value in result.items() if not isinstance(value, dict)}
     table("the page", ("what", "figure"), [(key, f"{value:.4g}") for key, value in figures.items()])
+
+
+def _reverse(seconds: float, json: bool) -> None:
+    from tvist_lab.benchmark.reverse import reverse
+
+    result = asyncio.run(reverse(seconds, tell=say))
+    if json:
+        print_json(result)
+        return
+    rows = [(key, f"{value:.6g}") for key, value in result.items()]
+    table("a program steered over a socket", ("what", "figure"), rows)
 
 
 def _pairs(result: dict[str, Any], title: str) -> None:

@@ -62,15 +62,23 @@ class Client:
         data = self.socket.recv(65536)
         self._data += data
         while len(self._data) >= 3 and len(self._data) >= (size := int.from_bytes(self._data[:2], "big")):
-            if self._data[2] == ord("U"):
-                (stamp,) = struct.unpack_from(">d", self._data, 4)
-                tick = round(stamp / PERIOD)
-                if self._last is not None:
-                    self.lost += tick - self._last - 1
-                self._last = tick
-                self.received += 1
-            self._data = self._data[size:]
+            package, self._data = self._data[:size], self._data[size:]
+            if package[2] == ord("U"):
+                self.sample(package[4:])
         return bool(data)
+
+    def sample(self, values: bytes) -> None:
+        """Count a sample.
+
+        Args:
+            values: The values of its recipe, `timestamp` first.
+        """
+        (stamp,) = struct.unpack_from(">d", values)
+        tick = round(stamp / PERIOD)
+        if self._last is not None:
+            self.lost += tick - self._last - 1
+        self._last = tick
+        self.received += 1
 
     def _ask(self, kind: str, payload: bytes) -> bytes:
         self.socket.sendall(struct.pack(">HB", 3 + len(payload), ord(kind)) + payload)
