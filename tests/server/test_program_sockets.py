@@ -214,6 +214,19 @@ def test_a_time_out_waits_for_the_wall_and_only_for_waits_that_ask():
     with_sockets(test)
 
 
+def test_what_has_arrived_is_told_before_a_time_out():
+    async def test(side):
+        await side.connect()
+        _, writer = await side.accepted.get()
+        side.sockets.carry_out([Wait(7, 1)])
+        writer.write(b"x")  # is with the system now, but the network's thread has not read it yet
+        side.sockets.carry_out([Expire(7, 1, 0.0)])
+        await side.until(lambda: "expired" in side.changes())
+        assert side.changes() == ["opened", "received", "expired"]
+
+    with_sockets(test)
+
+
 def test_a_step_waits_for_a_socket_that_is_read_but_not_once_something_came():
     async def test(side):
         sockets = side.sockets

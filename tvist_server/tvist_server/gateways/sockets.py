@@ -182,11 +182,10 @@ class ProgramSockets(Gateway, SocketPorts):
         return max(0.0, max(begun for _, begun in waits) + PATIENCE - now)
 
     def _after(self, seconds: float, news: SocketNews) -> None:
-        loop = self._loop
-        if seconds <= 0.0:
-            self._tell_controller(news)
-        elif loop is not None:  # otherwise the server is ending
-            self._soon(lambda: loop.call_later(seconds, self._tell_controller, news))
+        """Tell the controller in the network's thread, so that what has arrived by then is told first."""
+        self._soon(
+            lambda: asyncio.get_running_loop().call_later(max(0.0, seconds), self._tell_controller, news)
+        )
 
     def _soon(self, action: Callable[[], object]) -> None:
         """Have something done in the network's thread."""
