@@ -65,7 +65,7 @@ KNOWN = {
     "DashboardClientTestG5.operational_mode": "needs a robot in local control, and this one is in remote control",
     "DashboardClientTestG5.cb3_version": "needs a robot of the CB3 series, and skips itself",
 }
-"""Tests that do not pass, and why this is not the robot's fault."""
+"""Tests that do not pass, and why this is not a fault of the robot."""
 
 EXAMPLES = {
     "dashboard_example": (),
@@ -81,12 +81,17 @@ EXAMPLES = {
     "trajectory_streaming_example": (),
     "instruction_executor": (),
     "send_script": (),
-    "external_fts_through_rtde": ("10",),
     "tool_contact_example": ("10",),
 }
-"""Examples that end by themselves, and their arguments after the address: how many seconds they take, mostly."""
-KNOWN_EXAMPLES: dict[str, str] = {}
-"""Examples that do not end well, and why this is not the robot's fault."""
+"""Examples that end by themselves, and their arguments after the address: mostly how many seconds they take.
+
+`external_fts_through_rtde` waits for keys, and `direct_torque_control_example` needs PolyScope 5.23.
+"""
+KNOWN_EXAMPLES = {
+    "freedrive_example": "needs moving the arm by hand, which is not simulated",
+    "tool_contact_example": "needs detecting contacts, which is not simulated",
+}
+"""Examples that do not end well, and what the simulated robot cannot do."""
 
 
 class Result(NamedTuple):
