@@ -74,6 +74,7 @@ MISUSE = [
     (("search", "--stops", "0", "--streams", "0", "--changes", "0", "--sequences", "0"), ["nothing to search"]),
     (("bench", "--seconds", "-1"), ["seconds is -1", "at least 0"]),
     (("bench", "--soak", "0"), ["soak is 0"]),
+    (("bench", "--reverse", "0"), ["reverse is 0"]),
     (("watch", "--seconds", "0"), ["seconds is 0", "more than 0"]),
     (("record", "x.mcap", "--seconds", "-3"), ["seconds is -3"]),
     (("shaperbench", "--moves", "0"), ["moves is 0", "1 to 10000"]),
