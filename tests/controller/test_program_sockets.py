@@ -204,6 +204,17 @@ def test_a_socket_that_was_never_opened_reads_nothing_and_sends_nothing():
     assert said(robot) == ["", "False"]
 
 
+def test_a_client_that_sends_more_than_a_program_reads_in_a_tick_is_no_endless_loop():
+    robot, far = opened("while True:", "  socket_read_binary_integer(1, timeout=0)", "end")
+    for _ in range(200):
+        far.tell("received", bytes(4000))
+        robot.tick()
+    assert playing(robot)
+    far.take()
+    read = sum(order.amount for order in far.orders if isinstance(order, Taken))
+    assert 200 * 4 * 20 < read < 200 * 4000
+
+
 @pytest.mark.parametrize(
     ("call", "sent"),
     [

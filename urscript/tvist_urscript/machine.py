@@ -129,6 +129,10 @@ class Machine:
         if failed is not None:
             raise failure(failed) from failed
 
+    def progress(self) -> None:
+        """Note that the thread that runs has got something from outside, so it is not in an endless loop."""
+        self._running.spent = 0
+
     def charge(self, work: int) -> None:
         """Take the elements of a list from the budget.
 

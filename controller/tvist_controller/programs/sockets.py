@@ -22,7 +22,7 @@ from tvist_controller.programs.socket_traffic import (
     Waited,
 )
 from tvist_plant.plant import PERIOD
-from tvist_urscript import Fault
+from tvist_urscript import Fault, Machine
 
 MAX_SOCKETS = 16
 """Sockets that a program may have at a time."""
@@ -49,15 +49,15 @@ class Sockets:
 
     Args:
         emit: Emits events.
-        owner: Returns what identifies the program that runs now.
+        owner: Returns the program that runs now.
         origin: Returns the address of the machine that started the program that runs now; None if it is unknown.
     """
 
-    def __init__(self, emit: Emit, owner: Callable[[], object], origin: Callable[[], str | None]) -> None:
+    def __init__(self, emit: Emit, owner: Callable[[], Machine], origin: Callable[[], str | None]) -> None:
         self._emit, self._owner, self._origin = emit, owner, origin
         self.orders: list[SocketOrder] = []
         """Orders for the network, in their order, which the host takes away."""
-        self._named: dict[tuple[object, str], _Socket] = {}
+        self._named: dict[tuple[Machine, str], _Socket] = {}
         self._numbered: dict[int, _Socket] = {}
         self._last = self._last_wait = 0
         self._waits: dict[int, bool] = {}
@@ -175,7 +175,7 @@ class Sockets:
         finally:
             self._end(wait)
 
-    def close(self, owner: object) -> None:
+    def close(self, owner: Machine) -> None:
         """Close all sockets of a program, which has ended."""
         for one, name in tuple(self._named):
             if one is owner:
@@ -188,6 +188,7 @@ class Sockets:
         found = take(bytes(socket.received)) if socket.received else None
         if found is not None:
             del socket.received[: found[1]]
+            self._owner().progress()
             if socket.number in self._numbered:  # another thread may have closed it
                 self.orders.append(Taken(socket.number, found[1]))
         return found
@@ -202,7 +203,7 @@ class Sockets:
         del self._waits[wait]
         self.orders.append(Waited(wait))
 
-    def _drop(self, owner: object, name: str) -> None:
+    def _drop(self, owner: Machine, name: str) -> None:
         socket = self._named.pop((owner, name))
         del self._numbered[socket.number]
         socket.opening = socket.open = False
