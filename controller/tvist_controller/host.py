@@ -73,6 +73,7 @@ class Host:
         except Exception:
             self._note(entry)  # needed to reproduce the error
             raise
+        self._carry_out_orders()  # of programs that it has ended
         # A command of the client in control renews the lease even if it is refused; another client's does not.
         if not isinstance(reply, Refused) or self._is_holders(command):
             self._note(entry)
@@ -95,6 +96,7 @@ class Host:
         if session in self._standing().sessions_of(client):
             self._note(Entry(tick=self._next, kind="client_gone", client=client, session=session))
             self.controller.client_gone(client, session)
+            self._carry_out_orders()
             self.standing = self._standing()
 
     def missed(self, ticks: int) -> None:

@@ -297,8 +297,8 @@ def main() -> None:
     if missing := set(options.only) - set(chosen):
         parser.error(f"there is no {', '.join(sorted(missing))}; there are {', '.join(available)}")
     options.logs.mkdir(parents=True, exist_ok=True)
-    for old in options.logs.glob("*.txt"):
-        old.unlink()
+    for name in ("server", *available):  # what this script has written before, and nothing else
+        (options.logs / f"{name}.txt").unlink(missing_ok=True)
     log = options.logs / "server.txt"
     unknown = 0
     with namespaces() as names, server(names, options.tvist, options.serve.split(), log) as served:

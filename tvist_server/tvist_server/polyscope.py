@@ -66,7 +66,7 @@ def with_external_control(text: str, sent: str) -> str:
     header, mark, part = sent.partition(_HEADER_ENDS)
     if not mark:
         header, part = "", sent
-    first, rest = text.split("\n", 1)
+    first, _, rest = text.partition("\n")
     return f"{first}\n{header}{mark}\n{rest.replace(EXTERNAL_CONTROL, part)}"
 
 

@@ -11,6 +11,7 @@ from tvist_server.gateways.ur.program_request import ProgramRequests
 from tvist_server.gateways.ur.programs import Programs
 from tvist_server.program_folder import ProgramFolder
 
+from .conftest import io
 from .hosts import told
 
 SENT = "# HEADER_BEGIN\nglobal a = 1\n# HEADER_END\nwhile a < 2:\n  sync()\nend\n# NODE_CONTROL_LOOP_ENDS\n"
@@ -64,6 +65,33 @@ def test_a_text_that_is_not_valid_is_an_exception_and_starts_nothing(robot, cont
     programs.play(control, heard.append)
     assert heard == [False]
     assert [message.kind for message in told(robot)] == [10]
+
+
+@pytest.mark.parametrize("what", ["stop", "load", "play"])
+def test_what_comes_while_a_machine_is_asked_counts(robot, control, what):
+    waiting = []
+    programs = Programs(robot, ExternalControl(None, lambda _, then: waiting.append(then)))
+    programs.load("external_control.urp", control, lambda _: None)
+    heard = []
+    programs.play(control, lambda well: heard.append(("first", well)))
+    if what == "stop":
+        programs.stop(control, lambda _: None)
+    elif what == "load":
+        programs.load("Q1.urp", control, lambda _: None)
+    else:
+        programs.play(control, lambda well: heard.append(("second", well)))
+    for then in waiting:
+        then(SENT)
+    assert heard == [("first", False)] + ([("second", True)] if what == "play" else [])
+    assert len(control.of(ProgramPlay)) == (1 if what == "play" else 0)
+
+
+def test_a_script_of_this_name_that_a_client_has_sent_is_played_as_it_is(robot, control):
+    programs, client = of(robot)
+    programs.io(io(program="external_control"))
+    programs.play(control, lambda _: None)
+    assert not client.asked
+    assert len(control.of(ProgramPlay)) == 1
 
 
 def test_a_paused_one_goes_on_as_it_is(robot, control):

@@ -230,7 +230,7 @@ class ProgramSockets(Gateway, SocketPorts):
         with contextlib.suppress(OSError, UnicodeError, TimeoutError, ValueError):
             async with asyncio.timeout(CONNECT_WITHIN):
                 for address in await self._addresses(order):
-                    with contextlib.suppress(ConnectionError):
+                    with contextlib.suppress(OSError):
                         await loop.create_connection(lambda: link, address, order.port)
                         return
         link.end("failed")

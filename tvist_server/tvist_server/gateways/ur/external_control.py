@@ -8,9 +8,9 @@ from tvist_plant.user_file import UserFileError
 from tvist_server.polyscope import EXTERNAL_CONTROL, program, with_external_control
 from tvist_server.program_folder import ProgramFolder
 
-NAME: Final = "external_control"
+FILE: Final = "external_control.urp"
 """Program that consists of the node alone, which exists without a file."""
-ALONE: Final = program(NAME, EXTERNAL_CONTROL)
+ALONE: Final = program("external_control", EXTERNAL_CONTROL)
 
 Fetch = Callable[[str, Callable[[str | None], None]], None]
 """Asks a machine for its part of the program, and calls back with it; with None if it does not answer."""
@@ -33,7 +33,7 @@ class ExternalControl:
         if self._folder is not None:
             with suppress(UserFileError):  # loading it says what is wrong
                 text = self._folder.read(name)
-        if text is None and name.partition(".")[0] == NAME:
+        if text is None and name == FILE:
             return ALONE
         return text if text is not None and EXTERNAL_CONTROL in text else None
 

@@ -70,6 +70,8 @@ async def _requested(host: str) -> str:
             if not piece:
                 break
             received += piece
+        if len(received) > MAX_SCRIPT:
+            raise OSError(f"it has more than {MAX_SCRIPT} bytes")
         if not received.strip():
             raise TimeoutError("it sent nothing")
         return received.decode()

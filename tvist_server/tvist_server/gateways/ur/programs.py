@@ -73,6 +73,8 @@ class Programs:
         self._beside: list[ControllerAccess] = []
         """Accesses of clients whose secondary programs run. They last until no secondary program runs."""
         self._running_beside = 0
+        self._asked: object | None = None
+        """The request to play a program whose client is being asked for its text; None if there is none."""
 
     @property
     def name(self) -> str | None:
@@ -99,7 +101,7 @@ class Programs:
             control: Access of the client that loads it.
             outcome: Called once.
         """
-        name = PurePosixPath(path).name
+        name, self._asked = PurePosixPath(path).name, None
 
         def then(reply: Reply) -> None:
             refused = reply if isinstance(reply, Refused) else None
@@ -153,19 +155,22 @@ class Programs:
         if text is None:
             self._play(control, heard)
             return
+        asked = self._asked = object()
 
         def completed(whole: str | None) -> None:
-            def loaded(reply: Reply) -> None:
-                if isinstance(reply, Refused):
-                    self._except(reply)
-                    heard(False)
-                else:
-                    self._play(control, heard)
-
-            if whole is None:
+            # Meanwhile it may have been stopped, or another program loaded or started.
+            wanted = self._asked is asked and (self.name, self.state) == (name, "STOPPED")
+            if whole is None or not wanted:
                 heard(False)
             else:
                 control.ask(ProgramLoad(name=name, text=whole), loaded)
+
+        def loaded(reply: Reply) -> None:
+            if isinstance(reply, Refused):
+                self._except(reply)
+                heard(False)
+            else:
+                self._play(control, heard)
 
         self._external.complete(text, control.host, completed)
 
@@ -202,6 +207,7 @@ class Programs:
             control: Access of the client that stops it.
             heard: Called once.
         """
+        self._asked = None
         control.ask(ProgramStop(), self._changed("STOPPED", heard))
 
     def close_popup(self, control: ControllerAccess, heard: Heard) -> None:
