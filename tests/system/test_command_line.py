@@ -437,7 +437,7 @@ def test_help_and_version_are_no_errors():
     assert tvist("--version").assert_done().out.strip().count(".") == 2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_identify_reports_how_good_the_calibration_is_and_serve_takes_it(tmp_path):
     path = tmp_path / "mine.json"
     options = ("--configurations", 40, "--repeats", 1, "--output", path, "--json")

@@ -115,7 +115,7 @@ def test_a_disk_that_does_not_answer_for_a_second_costs_nothing(system, tmp_path
     assert content.states[-1].tick >= last
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_disk_that_does_not_answer_for_longer_loses_what_is_counted_and_nothing_else(system, tmp_path):
     path = tmp_path / "run.mcap"
     # Twice as fast, with the truth: the recorder's queue is full after about four seconds.

@@ -40,6 +40,7 @@ def idle_connections(endpoint):
     return [socket.create_connection((host, int(port))) for _ in range(100)]
 
 
+@pytest.mark.nightly
 def test_a_hundred_idle_connections_lock_nobody_out(served, operator, ring):
     """By default Zenoh turns everybody away while a hundred connections shake no hands."""
     idle = idle_connections(served.endpoint)
