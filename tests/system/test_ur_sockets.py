@@ -1,5 +1,6 @@
 """Programs that connect to their client and are steered by it: whatever becomes of the client, the arm stops."""
 
+import itertools
 import signal
 import socket
 import struct
@@ -84,30 +85,34 @@ end
 
 
 def test_in_lockstep_a_step_waits_for_what_a_program_reads_and_for_a_silent_client_only_a_second(tmp_path):
-    """The client answers late on the wall, and so in each tick anew: no time-out of two ticks is met."""
+    """The client answers late on the wall, but in each tick: no time-out of two ticks is met until it is silent."""
     path = tmp_path / "run.mcap"
-    with lockstep(52, path) as (served, host), Wire(served.endpoint) as stepper:
+    with (
+        lockstep(52, path) as (served, host),
+        Wire(served.endpoint) as stepper,
+        Wire(served.endpoint) as other,
+    ):
         clock = take_clock(stepper)
-        stepper.listen("io", "state")
+        other.listen("io")
         stepper.step(clock, 1)
+        begin_step(stepper, clock, 100_000)
         with socket.create_server((host, 0)) as server, socket.create_connection((host, 30001)) as script:
-            port = server.getsockname()[1]
-            script.sendall(ECHO.format(host=host, port=port).encode())
-            answers = begin_step(stepper, clock, 40)
+            script.sendall(ECHO.format(host=host, port=server.getsockname()[1]).encode())
             stream, _ = server.accept()
             with stream:
                 for number in range(20):
-                    time.sleep(0.01)  # a client that is slow, five times as slow as its robot's clock
+                    time.sleep(0.01)  # five times as slow as the robot's clock
                     stream.sendall(struct.pack(">i", number))
                     assert stream.recv(4, socket.MSG_WAITALL) == struct.pack(">i", number)
                 begun = time.monotonic()
-                next(iter(answers))
+                other.wait("io", lambda io: io["output_int_register"][0] > 0)
                 assert time.monotonic() - begun >= 0.5
-        latest = stepper.received["io"][-1]
-        assert latest["output_int_register"][0] > 0  # now it has timed out
         assert served.end() == 0
-    content = replayed(path)
-    assert sum(entry.change == "received" for entry in content.journal) == 20
+    journal = [entry for entry in replayed(path).journal if entry.kind == "socket"]
+    ticks = [entry.tick for entry in journal if entry.change == "received"]
+    assert len(ticks) == 20
+    assert {after - before for before, after in itertools.pairwise(ticks)} == {1}
+    assert all(entry.tick > ticks[-1] for entry in journal if entry.change == "expired")
 
 
 @pytest.mark.realtime
