@@ -365,7 +365,7 @@ COMMANDS = {
 }
 
 
-@examples(60)
+@examples(40)
 @given(
     st.lists(st.tuples(st.sampled_from(sorted(COMMANDS)), st.sampled_from([0, 1, 3, 100, 600])), max_size=25)
 )

@@ -23,7 +23,7 @@ def measured(plan: MeasurementPlan):
     return asyncio.run(run())
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_small_identification_with_another_seed_is_already_near_the_truth():
     plan = MeasurementPlan(configurations=45, anchors=(pose("Q1"), pose("Q3")), repeats=2, seed=11)
     done = measured(plan)
