@@ -255,6 +255,22 @@ def test_what_is_read(call, received, value):
         assert far.sent == b"GET POS\n"
 
 
+def test_a_number_of_any_length_is_refused_at_once():
+    robot, far = opened("x = socket_read_ascii_float(1)", "textmsg(x[0])")
+    far.tell("received", b"(" + b"1" * 60_000 + b"x)")
+    finish(robot)
+    assert said(robot) == ["0"]
+
+
+def test_a_name_that_is_not_utf_8_can_be_told():
+    robot, far = opened("x = socket_read_string()", "socket_open(x, 5, x)")
+    far.tell("received", b"\xff\xfe")
+    robot.tick(2)
+    far.tell("failed", number=2)
+    finish(robot)
+    assert all(event.why is None or event.why.encode() for event in robot.events)
+
+
 def test_text_that_follows_a_suffix_stays():
     robot, far = opened(*['textmsg(socket_read_string(prefix=">", suffix="<"))'] * 2)
     far.tell("received", b">hello<>world<")

@@ -157,6 +157,8 @@ def test_a_program_reaches_the_machine_that_sent_it_and_those_that_are_allowed(
         ("h", "10.1.2.3", None, True),
         ("gripper", "172.16.0.1", None, True),
         ("h", "172.16.0.1", None, False),
+        ("gripper", "127.0.0.1", None, False),
+        ("gripper", "127.0.0.1", "127.0.0.1", True),
     ],
 )
 def test_who_may_be_reached(name, address, origin, well):

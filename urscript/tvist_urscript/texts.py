@@ -7,7 +7,7 @@ from tvist_urscript.values import Value, integer, short, text, to_bytes, to_str,
 
 _INTEGER = re.compile(r"\s*[+-]?\d+\s*", re.ASCII)
 _HEXADECIMAL = re.compile(r"\s*[+-]?0[xX][0-9a-fA-F]+\s*", re.ASCII)
-_FLOAT = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
+_FLOAT = re.compile(r"\s*[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 
 
 def str_cat(op1: Value, op2: Value) -> str:

@@ -7,8 +7,10 @@ it is incomplete. A message that is not valid is None with the length of what is
 import re
 from struct import unpack_from
 
-_FLOAT = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
+_FLOAT = re.compile(r"\s*[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 _VARIABLE = re.compile(r"\s*(\S+)\s+([+-]?\d+)\s*", re.ASCII)
+LONGEST_NUMBER = 64
+"""Longest number in characters [bytes]."""
 LONGEST_LINE = 1023
 """Longest line or string [bytes], as that of a text in a program."""
 
@@ -55,7 +57,8 @@ def floats(received: bytes, number: int) -> tuple[tuple[float, ...] | None, int]
         return None
     start = received.rfind(b"(", 0, end)
     parts = received[start + 1 : end].decode("ascii", "replace").split(",")
-    valid = start >= 0 and len(parts) == number and all(map(_FLOAT.fullmatch, parts))
+    short = all(len(part) <= LONGEST_NUMBER for part in parts)  # the pattern takes long for long ones
+    valid = start >= 0 and len(parts) == number and short and all(map(_FLOAT.fullmatch, parts))
     return tuple(map(float, parts)) if valid else None, end + 1
 
 
@@ -65,7 +68,10 @@ def variable(received: bytes, name: str) -> tuple[int | None, int] | None:
     if found is None:
         return None
     answer = _VARIABLE.fullmatch(found[0].decode("ascii", "replace"))
-    return int(answer[2]) if answer and answer[1] == name else None, found[1]
+    if answer is None or answer[1] != name or len(answer[2]) > LONGEST_NUMBER:
+        return None, found[1]
+    value = int(answer[2])
+    return value if -(2**31) <= value < 2**31 else None, found[1]
 
 
 def unescaped(text: str) -> str:

@@ -10,6 +10,7 @@ from math import ceil
 from typing import Any, TypeVar
 
 from tvist_controller.events import Emit
+from tvist_controller.programs.arguments import readable
 from tvist_controller.programs.socket_traffic import (
     Close,
     Expire,
@@ -112,7 +113,8 @@ class Sockets:
             if not socket.connected and self._named.get((owner, name)) is socket:
                 self._drop(owner, name)
         if not socket.connected:
-            self._emit("warning", why=f'socket_open: "{name}" has no connection to {address} port {port}')
+            why = f'socket_open: "{name[:60]}" has no connection to {address[:60]} port {port}'
+            self._emit("warning", why=readable(why))
         return socket.connected
 
     def disconnect(self, name: str) -> None:

@@ -3,6 +3,7 @@
 import ipaddress
 from collections.abc import Sequence
 
+LOCALHOST = "localhost"
 IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 
@@ -20,19 +21,19 @@ class AllowedHosts:
     def allows(self, name: str, address: str, origin: str | None) -> bool:
         """Return whether a program may connect to an address.
 
-        The loopback interface is open to programs that came from there.
+        The loopback interface is open to programs that came from there, and if it is given itself.
 
         Args:
             name: What the program calls the machine.
             address: IP address that this stands for.
             origin: IP address of the machine that started the program; None if it is unknown.
         """
-        if name in self._names:
-            return True
         to, sender = _ip(address), None if origin is None else _ip(origin)
-        if sender is not None and (to == sender or (_is_here(to) and sender.is_loopback)):
-            return True
-        return any(to in network for network in self._networks)
+        if _is_here(to):  # a name or a wide network does not open it by the way
+            named = name == LOCALHOST and name in self._names
+            inside = any(network.is_loopback and to in network for network in self._networks)
+            return named or inside or (sender is not None and sender.is_loopback)
+        return to == sender or name in self._names or any(to in network for network in self._networks)
 
 
 def _ip(text: str) -> IpAddress:

@@ -32,6 +32,8 @@ PATIENCE: Final = 1.0
 """Wall time for which a step waits for a socket that a program reads [s]."""
 MAX_UNREAD: Final = 65_536
 """Bytes that may wait for a program to read them, besides those of one more piece; then the sender has to wait."""
+FLUSH_WITHIN: Final = 5.0
+"""Longest time to send what a closed socket has left to send [s]."""
 MAX_UNSENT: Final = 262_144
 """Bytes that may wait for the other side to read them; then it is disconnected."""
 
@@ -54,6 +56,7 @@ class _Link(asyncio.Protocol):
         """Whether the sender has to wait."""
         self.ended = False
         """Whether nothing more of it counts."""
+        self.connecting: asyncio.Task[None] | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
@@ -98,9 +101,12 @@ class _Link(asyncio.Protocol):
         """End it, and tell the controller unless it knows."""
         if change is not None:
             self._say(change)
+        elif self.connecting is not None:
+            self.connecting.cancel()
         self.ended = True
         if self._transport is not None:
             self._transport.close()
+            asyncio.get_running_loop().call_later(FLUSH_WITHIN, self._transport.abort)
 
     def _say(self, change: SocketChange, data: bytes = b"") -> None:
         if not self.ended:
@@ -165,8 +171,11 @@ class ProgramSockets(Gateway, SocketPorts):
 
     def note(self, news: SocketNews) -> None:
         """Note that news reach the controller before the next tick."""
-        self._moved.add(news.number)
-        self._silent.discard(news.number)
+        if news.change == "expired":
+            self._moved.update(socket for wait, (socket, _) in self._waits.items() if wait == news.number)
+        else:
+            self._moved.add(news.number)
+            self._silent.discard(news.number)
 
     def patience(self) -> float:
         """Return how long a step may wait for a socket that a program reads [s]; 0 if there is no reason.
@@ -221,13 +230,13 @@ class ProgramSockets(Gateway, SocketPorts):
         self._loop = self._early = None
 
     def _begin(self, order: Open, link: _Link) -> None:
-        task = asyncio.ensure_future(self._connect(order, link))
+        task = link.connecting = asyncio.ensure_future(self._connect(order, link))
         self._opening.add(task)
         task.add_done_callback(self._opening.discard)
 
     async def _connect(self, order: Open, link: _Link) -> None:
         loop = asyncio.get_running_loop()
-        with contextlib.suppress(OSError, UnicodeError, TimeoutError, ValueError):
+        with contextlib.suppress(Exception):  # whatever a name leads to, the program has to hear of it
             async with asyncio.timeout(CONNECT_WITHIN):
                 for address in await self._addresses(order):
                     with contextlib.suppress(OSError):

@@ -5,6 +5,7 @@ from contextlib import suppress
 from typing import Final
 
 from tvist_plant.user_file import UserFileError
+from tvist_protocol.programs import MAX_SCRIPT
 from tvist_server.polyscope import EXTERNAL_CONTROL, program, with_external_control
 from tvist_server.program_folder import ProgramFolder
 
@@ -43,6 +44,11 @@ class ExternalControl:
         Args:
             text: Its text.
             host: Address of the machine that plays it.
-            then: Called once with the complete text; with None if the machine does not answer.
+            then: Called once with the complete text; with None if the machine does not answer, or if it is too long.
         """
-        self._fetch(host, lambda sent: then(None if sent is None else with_external_control(text, sent)))
+
+        def fetched(sent: str | None) -> None:
+            whole = None if sent is None else with_external_control(text, sent)
+            then(None if whole is None or len(whole) > MAX_SCRIPT else whole)
+
+        self._fetch(host, fetched)

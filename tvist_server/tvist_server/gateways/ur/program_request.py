@@ -52,7 +52,7 @@ class ProgramRequests:
                 "%s port %d did not send the program for External Control: %s",
                 host,
                 PORT,
-                error or "no answer",
+                str(error) or "no answer",
             )
         then(text)
 

@@ -169,6 +169,8 @@ class Programs:
             if isinstance(reply, Refused):
                 self._except(reply)
                 heard(False)
+            elif self._asked is not asked:  # stopped, or another one loaded, while this one was compiled
+                heard(False)
             else:
                 self._play(control, heard)
 
