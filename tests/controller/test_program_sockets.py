@@ -16,7 +16,7 @@ from tvist_controller.programs.socket_traffic import (
     Wait,
     Waited,
 )
-from tvist_protocol.programs import ProgramRun, ProgramStop
+from tvist_protocol.programs import ProgramLoad, ProgramPlay, ProgramRun, ProgramStop
 
 from .scripts import a_robot, failure, finish, playing, run, said, script, start
 
@@ -87,6 +87,21 @@ def test_a_program_connects_to_where_it_says_and_gets_the_answer():
         'socket_open: "two" has no connection to h port 7'
     ]
     assert {order.socket for order in far.of(Close)} == {1, 2}
+
+
+def test_who_plays_the_program_of_another_machine_does_not_lend_it_an_address():
+    robot = a_robot()
+    far = Far(robot)
+    text = script(OPENS)
+    robot.controller.receive(ProgramLoad(name="cell.urp", text=text), origin="10.0.0.9")
+    for origin in ("10.0.0.9", "127.0.0.1"):
+        robot.controller.receive(ProgramPlay(token=robot.token), origin=origin)
+        robot.tick()
+        robot.send(ProgramStop)
+    robot.controller.receive(ProgramLoad(name="cell.urp"), origin="127.0.0.1")
+    robot.controller.receive(ProgramPlay(token=robot.token), origin="127.0.0.1")
+    robot.tick()
+    assert [order.origin for order in far.of(Open)] == ["10.0.0.9", None, None]
 
 
 @settings(max_examples=30, deadline=None)

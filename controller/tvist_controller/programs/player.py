@@ -71,8 +71,10 @@ class ProgramPlayer:
             access, self.arm, self._popups, self._watchdogs, self.sockets, self.statements
         )
         self._built_in = frozenset(built_in(access.description))
-        self._kept: dict[str, Script] = {}
-        """Programs that were loaded with their text, by name."""
+        self._kept: dict[str, tuple[Script, str | None]] = {}
+        """Programs that were loaded with their text, by name, and the address of the machine that sent it."""
+        self._sender: str | None = None
+        """Address of the machine that sent the loaded program; None if it is unknown."""
         self.name: str | None = None
         """Name of the loaded program; None if there is none."""
         self.state: ProgramState = "STOPPED"
@@ -251,19 +253,19 @@ class ProgramPlayer:
     # ------------------------------------------------------------------ commands
 
     def _load(self, call: Call[ProgramLoad]) -> None:
-        name, script = call.command.name, call.planned()
+        name, script, sender = call.command.name, call.planned(), call.origin
         if call.command.text is not None:
             if name not in self._kept and len(self._kept) >= MAX_KEPT:
                 why = f"{MAX_KEPT} programs are kept already: send this one with program.run"
                 raise RefusalError("busy", "name", why, MAX_KEPT)
-            self._kept[name] = script
+            self._kept[name] = script, sender
         elif script is None:
-            script = self._kept.get(name)
+            script, sender = self._kept.get(name, (None, None))
         if script is None:
             why = f"name is {name!r}: must be one of {', '.join(self.known)}"
             raise RefusalError("out_of_range", "name", why)
         self._replace("another program was loaded")
-        self.name, self._loaded = name, script
+        self.name, self._loaded, self._sender = name, script, sender
 
     def _run(self, call: Call[ProgramRun]) -> None:
         script: Script = call.planned()
@@ -275,7 +277,7 @@ class ProgramPlayer:
             self._begin(script, script.name, call.origin)
             return
         self._replace("another program was started")
-        self.name, self._loaded = script.name, script
+        self.name, self._loaded, self._sender = script.name, script, call.origin
         self._start(script, call.origin)
 
     def _play(self, call: Call[ProgramPlay]) -> None:
@@ -285,7 +287,8 @@ class ProgramPlayer:
             raise RefusalError("busy", "", f"program {self.name} is playing")
         if self._main is None:
             self._motion.check("move_j")
-            self._start(self._loaded, call.origin)
+            # Whoever plays a program does not lend it what only their own programs may reach.
+            self._start(self._loaded, call.origin if call.origin == self._sender else None)
             return
         if self._motion.activity is Activity.PAUSED:
             self._motion.resume()
