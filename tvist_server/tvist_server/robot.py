@@ -29,7 +29,7 @@ from tvist_server.recording.black_box import BlackBox
 from tvist_server.recording.recorder import Recorder
 
 LOCAL = "127.0.0.1"
-"""Where commands of this process come from."""
+"""Address of this machine, from which commands of this process come."""
 
 
 class ServedRobot:

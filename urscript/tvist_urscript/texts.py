@@ -7,7 +7,7 @@ from tvist_urscript.values import Value, integer, short, text, to_bytes, to_str,
 
 _INTEGER = re.compile(r"\s*[+-]?\d+\s*", re.ASCII)
 _HEXADECIMAL = re.compile(r"\s*[+-]?0[xX][0-9a-fA-F]+\s*", re.ASCII)
-_FLOAT = re.compile(r"\s*[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
+DECIMAL = re.compile(r"\s*[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 
 
 def str_cat(op1: Value, op2: Value) -> str:
@@ -61,7 +61,7 @@ def to_num(string: Value) -> int | float:
         return whole(int(written, 16))
     if _INTEGER.fullmatch(written):
         return whole(int(written))
-    if _FLOAT.fullmatch(written):
+    if DECIMAL.fullmatch(written):
         return float(written)
     raise Fault(f'the text "{written[:40]}" is no number')
 

@@ -65,7 +65,7 @@ class ProgramArm:
         self._abandoned = False
         self._own = False
         self._skipped = False
-        """Whether the motion that is being planned is to be left out."""
+        """True after a call of `abort`; a motion that was being planned then is not started."""
         self.waypoint: Segment | None = None
         """Target of the present move, or of the last one."""
 

@@ -45,7 +45,7 @@ class _Running:
     script: Script
     machine: Machine
     origin: str | None
-    """Address of the machine that started it; None if it is unknown."""
+    """Address of the machine that sent and started it; None if it is unknown, or if these are two machines."""
 
 
 class ProgramPlayer:

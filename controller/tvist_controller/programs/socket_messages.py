@@ -7,7 +7,8 @@ it is incomplete. A message that is not valid is None with the length of what is
 import re
 from struct import unpack_from
 
-_FLOAT = re.compile(r"\s*[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
+from tvist_urscript.texts import DECIMAL
+
 _VARIABLE = re.compile(r"\s*(\S+)\s+([+-]?\d+)\s*", re.ASCII)
 LONGEST_NUMBER = 64
 """Longest number in characters [bytes]."""
@@ -58,7 +59,7 @@ def floats(received: bytes, number: int) -> tuple[tuple[float, ...] | None, int]
     start = received.rfind(b"(", 0, end)
     parts = received[start + 1 : end].decode("ascii", "replace").split(",")
     short = all(len(part) <= LONGEST_NUMBER for part in parts)  # the pattern takes long for long ones
-    valid = start >= 0 and len(parts) == number and short and all(map(_FLOAT.fullmatch, parts))
+    valid = start >= 0 and len(parts) == number and short and all(map(DECIMAL.fullmatch, parts))
     return tuple(map(float, parts)) if valid else None, end + 1
 
 

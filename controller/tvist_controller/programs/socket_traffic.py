@@ -37,7 +37,7 @@ class Open(NamedTuple):
     socket: int
     """Number of the socket; no number comes twice."""
     origin: str | None
-    """Address of the machine that started the program; None if it is unknown."""
+    """Address of the machine that sent and started the program; None if it is unknown."""
     address: str
     """Name or IP address of the machine to connect to."""
     port: int

@@ -41,7 +41,7 @@ class _Socket:
     received: bytearray = field(default_factory=bytearray)
     opening: bool = True
     connected: bool = False
-    """Whether it was open, even if the other side has closed it since."""
+    """True once it was open; the other side may have closed it since."""
     open: bool = False
 
 
@@ -51,7 +51,7 @@ class Sockets:
     Args:
         emit: Emits events.
         owner: Returns the program that runs now.
-        origin: Returns the address of the machine that started the program that runs now; None if it is unknown.
+        origin: Returns the address of the machine that sent and started that program; None if it is unknown.
     """
 
     def __init__(self, emit: Emit, owner: Callable[[], Machine], origin: Callable[[], str | None]) -> None:
@@ -92,7 +92,7 @@ class Sockets:
             port: Its port.
 
         Returns:
-            Whether it was opened.
+            True if it was opened.
 
         Raises:
             Fault: The program has too many sockets.
@@ -151,7 +151,7 @@ class Sockets:
             meanwhile: Called with the number of ticks that the call has waited so far, before each further one.
 
         Returns:
-            What is read; None if the time is over, or if the socket is not open and has not received it.
+            The message; None if the time is over, or if the socket was closed before all of it had arrived.
         """
         socket = self._named.get((self._owner(), name))
         if socket is None:

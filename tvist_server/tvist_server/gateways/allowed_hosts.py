@@ -1,4 +1,4 @@
-"""Which machines programs may connect to."""
+"""The machines that programs may connect to."""
 
 import ipaddress
 from collections.abc import Sequence

@@ -53,10 +53,11 @@ class _Link(asyncio.Protocol):
         self.taken = 0
         """Received bytes that the program has read; written in the controller's thread."""
         self.paused = False
-        """Whether the sender has to wait."""
+        """True while the sender has to wait, since the program has much to read."""
         self.ended = False
-        """Whether nothing more of it counts."""
+        """True from its end on; what happens to it later is not told."""
         self.connecting: asyncio.Task[None] | None = None
+        """Connects it; None before that begins."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
@@ -129,8 +130,7 @@ class ProgramSockets(Gateway, SocketPorts):
         self._tell_controller, self._warn, self._allowed = tell, warn, allowed
         self._loop: asyncio.AbstractEventLoop | None = None
         self._early: list[Callable[[], object]] | None = []
-        """What is to be done when the network's thread begins; None from then on."""
-        self._opening: set[asyncio.Task[None]] = set()
+        """Actions that wait until the network's thread begins; None from then on."""
         # The following are used in the controller's thread only.
         self._links: dict[int, _Link] = {}
         self._waits: dict[int, tuple[int, float]] = {}
@@ -172,7 +172,8 @@ class ProgramSockets(Gateway, SocketPorts):
     def note(self, news: SocketNews) -> None:
         """Note that news reach the controller before the next tick."""
         if news.change == "expired":
-            self._moved.update(socket for wait, (socket, _) in self._waits.items() if wait == news.number)
+            if news.number in self._waits:
+                self._moved.add(self._waits[news.number][0])
         else:
             self._moved.add(news.number)
             self._silent.discard(news.number)
@@ -219,8 +220,6 @@ class ProgramSockets(Gateway, SocketPorts):
     async def shut(self) -> None:
         """Close all sockets."""
         self._loop = None
-        for task in self._opening:
-            task.cancel()
         for link in tuple(self._links.values()):
             link.end()
         await asyncio.sleep(0)  # lets the connections end
@@ -230,9 +229,7 @@ class ProgramSockets(Gateway, SocketPorts):
         self._loop = self._early = None
 
     def _begin(self, order: Open, link: _Link) -> None:
-        task = link.connecting = asyncio.ensure_future(self._connect(order, link))
-        self._opening.add(task)
-        task.add_done_callback(self._opening.discard)
+        link.connecting = asyncio.ensure_future(self._connect(order, link))
 
     async def _connect(self, order: Open, link: _Link) -> None:
         loop = asyncio.get_running_loop()

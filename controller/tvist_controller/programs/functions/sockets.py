@@ -1,7 +1,7 @@
 """Functions for sockets, over which programs talk to other machines."""
 
 import math
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from struct import pack
 from typing import Any, TypeVar
 
@@ -74,25 +74,19 @@ class SocketFunctions:
         self, number: object, socket_name: object, timeout: object
     ) -> Generator[None, None, Array]:
         """Read integers of 32 bits, at most 30, as `[n, v1, …, vn]`; `[0, -1, …, -1]` when the time is over."""
-        count = integer("number", number, 0, MOST)
-        found = yield from self._read(socket_name, lambda got: cut.integers(got, count), timeout)
-        return _counted(found, count, -1)
+        return self._read_list(cut.integers, integer("number", number, 0, MOST), socket_name, timeout, -1)
 
     def socket_read_byte_list(
         self, number: object, socket_name: object, timeout: object
     ) -> Generator[None, None, Array]:
         """Read bytes, at most 30, as `[n, v1, …, vn]`; `[0, -1, …, -1]` when the time is over."""
-        count = integer("number", number, 0, MOST)
-        found = yield from self._read(socket_name, lambda got: cut.octets(got, count), timeout)
-        return _counted(found, count, -1)
+        return self._read_list(cut.octets, integer("number", number, 0, MOST), socket_name, timeout, -1)
 
     def socket_read_ascii_float(
         self, number: object, socket_name: object, timeout: object
     ) -> Generator[None, None, Array]:
         """Read numbers in brackets, at most 30: `(1.5, 2)` is `[2, 1.5, 2]`; `[0, nan, …, nan]` if that fails."""
-        count = integer("number", number, 1, MOST)
-        found = yield from self._read(socket_name, lambda got: cut.floats(got, count), timeout)
-        return _counted(found, count, math.nan)
+        return self._read_list(cut.floats, integer("number", number, 1, MOST), socket_name, timeout, math.nan)
 
     def socket_read_line(self, socket_name: object, timeout: object) -> Generator[None, None, str]:
         """Read a line of at most 1023 bytes, without its end; an empty text when the time is over."""
@@ -152,6 +146,18 @@ class SocketFunctions:
         self._arm.then(send)
         return self._sockets.is_open(name)
 
+    def _read_list(
+        self,
+        take: Callable[[bytes, int], tuple[tuple[Any, ...] | None, int] | None],
+        count: int,
+        socket_name: object,
+        timeout: object,
+        missing: float,
+    ) -> Generator[None, None, Array]:
+        """Read so many values; they follow their number, which is 0 if they are missing."""
+        found = yield from self._read(socket_name, lambda got: take(got, count), timeout)
+        return a_list((0,) + (missing,) * count if found is None else (count, *found))
+
     def _read(self, socket_name: object, take: Take[T], timeout: object) -> Generator[None, None, T | None]:
         name, longest = text("socket_name", socket_name), number("timeout", timeout)
         return self._sockets.read(name, take, longest, self._go_on)
@@ -164,7 +170,3 @@ class SocketFunctions:
 
 def _idle(_: int) -> Generator[None, None, None]:
     yield from ()
-
-
-def _counted(found: tuple[Any, ...] | None, count: int, missing: float) -> Array:
-    return a_list((count, *found)) if found is not None else a_list((0,) + (missing,) * count)

@@ -157,10 +157,12 @@ class Programs:
             return
         asked = self._asked = object()
 
+        def wanted() -> bool:
+            """Return False if it was stopped meanwhile, or another program was loaded or started."""
+            return self._asked is asked and (self.name, self.state) == (name, "STOPPED")
+
         def completed(whole: str | None) -> None:
-            # Meanwhile it may have been stopped, or another program loaded or started.
-            wanted = self._asked is asked and (self.name, self.state) == (name, "STOPPED")
-            if whole is None or not wanted:
+            if whole is None or not wanted():
                 heard(False)
             else:
                 control.ask(ProgramLoad(name=name, text=whole), loaded)
@@ -169,10 +171,10 @@ class Programs:
             if isinstance(reply, Refused):
                 self._except(reply)
                 heard(False)
-            elif self._asked is not asked:  # stopped, or another one loaded, while this one was compiled
-                heard(False)
-            else:
+            elif wanted():
                 self._play(control, heard)
+            else:
+                heard(False)
 
         self._external.complete(text, control.host, completed)
 
