@@ -12,9 +12,11 @@ from tvist_controller.calibrations.modal import drivetrain, mass_matrix, modal_e
 from tvist_controller.choices import choose_filter, wanted_modes
 from tvist_controller.collision import CLEARANCE, FAR, CollisionModel
 from tvist_controller.control.differentiator import Target, central_differences
+from tvist_controller.control.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.controller import Controller
 from tvist_controller.cycle import STILL, ControlCycle
+from tvist_controller.elastic_source import elastic_feed_forward
 from tvist_controller.from_rest import plan_from_rest
 from tvist_controller.host import Host
 from tvist_controller.kinematics.tool import ToolKinematics, turned
@@ -41,6 +43,7 @@ __all__ = [
     "CollisionModel",
     "ControlCycle",
     "Controller",
+    "ElasticFeedForward",
     "Host",
     "InverseDynamics",
     "JointLine",
@@ -64,6 +67,7 @@ __all__ = [
     "choose_filter",
     "default_calibration",
     "drivetrain",
+    "elastic_feed_forward",
     "estimator_of",
     "info_of",
     "load_calibration",

@@ -68,10 +68,10 @@ class Controller:
         self._stop_reasons = StopReasons()
         planner = Planner(setup)
         self._commands = CommandTable(planner, lambda: self.basis)
-        source, tvist = planner.filters.first()
+        first = planner.filters.first()
         self.cycle = ControlCycle(
-            setup.description, tvist, q=np.array(setup.q, dtype=float), declared=body(setup.payload),
-            carried=body(setup.carried or setup.payload), seed=setup.seed, plant=plant,
+            setup.description, first.tvist, elastic=first.elastic, q=np.array(setup.q, dtype=float),
+            declared=body(setup.payload), carried=body(setup.carried or setup.payload), seed=setup.seed, plant=plant,
             compensate_sag=setup.compensate_sag,
         )  # fmt: skip
         if setup.truth:
@@ -93,7 +93,7 @@ class Controller:
         guidance = Guidance(self.motion)
         self.programs = ProgramPlayer(self._access(guidance, order or self._commands.plan_later), safety)
         self._told_program = self.programs.progress
-        self.filters = Filters(self.motion, source, setup.payload, self._emit)
+        self.filters = Filters(self.motion, first.source, setup.payload, self._emit)
         self._payload = DeclaredPayload(setup.payload, self.motion, self.filters, self._emit)
         parts = (
             self._authority, MotionCommands(self.motion, safety, self.programs),

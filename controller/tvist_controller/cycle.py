@@ -6,8 +6,9 @@ import numpy as np
 from msgspec import Struct
 
 from tvist_controller.control.differentiator import Differentiator, Floats, Target
+from tvist_controller.control.drive_feed_forward import DriveFeedForward, MotorReference
+from tvist_controller.control.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.control.inverse_dynamics import SLEW, InverseDynamics
-from tvist_controller.control.joint_controllers import JointControllers
 from tvist_controller.control.shaped_reference import ShapedReference
 from tvist_controller.control.unshaped_reference import UnshapedReference
 from tvist_controller.line_filter import LineFilter
@@ -50,6 +51,8 @@ class Sample(Struct, frozen=True, eq=False, gc=False):
     """Measurement of the arm."""
     unshaped: Target | None = None
     """What the target is without the filter, at the same tick; None if it is the target itself, to the last bit."""
+    motors: MotorReference | None = None
+    """Motion of the motors that elastic feed-forward asks for; None without it."""
 
 
 class ControlCycle:
@@ -63,6 +66,7 @@ class ControlCycle:
         carried: Payload that the arm carries.
         seed: Seed of the arm's noise and gear errors.
         plant: Plant to control; None for the flexible arm of the description.
+        elastic: Elastic feed-forward to use with the filter; None for that of the paper's controller.
         compensate_sag: Whether the drives lead by the twist of the gears under gravity.
 
     Raises:
@@ -79,13 +83,15 @@ class ControlCycle:
         carried: Payload,
         seed: int,
         plant: Plant | None = None,
+        elastic: ElasticFeedForward | None = None,
         compensate_sag: bool = False,
     ) -> None:
         self.description = description
         self.line_filter = LineFilter(tvist, arm_limits(description))
         self._plant: Plant = FlexibleArm(description, carried) if plant is None else plant
         self.inverse_dynamics = InverseDynamics(description, declared)
-        self._joint_controllers = JointControllers(description, PERIOD, compensate_sag=compensate_sag)
+        self._feed_forward = DriveFeedForward(description, PERIOD, compensate_sag=compensate_sag)
+        self._feed_forward.use(elastic)
         self._shaped = ShapedReference(q, PERIOD)
         self._unshaped = UnshapedReference()
         self.trajectory: Trajectory = Rest(q)
@@ -117,6 +123,16 @@ class ControlCycle:
         return self._plant
 
     @property
+    def elastic(self) -> ElasticFeedForward | None:
+        """The latest chosen elastic feed-forward: in use, or about to be; None for that of the paper's controller."""
+        return self._feed_forward.wanted
+
+    @property
+    def drive_delay(self) -> float:
+        """Time by which commands for the drives are later than their targets [s]."""
+        return self._feed_forward.delay
+
+    @property
     def tvist(self) -> Filter:
         """The latest chosen filter: in use, or about to be."""
         return self.line_filter.tvist
@@ -140,10 +156,13 @@ class ControlCycle:
         self.inverse_dynamics.advance()
         torque = self.inverse_dynamics.torque(target.q, target.qd, target.qdd)  # τ* [N m]
         gravity = self.inverse_dynamics.gravity(target.q)
-        command = self._joint_controllers.command(target, torque, gravity)
+        smooth = not self.unshaped or self.stopping
+        carried = self.inverse_dynamics.carried
+        command = self._feed_forward.command(target, torque, gravity, carried, smooth=smooth)
         measured = self._plant.step(command)
         self._settle(reference, target)
-        return Sample(reference, target, torque, command.torque, measured, unshaped)
+        motors = self._feed_forward.reference
+        return Sample(reference, target, torque, command.torque, measured, unshaped, motors)
 
     def _give_up(self, error: StuckError) -> Floats:
         """Return the first reference of the stop from the last shaped one, since the trajectory cannot go on."""
@@ -163,14 +182,18 @@ class ControlCycle:
         reference = stop.next()
         return reference, reference
 
-    def use(self, tvist: Filter) -> None:
+    def use(self, tvist: Filter, elastic: ElasticFeedForward | None = None) -> None:
         """Change the filter: at once if the arm is at rest, else within the limits of the motion.
 
         If a change is under way, the new filter waits until that is complete; only the latest waiting filter is kept.
 
         Args:
             tvist: New filter, with the joints and the period of the present one.
+            elastic: Elastic feed-forward to use with it; None for that of the paper's controller.
         """
+        self._feed_forward.use(elastic)
+        if self.at_rest:
+            self._feed_forward.rest()
         if self.at_rest or self.unshaped:
             self.line_filter.begin(tvist, self.reference)
         else:
@@ -191,6 +214,7 @@ class ControlCycle:
             self.trajectory = Rest(reference)
         self.at_rest, self.unshaped, self.guard = True, False, None
         self.stopping = self.running_out = False
+        self._feed_forward.rest()
 
     @property
     def position(self) -> Floats:
@@ -286,8 +310,10 @@ class ControlCycle:
         self._unshaped.join()
         still = np.zeros_like(q)
         torque = self.inverse_dynamics.gravity(q)
-        self._joint_controllers.reset(torque)
-        command = self._joint_controllers.command(Target(q, still, still), torque, torque)
+        self._feed_forward.reset(torque)
+        command = self._feed_forward.command(
+            Target(q, still, still), torque, torque, self.inverse_dynamics.carried
+        )
         measured = self._plant.reset(command, payload=carried, seed=seed)
         self.standing = Sample(q, Target(q, still, still), torque, command.torque, measured)
         """Signals to report before the first tick from there."""

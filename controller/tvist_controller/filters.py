@@ -40,8 +40,8 @@ class Filters:
     def use(self, chosen: PlannedFilter) -> None:
         """Shape with a filter from now on."""
         before, idle = self.source, self._idle
-        self.source, tvist = chosen
-        self._cycle.use(tvist)
+        self.source, tvist = chosen.source, chosen.tvist
+        self._cycle.use(tvist, chosen.elastic)
         self._motion.motions.keep_rate()
         self._emit("shaper_changed", why=f"{tvist.name} with estimator {self.source.name}")
         if self.source is not before:
@@ -51,7 +51,7 @@ class Filters:
 
     def _choose(self, call: Call[SetShaper] | Call[SetEstimator]) -> None:
         chosen: PlannedFilter = call.planned()
-        self._motion.ahead.check_filter(chosen[1])
+        self._motion.ahead.check_filter(chosen.tvist)
         self.use(chosen)
 
     def _estimate(self, call: Call[SetEstimator]) -> None:
@@ -67,7 +67,7 @@ class Filters:
         """
         self._declared = payload
         if tvist is not None:
-            self._cycle.use(tvist)
+            self._cycle.use(tvist, self._cycle.elastic)
             self._motion.motions.keep_rate()
         self._warn_of_payload()
 

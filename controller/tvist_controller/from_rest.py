@@ -36,7 +36,8 @@ def plan_from_rest(
         ValueError: There is no such shaper for this robot.
     """
     planner, q = Planner(setup), np.array(setup.q, dtype=float)
-    source, tvist = planner.filters.first()
+    first = planner.filters.first()
+    source, tvist = first.source, first.tvist
     on = FilterBasis(tvist.name, tvist.estimator.modes, source, setup.payload)
     motion = MotionBasis(
         q=q,

@@ -3,7 +3,7 @@
 import copy
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Self
+from typing import Literal, Self, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,10 @@ from tvist_shaping.delay_line import DelayLine
 from tvist_shaping.errors import FilterError, ShaperFailureError, ShapingError
 from tvist_shaping.estimators.base import Estimator
 
+FeedForward: TypeAlias = Literal["rigid", "elastic", "elastic-position"]
+"""What a controller feeds forward to the drives: torques of the rigid arm; or positions, velocities and torques with
+which an elastic arm follows its reference; or of these only positions and velocities.
+"""
 Posture = Callable[[Floats], Floats]
 """Function from a sample, shape (width,), to the joint angles that it represents, shape (joints,) [rad]."""
 
@@ -35,6 +39,7 @@ class Filter(ABC):
             [-]. The generator of the reference can stay below its limit by this share.
         clipped: Whether the filter was limited at the last tick: a delay exceeded the buffer, or a mode was outside
             its estimator's bounds.
+        feed_forward: Feed-forward that the drives need for the filter to work as designed.
         fault: Why the shaper's function failed in its last call; None if it did not. A filter cannot stop abruptly
             during a motion, so it continues with its last weights, and the caller should stop the motion.
     """
@@ -47,6 +52,7 @@ class Filter(ABC):
     zeta: Floats
     excess: float
     clipped: bool
+    feed_forward: FeedForward
     fault: str | None
 
     def __init__(self, name: str, estimator: Estimator, joints: int, period: float, capacity: int) -> None:
@@ -69,6 +75,7 @@ class Filter(ABC):
         self.name, self.estimator = name, estimator
         self.joints, self.period = joints, period
         self.excess, self.clipped, self.fault = 0.0, False, None
+        self.feed_forward = "rigid"
         self._line = DelayLine(joints, capacity)
         self._reach = capacity
         """Number of newest samples that the weights may use."""

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import TypeAlias
 
 from tvist_shaping.aimed import AimedFilter
-from tvist_shaping.base import Filter
+from tvist_shaping.base import FeedForward, Filter
 from tvist_shaping.catalogue import SHAPERS
 from tvist_shaping.errors import DesignError, UnknownShaperError
 from tvist_shaping.estimators.base import Estimator
@@ -15,6 +15,7 @@ from tvist_shaping.filter import TvistFilter
 from tvist_shaping.fir import FirDesign
 from tvist_shaping.fir_shaper import FirShaper
 from tvist_shaping.shaper import Shaper
+from tvist_shaping.smoothing import SmoothedDesign, SmoothingFilter, running_means
 from tvist_shaping.steady import Design, ShortDesign, SteadyFilter
 
 AnyShaper: TypeAlias = Shaper | FirShaper
@@ -33,13 +34,23 @@ def _auto_target() -> Design:
     return ShortDesign(0.026, wanted=FirDesign(residual=(0.035, 0.035, 0.06, 0.2)), name=AIMED)
 
 
-AIMED = "auto-target"
+def _elastic_auto() -> Design:
+    return SmoothedDesign(_auto(), running_means(8, 8), ELASTIC_AUTO)
+
+
+AIMED, ELASTIC_AUTO = "auto-target", "elastic-auto"
 DESIGNS: Mapping[str, Callable[[], Design]] = MappingProxyType(
-    {"auto": _auto, "short": _short, AIMED: _auto_target}
+    {"auto": _auto, "short": _short, AIMED: _auto_target, ELASTIC_AUTO: _elastic_auto}
 )
 """Designs with constant mean delay against an arm's four lowest modes: one with a smaller residual, one that is
-shorter, and one that knows where a motion will end.
+shorter, one that knows where a motion will end, and one for what feed-forward of the arm's elasticity leaves.
 """
+SMOOTHED: Mapping[str, FeedForward] = MappingProxyType(
+    {"elastic": "elastic", "elastic-position": "elastic-position"}
+)
+"""Filters that only smooth the reference, with the feed-forward that stills the arm."""
+SMOOTHING = (14, 8)
+"""Ticks of their running means."""
 
 PERIOD = 0.002
 """Tick of every filter that is created by name [s]."""
@@ -64,7 +75,7 @@ class Registry:
             if not (isinstance(shaper.name, str) and _NAME.fullmatch(shaper.name)):
                 limit = "1 to 64 of a-z 0-9 _ - . , ( ), the first a letter or a digit"
                 raise DesignError("name", shaper.name, limit)
-            if shaper.name in SHAPERS or shaper.name in DESIGNS or shaper.name in found:
+            if shaper.name in {*SHAPERS, *DESIGNS, *SMOOTHED, *found}:
                 raise DesignError("name", shaper.name, "a name that no other shaper has")
             if isinstance(shaper, FirShaper) and shaper.period != PERIOD:
                 raise DesignError("period", shaper.period, f"{PERIOD:g} s, as that of all filters by name")
@@ -73,7 +84,7 @@ class Registry:
 
     def names(self) -> tuple[str, ...]:
         """Names of all available filters."""
-        return (*SHAPERS, *DESIGNS, *self.own)
+        return (*SHAPERS, *DESIGNS, *SMOOTHED, *self.own)
 
     def check(self, name: str) -> None:
         """Check that there is a filter with this name.
@@ -81,7 +92,7 @@ class Registry:
         Raises:
             UnknownShaperError: There is no shaper of that name; the error lists all names and the most similar one.
         """
-        if name not in DESIGNS and name not in SHAPERS and name not in self.own:
+        if name not in self.names():
             near = get_close_matches(name, self.names(), n=1)
             raise UnknownShaperError(name, self.names(), near[0] if near else None)
 
@@ -99,7 +110,18 @@ class Registry:
         shaper = self.own.get(name)
         if isinstance(shaper, FirShaper):
             return shaper.modes
+        if name in SMOOTHED:
+            return 1
         return DESIGNS[name]().modes if name in DESIGNS else modes
+
+    def feed_forward_of(self, name: str) -> FeedForward:
+        """Return the feed-forward for the drives that a filter needs, see `Filter.feed_forward`.
+
+        Raises:
+            UnknownShaperError: There is no shaper of that name.
+        """
+        self.check(name)
+        return "elastic" if name == ELASTIC_AUTO else SMOOTHED.get(name, "rigid")
 
     def make_filter(self, name: str, estimator: Estimator, *, joints: int) -> Filter:
         """Create a filter by name.
@@ -114,10 +136,14 @@ class Registry:
             FilterError: Filter and estimator do not fit together.
             ShaperFailureError: The function of a user's own shaper fails for the modes at q = 0.
         """
-        self.check(name)
+        feed_forward = self.feed_forward_of(name)
+        if name in SMOOTHED:
+            weights = running_means(*SMOOTHING)
+            return SmoothingFilter(name, weights, estimator, joints=joints, feed_forward=feed_forward)
+        if name == AIMED:
+            return AimedFilter(DESIGNS[name](), estimator, joints=joints)
         if name in DESIGNS:
-            kind = AimedFilter if name == AIMED else SteadyFilter
-            return kind(DESIGNS[name](), estimator, joints=joints)
+            return SteadyFilter(DESIGNS[name](), estimator, joints=joints, feed_forward=feed_forward)
         shaper = self.own[name] if name in self.own else SHAPERS[name]
         if isinstance(shaper, FirShaper):
             return SteadyFilter(shaper.design(), estimator, joints=joints)

@@ -18,7 +18,7 @@ from typing import Self
 import numpy as np
 
 from tvist_shaping._types import Floats
-from tvist_shaping.base import Filter
+from tvist_shaping.base import FeedForward, Filter
 from tvist_shaping.errors import FilterError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.failures import FAILURES, failure
@@ -202,7 +202,15 @@ class SteadyFilter(Filter):
 
     design: Design
 
-    def __init__(self, design: Design, estimator: Estimator, *, joints: int, smooth: int = SMOOTH) -> None:
+    def __init__(
+        self,
+        design: Design,
+        estimator: Estimator,
+        *,
+        joints: int,
+        smooth: int = SMOOTH,
+        feed_forward: FeedForward = "rigid",
+    ) -> None:
         """Create a filter at rest at q = 0; `reset` moves it to the arm's configuration.
 
         Args:
@@ -210,6 +218,7 @@ class SteadyFilter(Filter):
             estimator: The modes as functions of q, as many as the design needs.
             joints: Number of joints of the arm, >= 1.
             smooth: Ticks of each of the three running means of the taps, >= 1.
+            feed_forward: Feed-forward that the drives need with it.
 
         Raises:
             FilterError: An argument is out of range, or the estimator has another number of modes.
@@ -223,7 +232,7 @@ class SteadyFilter(Filter):
                 "take an estimator of that many modes, or another design",
             )  # fmt: skip
         super().__init__(design.name, estimator, joints, design.period, design.taps + 4)
-        self.design, self.excess = design, EXCESS
+        self.design, self.excess, self.feed_forward = design, EXCESS, feed_forward
         self._reach = design.taps
         self._smooth = smooth
         self._delays = np.arange(design.taps, dtype=float)

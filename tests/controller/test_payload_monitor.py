@@ -43,13 +43,13 @@ class Watched:
         )
         self.monitor = PayloadMonitor(description, disc(declared))
         self.fed = None
-        command = self.cycle._joint_controllers.command
+        command = self.cycle._feed_forward._plain.command
 
         def watched(target, torque, gravity):
             self.fed = command(target, torque, gravity)
             return self.fed
 
-        self.cycle._joint_controllers.command = watched
+        self.cycle._feed_forward._plain.command = watched
         self.worst = 0.0
 
     def step(self):

@@ -36,13 +36,13 @@ def line(description=UR5E, mass=5.0, q=Q1, *, compensated=True, name="none", **c
 
 def commands_of(cycle):
     """Commands to the drives from now on, and the references that they belong to."""
-    found, made = [], cycle._joint_controllers.command
+    found, made = [], cycle._feed_forward._plain.command
 
     def watched(target, torque, gravity):
         found.append((made(target, torque, gravity), target))
         return found[-1][0]
 
-    cycle._joint_controllers.command = watched
+    cycle._feed_forward._plain.command = watched
     return found
 
 

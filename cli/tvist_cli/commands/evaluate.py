@@ -154,6 +154,7 @@ def _calibration(
     with told(CalibrationError, RefusalError, code=2):
         known = Registry(one.shaper for one in own)
         several = wanted_modes(shaper, modes, "shaper", known) > 1
+        several = several or known.feed_forward_of(shaper) != "rigid"
         if name is not None:
             return load(name)
         default = default_for(description.robot.model)

@@ -44,6 +44,10 @@ class JointControllers:
         """
         self._windup = np.zeros_like(gravity) if self._yielding is None else self._yielding * gravity
 
+    def sag(self, gravity: Floats) -> Floats | None:
+        """Lead by which the motors compensate the twist under gravity, shape (n,) [rad]; None if they do not."""
+        return None if self._yielding is None else self._yielding * gravity
+
     def command(self, target: Target, torque: Floats, gravity: Floats) -> DriveCommand:
         """Drive command for a target.
 

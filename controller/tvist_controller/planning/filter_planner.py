@@ -1,8 +1,12 @@
 """Filters by the names that clients use."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from tvist_controller.choices import choose_filter, choose_source, make_estimator, wanted_modes
+from tvist_controller.control.elastic_feed_forward import ElasticFeedForward
+from tvist_controller.elastic_source import elastic_feed_forward
 from tvist_controller.mode_source import ModeSource, modal_source
 from tvist_controller.planning.basis import FilterBasis
 from tvist_controller.refusal import RefusalError
@@ -10,10 +14,20 @@ from tvist_controller.setup import Setup
 from tvist_protocol.commands import SetEstimator
 from tvist_protocol.values import Payload
 from tvist_shaping.base import Filter
+from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.base import Estimator
 
-PlannedFilter = tuple[ModeSource, Filter]
-"""Source of the modes, and the filter."""
+
+@dataclass(frozen=True)
+class PlannedFilter:
+    """A filter with what it needs."""
+
+    source: ModeSource
+    """Source of its modes."""
+    tvist: Filter
+    """The filter."""
+    elastic: ElasticFeedForward | None
+    """Elastic feed-forward for the drives; None if the filter does without."""
 
 
 class FilterPlanner:
@@ -39,8 +53,8 @@ class FilterPlanner:
         except RefusalError as error:
             raise ValueError(str(error)) from error
         if self._modal is not None:
-            _, tvist = self.choose("auto", 1, self._modal, setup.payload)
-            tvist.filter(np.zeros(setup.description.joints))
+            ready = self.choose("elastic-auto", 1, self._modal, setup.payload)
+            ready.tvist.filter(np.zeros(setup.description.joints))
         return chosen
 
     def choose(
@@ -64,7 +78,7 @@ class FilterPlanner:
         if wanted > source.most and self._modal is not None:
             source = self._modal
         estimator = make_estimator(source, wanted, declared, "modes" if modes > 1 else where)
-        return source, self._make(name, estimator, where)
+        return self._with_feed_forward(source, self._make(name, estimator, where), where)
 
     def estimate(self, command: SetEstimator, basis: FilterBasis) -> PlannedFilter:
         """Return the present filter with modes from another source.
@@ -74,7 +88,7 @@ class FilterPlanner:
         """
         source = choose_source(command, self._setup)
         where = "f_d" if source.calibration is None else "calibration"
-        return source, self._again(basis, source, basis.declared, where)
+        return self._with_feed_forward(source, self._again(basis, source, basis.declared, where), where)
 
     def with_payload(self, payload: Payload, basis: FilterBasis) -> Filter | None:
         """Return the present filter with the modes for another payload; None if these are not known."""
@@ -91,3 +105,21 @@ class FilterPlanner:
     def _make(self, name: str, estimator: Estimator, where: str) -> Filter:
         joints = self._setup.description.joints
         return choose_filter(name, estimator, joints, where=where, known=self._known)
+
+    def _with_feed_forward(self, source: ModeSource, tvist: Filter, where: str) -> PlannedFilter:
+        """Add the feed-forward that a filter needs, with the springs of its source or else of the robot's calibration.
+
+        Raises:
+            RefusalError: The springs are not known.
+        """
+        if tvist.feed_forward == "rigid":
+            return PlannedFilter(source, tvist, None)
+        known = source if source.knows_payload else self._modal
+        if known is None or known.calibration is None:
+            why = f"{tvist.name} needs the arm's springs: identify them with tvist identify --model modal"
+            raise RefusalError("out_of_range", where, why)
+        try:
+            elastic = elastic_feed_forward(tvist, self._setup.description, known.calibration)
+        except EstimatorError as error:
+            raise RefusalError("out_of_range", where, f"{tvist.name}: {error}") from error
+        return PlannedFilter(source, tvist, elastic)

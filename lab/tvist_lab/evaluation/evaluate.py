@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tvist_controller.api import body, paper_payload
+from tvist_controller.api import ElasticFeedForward, body, paper_payload
 from tvist_lab.evaluation.baselines import Baseline
 from tvist_lab.evaluation.line import PAPER, control_line, point_to_point, shape, simulate
 from tvist_lab.evaluation.moves import Move
@@ -134,13 +134,14 @@ def _record(job: MoveJob) -> tuple[Recording, Recording, dict[str, Recording]]:
     cycle = control_line(description, start, carried, carried)
     reference = point_to_point(start, target)
 
-    def follow(shaped: Floats) -> Recording:
-        return simulate(cycle, start, reference, shaped, job.seed)
+    def follow(shaped: Floats, elastic: ElasticFeedForward | None = None) -> Recording:
+        return simulate(cycle, start, reference, shaped, job.seed, elastic=elastic)
 
     tvist = recipe.make(description, move.mass)
     tvist.reset(start)
     tvist.aim(target)  # as the robot does before a move
-    shaped = follow(shape(sound(tvist), point_to_point(start, target, spared(PAPER, tvist)))[0])
+    elastic = recipe.elastic(description, tvist)
+    shaped = follow(shape(sound(tvist), point_to_point(start, target, spared(PAPER, tvist)))[0], elastic)
     ticks = round(motions(shaped)[0].shaped_duration(shaped) / PERIOD)
     others = {
         baseline.name: follow(baseline.shaped(recipe, description, move, reference, ticks))

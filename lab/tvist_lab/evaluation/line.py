@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from tvist_controller.api import (
     STILL,
     ControlCycle,
+    ElasticFeedForward,
     JointLine,
     MotionLimits,
     Target,
@@ -145,7 +146,13 @@ def shape(step: Step, reference: Floats) -> tuple[Floats, bool]:
 
 
 def simulate(
-    cycle: ControlCycle, start: Floats, reference: Floats, shaped: Floats, seed: int, delay: float = 0.0
+    cycle: ControlCycle,
+    start: Floats,
+    reference: Floats,
+    shaped: Floats,
+    seed: int,
+    delay: float = 0.0,
+    elastic: ElasticFeedForward | None = None,
 ) -> Recording:
     """Let a plant follow a shaped reference from rest, and then rest for a while.
 
@@ -156,14 +163,17 @@ def simulate(
         shaped: The reference that the arm follows, shape (T', n) [rad].
         seed: Seed of sensor noise and gear errors.
         delay: Delay that the shaper declares [s].
+        elastic: Elastic feed-forward for the drives; None for that of the paper's controller.
 
     Returns:
-        Columns for the metrics on a common clock, from a tick before the motion on.
+        Columns for the metrics on a common clock, from a tick before the motion on. Targets are those that the drives
+        receive, so that ticks in which a feed-forward differentiates count as delay.
 
     Raises:
         ValueError: The plant does not provide the truth.
     """
     plant = cycle.plant
+    cycle.use(cycle.tvist, elastic)
     cycle.reset(start, seed=seed)
     resting = 4
     ticks = resting + max(len(shaped), len(reference)) + round(REST / PERIOD)
@@ -179,6 +189,9 @@ def simulate(
         aim: Target = sample.target
         target[tick], qd[tick], qdd[tick] = aim.q, aim.qd, aim.qdd
         force[tick], rotation[tick] = truth.specific_force, truth.flange_rotation
+    late = round(cycle.drive_delay / PERIOD)
+    for column in (target, qd, qdd):
+        column[late:] = column[: ticks - late].copy()
     q[:resting], q[resting:] = start, reference[-1]
     q[resting : resting + len(reference)] = reference
     pose = np.zeros((ticks, 6))
@@ -189,7 +202,7 @@ def simulate(
             "tick": tick_of, "timestamp": PERIOD * tick_of,
             "reference_q": q, "target_q": target, "target_qd": qd, "target_qdd": qdd,
             "truth_tool_acceleration": force, "truth_flange_pose": pose,
-            "shaper_delay": np.full(ticks, delay),
+            "shaper_delay": np.full(ticks, delay + cycle.drive_delay),
         }
     )  # fmt: skip
 

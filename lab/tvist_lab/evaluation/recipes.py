@@ -3,10 +3,12 @@
 from dataclasses import dataclass, replace
 
 from tvist_controller.api import (
+    ElasticFeedForward,
     ModeSource,
     MotionLimits,
     OwnShaper,
     choose_filter,
+    elastic_feed_forward,
     paper_payload,
     wanted_modes,
 )
@@ -14,6 +16,7 @@ from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration
 from tvist_shaping.base import Filter
+from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.fixed import Fixed
 from tvist_shaping.named import Registry
@@ -101,6 +104,23 @@ class Recipe:
             return choose_filter(self.shaper, Fixed([10.0], [0.1]), description.joints)
         estimator = self.estimator(description, mass, modes)
         return choose_filter(self.shaper, estimator, description.joints, known=known)
+
+    def elastic(self, description: RobotDescription, tvist: Filter) -> ElasticFeedForward | None:
+        """Create the elastic feed-forward that the filter needs; None if it does without.
+
+        Args:
+            description: The robot.
+            tvist: The filter.
+
+        Raises:
+            RecipeError: The calibration has no springs, or belongs to another arm.
+        """
+        if self.calibration is None:
+            return None
+        try:
+            return elastic_feed_forward(tvist, description, self.calibration)
+        except EstimatorError as error:
+            raise RecipeError(f"shaper {self.shaper}: {error}") from error
 
     def estimator(self, description: RobotDescription, mass: float, modes: int) -> Estimator:
         """Create the estimator that provides the filter's modes.

@@ -1,0 +1,143 @@
+"""Choice between the two kinds of feed-forward for the drives, and the transition from one to the other."""
+
+from msgspec import Struct
+
+from tvist_controller.control.differentiator import Floats, Target
+from tvist_controller.control.elastic_feed_forward import ElasticFeedForward
+from tvist_controller.control.joint_controllers import JointControllers
+from tvist_plant.description import RobotDescription
+from tvist_plant.drives import DriveCommand
+
+FADE = 150
+"""Ticks over which one kind of feed-forward fades into the other in motion."""
+
+
+class MotorReference(Struct, frozen=True, eq=False, gc=False):
+    """Motion of the motors that elastic feed-forward asks for."""
+
+    qd: Floats
+    """Velocity q̇* + ẇ, shape (n,) [rad/s]."""
+    qdd: Floats
+    """Acceleration q̈* + ẅ, shape (n,) [rad/s^2]."""
+    torque: Floats
+    """Torque, shape (n,) [N m]."""
+    limited: bool
+    """Whether ẅ was limited to the torque that the drives have left."""
+
+
+class DriveFeedForward:
+    """Feed-forward of the paper's controller, or of an elastic arm's while a shaper wants that.
+
+    Commands of the two kinds belong to different ticks, and they lead by different shares of the wind-up, so in motion
+    one fades into the other; at rest they are equal.
+
+    Args:
+        description: The robot.
+        period: Tick [s].
+        compensate_sag: Whether the motors lead by the twist of the gears under gravity.
+    """
+
+    def __init__(self, description: RobotDescription, period: float, *, compensate_sag: bool = False) -> None:
+        self._plain = JointControllers(description, period, compensate_sag=compensate_sag)
+        self.wanted: ElasticFeedForward | None = None
+        """The elastic feed-forward in use, or about to be; None for that of the paper's controller."""
+        self._elastic: ElasticFeedForward | None = None
+        self._share, self._rising = 0, False
+        self._rate = 1.0 / (FADE * period)
+        self._skipped: tuple[Target, Floats, Floats] | None = None
+        """Arguments for which the plain command was not computed at the last tick."""
+        self.reference: MotorReference | None = None
+        """Motion of the motors in the last command; None without elastic feed-forward."""
+
+    @property
+    def delay(self) -> float:
+        """Time by which commands are later than their targets at rest [s]."""
+        return 0.0 if self.wanted is None else self.wanted.delay
+
+    def use(self, elastic: ElasticFeedForward | None) -> None:
+        """Use elastic feed-forward or, for None, that of the paper's controller, after a transition."""
+        self.wanted = elastic
+
+    def rest(self) -> None:
+        """Complete a transition at once, since the arm is at rest."""
+        if self._elastic is not self.wanted or self._share != self._full:
+            self._begin()
+            self._share = self._full
+
+    def reset(self, gravity: Floats) -> None:
+        """Restart at rest.
+
+        Args:
+            gravity: Torque that balances gravity there, shape (n,) [N m].
+        """
+        self._plain.reset(gravity)
+        self._skipped = None
+        self._begin()
+        self._share = self._full
+
+    def command(
+        self, target: Target, torque: Floats, gravity: Floats, carried: Floats, *, smooth: bool = True
+    ) -> DriveCommand:
+        """Drive command for a target.
+
+        Args:
+            target: Shaped reference and its derivatives.
+            torque: τ* of the rigid arm, shape (n,) [N m].
+            gravity: The part of the torque that balances gravity, shape (n,) [N m].
+            carried: Inertial parameters of the payload, see `InverseDynamics.carried`.
+            smooth: Whether the reference is smooth enough for elastic feed-forward.
+        """
+        self._fade(smooth=smooth)
+        elastic = self._elastic
+        if elastic is None or self._share == 0:
+            self.reference = None
+            return self._continued(target, torque, gravity)
+        command = elastic.command(target, torque, carried, self._plain.sag(gravity))
+        if self._share < FADE:
+            command = self._blend(self._continued(target, torque, gravity), command)
+        else:
+            self._skipped = (target, torque, gravity)
+        qdd = target.qdd + elastic.acceleration
+        self.reference = MotorReference(command.qd, qdd, command.torque, elastic.limited)
+        return command
+
+    @property
+    def _full(self) -> int:
+        """Share of a completed transition."""
+        return 0 if self.wanted is None else FADE
+
+    def _begin(self) -> None:
+        """Begin with what is wanted, with a share of zero."""
+        self._elastic, self._share, self._rising = self.wanted, 0, False
+        if self._elastic is not None:
+            self._elastic.reset()
+
+    def _fade(self, *, smooth: bool) -> None:
+        """Advance the transition by a tick; one that is under way is completed before it turns back."""
+        if self._share == 0 and self._elastic is not self.wanted:
+            self._begin()
+        rises = smooth and self._elastic is not None and self._elastic is self.wanted
+        if self._share == 0 and rises and self._elastic is not None:
+            self._elastic.reset()
+        if self._share in {0, FADE}:
+            self._rising = rises
+        self._share = min(max(self._share + (1 if self._rising else -1), 0), FADE)
+
+    def _continued(self, target: Target, torque: Floats, gravity: Floats) -> DriveCommand:
+        """Plain command, which differentiates the wind-up from tick to tick."""
+        if self._skipped is not None:
+            self._plain.command(*self._skipped)
+            self._skipped = None
+        return self._plain.command(target, torque, gravity)
+
+    def _blend(self, plain: DriveCommand, elastic: DriveCommand) -> DriveCommand:
+        """Mixture of both commands, whose velocity is the derivative of its position."""
+        x = self._share / FADE
+        share = x * x * x * (10.0 - x * (15.0 - 6.0 * x))
+        rate = 30.0 * (x * (1.0 - x)) ** 2 * (self._rate if self._rising else -self._rate)
+        away = elastic.q - plain.q
+        return DriveCommand(
+            q=plain.q + share * away,
+            qd=plain.qd + share * (elastic.qd - plain.qd) + rate * away,
+            torque=plain.torque + share * (elastic.torque - plain.torque),
+        )
