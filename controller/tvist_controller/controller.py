@@ -210,7 +210,7 @@ class Controller:
             sample = self.motion.recover(error, self._seed)
             self._payload.begin_anew()
         self._payload.watch(sample)
-        self.filters.watch()
+        self.filters.watch(sample)
         self._stop_reasons.update(self.motion.activity.robot_mode, self.motion.safety_mode)
         self.tick_number += 1
         events, self._events = self._events, []
@@ -223,6 +223,7 @@ class Controller:
             self.tick_number,
             sample,
             self.cycle.tvist,
+            self.cycle.drive_delay,
             robot_mode=self.motion.activity.robot_mode,
             safety_mode=self.motion.safety_mode,
             runtime=self.motion.runtime,

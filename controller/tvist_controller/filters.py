@@ -2,6 +2,7 @@
 
 from tvist_controller.calibrations import fits
 from tvist_controller.command_row import Call, Row
+from tvist_controller.cycle import Sample
 from tvist_controller.events import Emit
 from tvist_controller.mode_source import ModeSource
 from tvist_controller.motion import MotionControl
@@ -24,7 +25,7 @@ class Filters:
 
     def __init__(self, motion: MotionControl, source: ModeSource, declared: Payload, emit: Emit) -> None:
         self._motion, self._cycle, self._emit = motion, motion.cycle, emit
-        self._declared, self._clipped = declared, False
+        self._declared, self._clipped, self._limited = declared, False, False
         self.source = source
         """Source of the filter's modes."""
         self.rows = (Row(SetShaper, self._choose), Row(SetEstimator, self._estimate))
@@ -99,11 +100,21 @@ class Filters:
             )
             self._emit("warning", why=why)
 
-    def watch(self) -> None:
-        """Warn when the filter cannot work as intended; once, until it works again."""
+    def watch(self, sample: Sample) -> None:
+        """Warn when the filter or its feed-forward cannot work as intended; once, until it works again.
+
+        Args:
+            sample: Signals of the latest tick.
+        """
         clipped = self._cycle.tvist.clipped
         if clipped and not self._clipped:
             name = self._cycle.tvist.name
             why = f"{name} cannot meet its specification here: it needs a longer delay line, or leaves more vibration"
             self._emit("warning", code="out_of_range", why=why)
         self._clipped = clipped
+        limited = sample.motors is not None and sample.motors.limited
+        if limited and not self._limited and not self._cycle.stopping:
+            why = "the torque limits keep the motors from leading enough: the arm will vibrate more after this motion"
+            self._emit("warning", code="limit_torque", why=why)
+            self._limited = True
+        self._limited = self._limited and not self._cycle.at_rest

@@ -32,6 +32,7 @@ class Reporter:
         tick: int,
         sample: Sample,
         tvist: Filter,
+        drive_delay: float,
         *,
         robot_mode: RobotMode,
         safety_mode: SafetyMode,
@@ -40,8 +41,21 @@ class Reporter:
         setpoint_sequence: int | None,
         missed_ticks: int,
     ) -> State:
-        """Return the state of a tick."""
-        target, measured, unshaped = sample.target, sample.measured, sample.unshaped
+        """Return the state of a tick.
+
+        Args:
+            tick: Number of the tick.
+            sample: Signals along the control line.
+            tvist: The filter.
+            drive_delay: Time by which commands for the drives are later than their targets [s].
+            robot_mode: Present robot mode.
+            safety_mode: Present safety mode.
+            runtime: Whether something moves.
+            speed: Share of the programmed speed [-].
+            setpoint_sequence: Sequence number of the newest accepted set-point.
+            missed_ticks: Number of ticks that began too late.
+        """
+        target, measured, unshaped, motors = sample.target, sample.measured, sample.unshaped, sample.motors
         pose, tool_speed = self._kinematics.tool(measured.q, measured.qd)
         state = State(
             tick=tick,
@@ -64,18 +78,26 @@ class Reporter:
             speed_scaling=speed,
             estimated_f_d=tvist.f_d.tolist(),
             estimated_zeta=tvist.zeta.tolist(),
-            shaper_delay=tvist.delay,
+            shaper_delay=tvist.delay + drive_delay,
             missed_ticks=missed_ticks,
             shaper_clipped=tvist.clipped,
         )
-        if unshaped is None:
-            return state
-        return replace(
-            state,
-            unshaped_q=unshaped.q.tolist(),
-            unshaped_qd=unshaped.qd.tolist(),
-            unshaped_qdd=unshaped.qdd.tolist(),
-        )
+        if unshaped is not None:
+            state = replace(
+                state,
+                unshaped_q=unshaped.q.tolist(),
+                unshaped_qd=unshaped.qd.tolist(),
+                unshaped_qdd=unshaped.qdd.tolist(),
+            )
+        if motors is not None:
+            state = replace(
+                state,
+                motor_qd=motors.qd.tolist(),
+                motor_qdd=motors.qdd.tolist(),
+                motor_moment=motors.torque.tolist(),
+                motor_limited=motors.limited,
+            )
+        return state
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:
         """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""

@@ -38,6 +38,10 @@ STATE_COLUMNS = (
     "unshaped_q",
     "unshaped_qd",
     "unshaped_qdd",
+    "motor_qd",
+    "motor_qdd",
+    "motor_moment",
+    "motor_limited",
 )
 """Fields of a `state`, each of which becomes a column of the same name."""
 TRUTH_PREFIX = "truth_"

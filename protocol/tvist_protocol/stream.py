@@ -102,6 +102,14 @@ class State(Struct, frozen=True, kw_only=True, tag_field="type", tag="state", gc
     """Velocity of the reference before shaping; null: the same as `target_qd` [rad/s]."""
     unshaped_qdd: list[float] | None = None
     """Acceleration of the reference before shaping; null: the same as `target_qdd` [rad/s²]."""
+    motor_qd: list[float] | None = None
+    """Velocity that the drives are given by feed-forward of the arm's elasticity; null without it [rad/s]."""
+    motor_qdd: list[float] | None = None
+    """Acceleration of that motion; null without it [rad/s²]."""
+    motor_moment: list[float] | None = None
+    """Torque that they are given with it, within the drives' limits in `info`; null without it [N m]."""
+    motor_limited: bool = False
+    """Whether the torque limits keep the motors from leading by as much as the arm's elasticity wants."""
 
 
 class Event(Struct, frozen=True, kw_only=True, tag_field="type", tag="event", gc=False):

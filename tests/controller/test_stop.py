@@ -249,7 +249,9 @@ def test_a_stop_is_not_ahead_of_a_motion_that_negative_impulses_let_turn_back(na
     assert moment > 20
 
 
-@pytest.mark.parametrize("shaper", ["none", "zv", "ei3", "auto", "auto-target", "short"])
+@pytest.mark.parametrize(
+    "shaper", ["none", "zv", "ei3", "auto", "auto-target", "short", "elastic", "elastic-auto"]
+)
 @pytest.mark.parametrize("deceleration", [None, 1.0])
 def test_a_move_that_has_barely_begun_stands_as_soon_as_it_is_stopped(shaper, deceleration):
     for ticks in range(12):

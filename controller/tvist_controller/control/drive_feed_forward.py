@@ -97,8 +97,7 @@ class DriveFeedForward:
             command = self._blend(self._continued(target, torque, gravity), command)
         else:
             self._skipped = (target, torque, gravity)
-        qdd = target.qdd + elastic.acceleration
-        self.reference = MotorReference(command.qd, qdd, command.torque, elastic.limited)
+        self.reference = MotorReference(command.qd, elastic.qdd, command.torque, elastic.limited)
         return command
 
     @property

@@ -48,8 +48,8 @@ class ElasticFeedForward:
         self._ticks = 0
         self._late: tuple[Target, Floats, Floats | None] | None = None
         """Target of the tick before, its torque with that of the rotors, and its sag."""
-        self.acceleration: Floats = np.zeros(description.joints)
-        """Acceleration of the lead in the last command, shape (n,) [rad/s^2]."""
+        self.qdd: Floats = np.zeros(description.joints)
+        """Acceleration q̈* + ẅ of the last command, shape (n,) [rad/s^2]."""
         self.limited = False
         """Whether the lead's acceleration was limited at the last tick."""
 
@@ -94,10 +94,11 @@ class ElasticFeedForward:
             self.limited = follow(wanted, led, room, self._period)
         late, its_torque, its_sag = self._late
         self._late = (target, needed, sag)
-        q, qd, motor_torque, self.acceleration = motor_reference(
+        q, qd, motor_torque, acceleration = motor_reference(
             late.q, late.qd, its_torque, led, self._rotor, self._friction, self._width, self._linear, self._torques,
             self._period,
         )  # fmt: skip
+        self.qdd = late.qdd + acceleration
         if sag is not None and its_sag is not None:
             q += its_sag
             qd += (sag - its_sag) / self._period

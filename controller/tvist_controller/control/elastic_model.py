@@ -85,7 +85,7 @@ class SpringLoads:
         q[joints], self._qd[joints], self._qdd[joints] = target.q, target.qd, target.qdd
         load = pin.rnea(self._model, self._data, q, self._qd, self._qdd)
         jacobian = pin.computeFrameJacobian(self._model, self._data, q, self._flange, pin.LOCAL_WORLD_ALIGNED)
-        return load, jacobian
+        return load, jacobian.reshape(6, -1)  # that of a single coordinate has one dimension
 
 
 def _moved(parameters: Floats, placement: pin.SE3) -> Floats:

@@ -32,7 +32,21 @@ ROUNDING = 1e-9
 """Differences between positions below this are rounding errors [rad]."""
 TORQUE_ROUNDING = 1e-3
 """Share by which a torque may exceed its bound between the moments that are checked in planning [-]."""
-SHAPERS = ("none", "zv", "mzv", "zvd", "zvddd", "ei3", "um_zv", "um_zvd", "auto", "auto-target", "short")
+SHAPERS = (
+    "none",
+    "zv",
+    "mzv",
+    "zvd",
+    "zvddd",
+    "ei3",
+    "um_zv",
+    "um_zvd",
+    "auto",
+    "auto-target",
+    "short",
+    "elastic",
+    "elastic-auto",
+)
 
 Halt = Callable[[Subject, np.random.Generator], object]
 
