@@ -51,6 +51,17 @@ SMOOTHED: Mapping[str, FeedForward] = MappingProxyType(
 """Filters that only smooth the reference, with the feed-forward that stills the arm."""
 SMOOTHING = (14, 8)
 """Ticks of their running means."""
+OF_SEVERAL_MODES: Mapping[str, str] = MappingProxyType(
+    {
+        "auto": "four modes with any payload, at a constant mean delay: keeps the limits",
+        "short": "like auto: shorter, leaves slightly more",
+        AIMED: "like auto, for motions with a known end: shorter",
+        "elastic": "smoothing alone, and feed-forward of the arm's elasticity: half the delay of auto",
+        "elastic-position": "like elastic, for drives that take positions and velocities, but no torques",
+        ELASTIC_AUTO: "auto, smoothed, with feed-forward of the arm's elasticity: leaves least",
+    }
+)
+"""What distinguishes the filters that are no shapers of the catalogue, by name."""
 
 PERIOD = 0.002
 """Tick of every filter that is created by name [s]."""

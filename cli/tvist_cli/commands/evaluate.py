@@ -50,8 +50,8 @@ def evaluate(
             configurations, and free of collisions.
         payload: Mass of the disc on the flange in kg, both carried and declared; uniform draws one for each move, from
             0 to the arm's rating [that of the robot file; 5 for the ur5e].
-        shaper: Name of a shaper; or of a filter for several modes: auto, short, or auto-target, which is given the
-            target of each move; or FILE.py:NAME, which runs that file, for your own shaper.
+        shaper: Any name that tvist shapers lists, such as zv, auto, or elastic; auto-target is given the target of each
+            move. Or FILE.py:NAME, which runs that file, for your own shaper.
         modes: Number of modes that the shaper suppresses; more than one needs a modal calibration.
         calibration: Name of a calibration that comes with the package, or path of a calibration file
             [the one that comes with the package for this robot; for several modes, its modal one].

@@ -71,7 +71,7 @@ def serve(
             file; 5 for the ur5e].
         overload: Start even if the payload exceeds the robot's rating. The drives may not hold it; the robot then makes
             a protective stop.
-        shaper: Any name that tvist shapers lists, such as none, zv or ei3; or auto, short or auto-target; or
+        shaper: Any name that tvist shapers lists, such as none, zv, auto or elastic; or
             FILE.py:NAME, which runs that file and adds your own shaper to those that clients can choose [zv].
         shape_servo: Shape servoj, speedj and speedl of programs too, where they begin at rest. Without this option they
             bypass the shaper, since their client usually closes a loop, to which the shaper would add its delay.

@@ -36,7 +36,8 @@ def shapers(
             delay.
         json: Print one JSON object.
     """
-    from tvist_shaping import SHAPERS, Registry, Shaper, ShapingError
+    from tvist_shaping import BUILT_IN, SHAPERS, Registry, Shaper, ShapingError
+    from tvist_shaping.named import OF_SEVERAL_MODES
 
     with told(ShapingError, code=2):
         SHAPERS["none"].function(f_d, zeta)
@@ -52,7 +53,16 @@ def shapers(
             err.print(str(save(catalogue_figure(of_impulses, zeta), figures / "shapers.png")))
             err.print(str(save(mean_delay_figure(), figures / "mean_delay.png")))
     if json:
-        print_json({"f_d_hz": f_d, "zeta": zeta, "shapers": found})
+        others = [
+            {
+                "name": name,
+                "description": description,
+                "modes": BUILT_IN.modes_of(name),
+                "feed_forward": BUILT_IN.feed_forward_of(name),
+            }
+            for name, description in OF_SEVERAL_MODES.items()
+        ]
+        print_json({"f_d_hz": f_d, "zeta": zeta, "shapers": found, "for_calibrated_arms": others})
         return
     table(
         f"input shapers for a mode of {f_d:g} Hz, ζ = {zeta:g}",
@@ -62,6 +72,10 @@ def shapers(
     width = max(len(one.name) for one in listed)
     for one in listed:
         out.print(f"{one.name:{width}}  {one.description}", markup=False)
+    out.print("\nfor arms with a modal calibration, whose modes and springs they know:", markup=False)
+    width = max(map(len, OF_SEVERAL_MODES))
+    for name, description in OF_SEVERAL_MODES.items():
+        out.print(f"{name:{width}}  {description}", markup=False)
     out.print(
         "\nms: how much later a motion ends; mean ms: delay during motion at constant velocity;\n"
         "band: ratios of true to assumed frequency for which at most that much vibration remains;\n"
