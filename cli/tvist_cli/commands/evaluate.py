@@ -207,7 +207,7 @@ def _recipe(
 
     recipe = Recipe(shaper, known, 0.01 * frequency_error, modes, own)
     with told(RecipeError, RefusalError, ShapingError, code=2):
-        recipe.make(description, masses[1])
+        recipe.elastic(description, recipe.make(description, masses[1]))
         # Without a calibration of the arm, no baseline can be designed for it.
         return recipe, every(recipe, description, masses) if baselines and known is not None else ()
 
