@@ -8,6 +8,7 @@ from tvist_lab.benchmark.many_robots import robots_at_500_hz
 from tvist_lab.benchmark.one_robot import one_robot
 from tvist_lab.benchmark.parts import parts
 from tvist_lab.benchmark.programs import programs
+from tvist_lab.benchmark.shapers import shapers
 from tvist_lab.benchmark.ur_interfaces import ur_interfaces, with_a_program
 
 OF_MANY = 0.4
@@ -22,6 +23,7 @@ def bench(seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
         tell: Called with a description of each measurement before it starts.
     """
     result: dict[str, Any] = parts(tell)
+    result["shapers"] = shapers(tell)
     result["programs"] = programs(tell)
     if seconds > 0.0:
         result |= asyncio.run(one_robot(seconds, tell))

@@ -170,6 +170,29 @@ def test_the_arm_rests_a_hundred_milliseconds_earlier_than_it_would_and_nearly_s
     assert left["elastic-position"] < 0.25 * left["none"]
 
 
+def left_with(change) -> float:
+    """Share of the vibration that `elastic` leaves if the controller's knowledge is changed."""
+    description, left = UR5E.clean(), {}
+    for name in ("none", "elastic"):
+        cycle = line(name, Q1, description=description)
+        if name == "elastic":
+            change(cycle.elastic)
+        left[name] = ringing(move(cycle, Q3)[1])
+    return left["elastic"] / left["none"]
+
+
+def test_the_bending_of_links_is_indispensable_and_rotor_inertia_need_not_be_exact():
+    def rigid_links(elastic):
+        elastic._model.stiffness[elastic._model.flexes] = 1e12
+
+    def other_rotors(elastic):
+        elastic._rotor *= 1.2
+
+    known = left_with(lambda _: None)
+    assert left_with(rigid_links) > 4.0 * known
+    assert left_with(other_rotors) < 2.0 * known
+
+
 def test_the_flange_accelerates_as_a_rigid_arms_would():
     """Independent of the lead's formula: the flexible arm's flange beside the rigid kinematics of its target."""
     wrong, kinematics = {}, ForwardKinematics(UR5E)

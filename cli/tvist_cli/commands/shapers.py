@@ -32,8 +32,8 @@ def shapers(
         f_d: Damped frequency of the mode in Hz.
         zeta: Damping ratio of the mode.
         shaper: FILE.py:NAME, repeatable: run that file and list the shaper in it, too.
-        figures: Folder to write figures to: residual vibration for a wrong frequency, and the effect of a varying mean
-            delay.
+        figures: Folder to write figures to: residual vibration for a wrong frequency, and the effects of a varying
+            mean delay and of elastic feed-forward.
         json: Print one JSON object.
     """
     from tvist_shaping import BUILT_IN, SHAPERS, Registry, Shaper, ShapingError
@@ -46,12 +46,13 @@ def shapers(
     listed: list[AnyShaper] = [*SHAPERS.values(), *own.values()]
     found = [_about(one, f_d, zeta) for one in listed]
     if figures is not None:
-        from tvist_lab.figures import catalogue_figure, mean_delay_figure, save
+        from tvist_lab.figures import catalogue_figure, elastic_figure, mean_delay_figure, save
 
         with told(OSError):
             of_impulses = [one for one in listed if isinstance(one, Shaper)]
             err.print(str(save(catalogue_figure(of_impulses, zeta), figures / "shapers.png")))
             err.print(str(save(mean_delay_figure(), figures / "mean_delay.png")))
+            err.print(str(save(elastic_figure(), figures / "elastic.png")))
     if json:
         others = [
             {

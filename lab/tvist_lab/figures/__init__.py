@@ -3,6 +3,7 @@
 from tvist_lab.figures.after_stop import after_stop_figure
 from tvist_lab.figures.catalogue import catalogue_figure
 from tvist_lab.figures.discretisation import figure_7
+from tvist_lab.figures.elastic import elastic_figure
 from tvist_lab.figures.evaluated import residual_by_move_figure, vibration_figure
 from tvist_lab.figures.identified import identified_figure
 from tvist_lab.figures.mean_delay import mean_delay_figure
@@ -19,6 +20,7 @@ __all__ = [
     "after_stop_figure",
     "catalogue_figure",
     "corner_figure",
+    "elastic_figure",
     "figure_2",
     "figure_4",
     "figure_7",
