@@ -75,6 +75,6 @@ def _stop(name: str) -> tuple[Floats, Floats, Floats]:
         force.append(truth_of(cycle.plant).specific_force)
         left.append(float(end[0] - sample.target.q[0]))
     felt = np.array(force)
-    time: Floats = 1e3 * PERIOD * (np.arange(len(felt)) - stop)
+    time = 1e3 * PERIOD * np.arange(-stop, len(felt) - stop, dtype=np.float64)
     away: Floats = np.sqrt(((felt - felt[-1]) ** 2).sum(axis=1))
     return time, away, 1e3 * np.array(left)
