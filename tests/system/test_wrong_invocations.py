@@ -53,6 +53,7 @@ MISUSE = [
     (("check", "--colour"), ["tvist check has no option --colour"]),
     (("move", "Q1", "--velcity", "2"), ["--velcity", "did you mean --velocity?"]),
     (("move", "Q1", "-x"), ["no option -x"]),
+    (("move", "--", "-0.5,0", "--endpoint", NOWHERE), ["--endpoint comes after --", "give it before"]),
     (("move",), ["target is missing"]),
     (("analyze",), ["file is missing"]),
     (("keys",), ["folder is missing"]),
