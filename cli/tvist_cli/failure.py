@@ -44,6 +44,8 @@ def _sentence(error: Exception) -> str:
     """Return the message without the code that a protocol error found here carries for a remote client."""
     if isinstance(error, ProtocolError):
         return error.why
+    if isinstance(error, FileExistsError) and error.filename is not None:
+        return f"{error.filename} exists already and is no folder: choose another name"
     if type(error).__module__ == "builtins" and isinstance(error, OSError) and error.strerror:
         return error.strerror if error.filename is None else f"{error.filename}: {error.strerror}"
     return str(error)

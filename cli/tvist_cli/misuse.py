@@ -79,7 +79,11 @@ def sentence(error: CycloptsError, commands: Sequence[str]) -> str:
             name = error.token.keyword or error.token.value
             known = [known for argument in error.argument_collection for known in argument.names]
             near = _near(name, [known for known in known if known.startswith("--")])
-            said = f"{command} has no option {short(name)}: {near}{seek}"
+            said = (
+                f"{short(name)} comes after --, where nothing counts as an option: give it before --"
+                if name in known
+                else f"{command} has no option {short(name)}: {near}{seek}"
+            )
         case CoercionError():
             given = "" if error.token is None else f" is {quoted(error.token.value)}"
             said = f"{_name(error)}{given}: must be {_wanted(error.target_type)}"

@@ -6,10 +6,11 @@ import weakref
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
-from tvist_client.errors import AnswerTimeoutError, ClientError, NotConnectedError
+from tvist_client.errors import AnswerTimeoutError, ArgumentError, ClientError, NotConnectedError
 from tvist_client.stream import Stream
 from tvist_client.transports.base import Topic, Transport
-from tvist_protocol.errors import ProtocolError
+from tvist_client.values import whole
+from tvist_protocol.errors import ProtocolError, quoted
 
 log = logging.getLogger(__name__)
 
@@ -66,13 +67,31 @@ class Feed(Generic[M]):
             self._subscribed = True
 
     def listen(self, callback: Callable[[M], object]) -> Callable[[], None]:
-        """Call a function with every message; the function returned ends that."""
+        """Call a function with every message; the function returned ends that.
+
+        Raises:
+            ArgumentError: What is given is not a function.
+            NotConnectedError: The connection is closed.
+        """
+        if not callable(callback):
+            raise ArgumentError(
+                "callback", f"callback is {quoted(callback)}: must be a function of one {self._topic} message"
+            )
         self.subscribe()
         self._listeners.append(callback)
         return lambda: self._listeners.remove(callback)
 
-    def stream(self, size: int) -> Stream[M]:
-        """Return an iterator over every message from now on; it is dropped when it is no longer referenced."""
+    def stream(self, buffer: int) -> Stream[M]:
+        """Return an iterator over every message from now on; it is dropped when it is no longer referenced.
+
+        Args:
+            buffer: Number of messages that may wait, at least 1.
+
+        Raises:
+            ArgumentError: The buffer has no such number of places.
+            NotConnectedError: The connection is closed.
+        """
+        size = whole(buffer, "buffer", 1)
         self.subscribe()
         stream: Stream[M] = Stream(size)
         self._streams.add(stream)

@@ -60,7 +60,7 @@ def check_free(lease: Lease | None, client: str) -> None:
         NoControlError: Another client has it.
     """
     if lease is not None and lease.client != client:
-        why = f"control is held by {lease.client!r} until it releases it"
+        why = f"control is held by {lease.client!r}: wait until it releases control or its lease ends"
         raise NoControlError("no_control", why)
 
 

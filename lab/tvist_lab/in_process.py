@@ -15,7 +15,8 @@ def free_setup(config: ServeConfig | None = None, **changes: object) -> Setup:
     """Return a setup with a free clock and published truth, by default of the default robot.
 
     Args:
-        config: Configuration to start from, except clock and truth.
+        config: Configuration to start from, with its own truth; since nothing in this process follows the wall clock,
+            `realtime` becomes `free`.
         changes: Fields of `ServeConfig` to change.
 
     Raises:
@@ -26,7 +27,8 @@ def free_setup(config: ServeConfig | None = None, **changes: object) -> Setup:
     if config is None:
         return from_mapping({"clock": "free", "truth": True, **changes}, "setup").setup()
     checked = from_mapping(changes, "setup")
-    return replace(config, **{name: getattr(checked, name) for name in changes}).setup()
+    timeless: dict[str, object] = {"clock": "free"} if config.clock == "realtime" else {}
+    return replace(config, **(timeless | {name: getattr(checked, name) for name in changes})).setup()
 
 
 @asynccontextmanager

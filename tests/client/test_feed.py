@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from tvist_client import AnswerTimeoutError, NotConnectedError
+from tvist_client import AnswerTimeoutError, ArgumentError, NotConnectedError
 from tvist_client.feed import Feed
 from tvist_client.stream import Stream
 from tvist_client.transports.inbox import MAX_WAITING, Inbox
@@ -96,6 +96,15 @@ async def test_a_listener_that_raises_disturbs_neither_the_others_nor_the_robot(
     source.put(encode(fake.state(1)))
     assert seen == [1]
     assert [type(error) for error in raised] == [ZeroDivisionError]
+
+
+async def test_what_is_no_function_or_no_buffer_is_refused_before_the_robot_is_asked(source, states):
+    with pytest.raises(ArgumentError, match="callback is None: must be a function of one state message"):
+        states.listen(None)
+    for size in (0, -1, "big", 1.5):
+        with pytest.raises(ArgumentError, match=r"buffer is .*: must be .*at least 1"):
+            states.stream(size)
+    assert not source.callbacks
 
 
 async def test_a_listener_may_end_itself_while_it_is_called(source, states, fake):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tvist_lab.in_process import free_setup
+from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_server.config import ConfigError, ServeConfig
 
 
@@ -16,6 +16,12 @@ def test_changes_are_made_to_the_default_and_to_a_configuration_alike():
 def test_what_is_not_changed_stays_the_configurations_own():
     found = free_setup(ServeConfig(shaper="ei", clock="lockstep"), seed=7)
     assert (found.shaper, found.clock, found.truth) == ("ei", "lockstep", False)
+
+
+async def test_a_configuration_of_a_served_robot_answers_in_process_too():
+    async with robot_in_process(free_setup(ServeConfig(), seed=7)) as robot:
+        assert (await robot.state()).tick == 0
+        assert await robot.clock() == "free"
 
 
 @pytest.mark.parametrize("config", [None, ServeConfig()])

@@ -71,6 +71,15 @@ def test_what_does_not_fit_the_rest(values, named):
     assert named in sentence(config(**values).setup)
 
 
+def test_a_folder_for_the_last_second_that_is_none_is_refused_and_not_found_out_at_the_failure(tmp_path):
+    (tmp_path / "file").touch()
+    for folder in ("file", "nowhere"):
+        assert f"dump is '{tmp_path / folder}': must be a folder" in sentence(
+            config(dump=str(tmp_path / folder)).dump_folder
+        )
+    assert config(dump=str(tmp_path)).dump_folder() == tmp_path
+
+
 def test_the_defaults_are_the_paper_s():
     made = config().setup()
     assert made.q == UR5E.poses["Q1"]

@@ -18,7 +18,7 @@ EXPOSED = [
     "tcp/0.0.0.0:7447", "tcp/[::]:7447", "udp/0.0.0.0:7447", "ws/0.0.0.0:7447", "tcp/192.168.1.5:7447",
     "tcp/[fe80::1%eth0]:7447", "tcp/[2001:db8::1]:7447", "udp/224.0.0.224:7446", "tcp/[::ffff:192.0.2.1]:7447",
     "tcp/0:7447", "tcp/:7447", "tcp/nowhere.invalid:7447", "serial//dev/ttyUSB0", "vsock/-1:7447", "TCP/127.0.0.1:7447",
-    "tcp/0.0.0.0:7447#iface=lo", "tcp/0.0.0.0:7447?from=127.0.0.1:1", "unixpipe//tmp/robot", "nonsense", "",
+    "tcp/0.0.0.0:7447#iface=lo", "tcp/0.0.0.0:7447?from=127.0.0.1:1", "unixpipe//tmp/robot",
     "tcp/127.0.0.1.evil.invalid:7447",
 ]  # fmt: skip
 
@@ -35,6 +35,18 @@ def test_whatever_else_is_refused_with_both_ways_out(endpoint):
         guarded(["tcp/127.0.0.1:7447", endpoint], ["ur5e"], security=None, insecure=False)
     for words in (f"listen is {endpoint}", "--security DIR", "--insecure"):
         assert words in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "endpoint", ["", "7447", "nonsense", "http://localhost:80", "tcp/", "/127.0.0.1:7447"]
+)
+@pytest.mark.parametrize("insecure", [True, False])
+def test_what_is_no_endpoint_is_told_the_form_of_one(endpoint, insecure):
+    assert not is_local(endpoint)
+    with pytest.raises(
+        ExposureError, match=r"must have the form tcp/ADDRESS:PORT, such as tcp/127.0.0.1:7447"
+    ):
+        guarded([endpoint], ["ur5e"], security=None, insecure=insecure)
 
 
 def test_a_name_with_one_address_that_leaves_the_machine_is_not_local(monkeypatch):

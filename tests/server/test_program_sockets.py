@@ -265,3 +265,11 @@ def test_what_is_asked_before_the_network_opens_is_done_then():
         server.close()
 
     asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    "text", ["300.1.1.1", "10.0.0.0/40", "1.2.3", "a b", "http://gripper", "gripper:50002", ""]
+)
+def test_what_is_no_machine_is_refused_and_not_taken_for_a_name(text):
+    with pytest.raises(ValueError, match=r"ur_allow has .*must be an IP address, a network"):
+        AllowedHosts(["gripper.lab", text])

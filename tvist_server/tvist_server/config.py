@@ -140,6 +140,16 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             raise ConfigError(f"programs is {self.programs!r}: must be a folder that exists")
         return ProgramFolder.of(Path(self.programs), name)
 
+    def dump_folder(self) -> Path:
+        """Return the folder for the last second before a failure.
+
+        Raises:
+            ConfigError: `dump` is not a folder, so that this second would be lost.
+        """
+        if not Path(self.dump).is_dir():
+            raise ConfigError(f"dump is {self.dump!r}: must be a folder that exists")
+        return Path(self.dump)
+
     def interfaces(self, number: int) -> tuple[str, dict[InterfaceName, int]]:
         """Return the address of a robot's UR interfaces, and the port of each.
 

@@ -44,7 +44,7 @@ class ServedRobot:
         allowed: Machines that programs may connect to, besides the one that sent them.
 
     Raises:
-        ValueError: The setup is invalid.
+        ValueError: The setup is invalid, or a machine is none.
         RecordingError: The recording cannot be written.
     """
 
@@ -58,6 +58,7 @@ class ServedRobot:
         allowed: Sequence[str] = (),
     ) -> None:
         self.setup = setup
+        hosts = AllowedHosts(allowed)
         self._complete = None if programs is None else programs.complete
         lockstep = setup.clock != "realtime"
         # When a client advances time, nothing is late, and plans are made when they are needed.
@@ -78,7 +79,7 @@ class ServedRobot:
         self._publisher = Publisher(lossless=lockstep)
         sinks: list[Sink] = [] if self.recorder is None else [self.recorder]
         sinks += [] if observe is None else [observe(self.controller)]
-        self.sockets = ProgramSockets(self._hear, self._warn, AllowedHosts(allowed))
+        self.sockets = ProgramSockets(self._hear, self._warn, hosts)
         """Gateway for the sockets of programs."""
         self._host = Host(self.controller, *sinks, black_box, self._publisher, ports=self.sockets)
         self.driven = Mailbox(self._host, self.sockets.patience)

@@ -82,6 +82,13 @@ def identify(
     """
     if min(configurations, repeats, ring_downs, poses) < 1:
         raise Failure("configurations, repeats, ring-downs and poses must be at least 1", code=2)
+    if model == "polynomial" and payloads is not None:
+        raise Failure("payloads is for the modal model: give --model modal too, or leave it out", code=2)
+    if model == "modal" and (at or figures is not None):
+        which = "at" if at else "figures"
+        raise Failure(
+            f"{which} is for the polynomial model: leave it out, or give --model polynomial", code=2
+        )
     if not output.absolute().parent.is_dir():  # said before half an hour of jogs
         raise Failure(f"output is {output}: its folder does not exist", code=2)
     endpoint, mass = _endpoint_and_mass(endpoint, payload)

@@ -57,8 +57,8 @@ def serve(
     Args:
         name: Name of the robot on the network [ur5e].
         robot: Name of a robot that comes with the package, or path of a robot file [ur5e].
-        robots: Serve several robots, given as ROBOT[*COUNT] separated by commas: ur5e*2,other.toml serves ur5e-1,
-            ur5e-2 and other. Replaces --name and --robot.
+        robots: Serve several robots, given as `ROBOT[*COUNT]` separated by commas: `ur5e*2,other.toml` serves
+            ur5e-1, ur5e-2 and other. Replaces --name and --robot.
         listen: Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447].
         security: Folder made by tvist keys. The endpoint is then tls/ADDRESS:PORT, and clients without a role have no
             access.

@@ -1,9 +1,12 @@
 """The machines that programs may connect to."""
 
 import ipaddress
+import re
 from collections.abc import Sequence
 
 LOCALHOST = "localhost"
+_NAME = re.compile(r"(?!.*(^|\.)\d+$)[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
+"""Host names. The last part is no number, since the whole would be a mistyped address."""
 IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 
@@ -12,9 +15,17 @@ class AllowedHosts:
 
     Args:
         given: IP addresses, networks such as 192.168.1.0/24, and names.
+
+    Raises:
+        ValueError: One is none of these.
     """
 
     def __init__(self, given: Sequence[str]) -> None:
+        for text in given:
+            if _network(text) is None and not _NAME.fullmatch(text):
+                raise ValueError(
+                    f"ur_allow has {text!r}: must be an IP address, a network such as 192.168.1.0/24, or a name"
+                )
         self._names = set(given)
         self._networks = [network for text in given if (network := _network(text)) is not None]
 

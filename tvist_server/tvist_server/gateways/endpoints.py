@@ -14,6 +14,12 @@ def protocol(endpoint: str) -> str:
     return before if slash else ""
 
 
+def is_endpoint(endpoint: str) -> bool:
+    """Return whether a text has the form of an endpoint: a word, a slash and an address."""
+    word, slash, address = endpoint.partition("/")
+    return bool(slash and address) and word.replace("-", "").isalnum()
+
+
 def options(endpoint: str) -> str:
     """Return the part after `#`, which overrides the session's settings; empty if there is none."""
     return endpoint.partition("#")[2]

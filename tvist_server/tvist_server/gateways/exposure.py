@@ -23,7 +23,7 @@ from tvist_protocol.codec import MAX_BYTES
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
 from tvist_server.gateways.access import Role, access_control, open_access
-from tvist_server.gateways.endpoints import is_local, options, protocol
+from tvist_server.gateways.endpoints import is_endpoint, is_local, options, protocol
 
 AUTHORITY, CERTIFICATE, KEY, CLIENTS = "authority.pem", "robot.pem", "robot.key", "clients.toml"
 _LINE = 'a line is "NAME" = "operator" or "NAME" = "viewer"'
@@ -56,8 +56,13 @@ def guarded(
         insecure: Whether clients need no authentication.
 
     Raises:
-        ExposureError: Other machines could reach an unprotected endpoint, or the folder is incomplete.
+        ExposureError: An endpoint is none, other machines could reach an unprotected one, or the folder is incomplete.
     """
+    for endpoint in listen:
+        if not is_endpoint(endpoint):
+            raise ExposureError(
+                f"listen is {endpoint!r}: must have the form tcp/ADDRESS:PORT, such as tcp/127.0.0.1:7447"
+            )
     if security is not None:
         if insecure:
             raise ExposureError("security and insecure exclude each other: leave one out")
