@@ -100,8 +100,9 @@ row belongs to every shaper. The other rows are measured with `--shape-servo`.
 
 The first joint alone speeds up with {RAMP:g} rad/s², keeps its speed for {CONSTANT:g} s, and slows down likewise. *Lag*
 is the error at constant speed divided by the speed. It is the lag of `servoj` plus the mean delay of the shaper.
-`auto`, `short` and `auto-target` know the modes with any payload. The frequencies of the other shapers come from the
-calibration of the package, which was made with 5 kg, and so do their mean delays.
+`auto`, `short`, `auto-target` and `elastic-auto` know the modes with any payload, `elastic` needs none. The
+frequencies of the other shapers come from the calibration of the package, which was made with 5 kg, and so do their
+mean delays.
 
 {_table(result, "ramp")}
 
