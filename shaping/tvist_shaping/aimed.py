@@ -1,4 +1,4 @@
-"""A filter that knows where a motion will end, and uses the weights for that configuration from the start."""
+"""Filters that know where a motion will end, and use the weights for that configuration from the start."""
 
 import numpy as np
 import numpy.typing as npt
@@ -21,12 +21,8 @@ class AimedFilter(SteadyFilter):
         super().__init__(design, estimator, joints=joints, smooth=smooth)
         self.excess = 0.0
 
-    def aim(self, q: npt.ArrayLike | None) -> None:
-        """Use the weights for the end of a motion; the reference must be at rest.
-
-        Args:
-            q: Sample at the end, shape (width,); None if it is not known.
-        """
+    def aim(self, q: npt.ArrayLike | None, *, quiet: bool = False) -> None:  # noqa: ARG002  see `PlannedFilter`
+        """Use the weights for the end of a motion; the reference must be at rest. See `Filter.aim`."""
         if q is None:
             self._start()
             return
@@ -43,3 +39,17 @@ class AimedFilter(SteadyFilter):
             self._line.gather(self._taps, self._delays, self._q_star)
         else:
             super()._weigh()
+
+
+class PlannedFilter(AimedFilter):
+    """Filter for motions that are planned to leave no vibration: it leaves these unchanged.
+
+    It shapes all other motions like an `AimedFilter`.
+    """
+
+    def aim(self, q: npt.ArrayLike | None, *, quiet: bool = False) -> None:
+        """Use the weights for the end of a motion, or leave a quiet one unchanged; see `Filter.aim`."""
+        super().aim(q)
+        if quiet:
+            self._taps[:] = 0.0
+            self._taps[0] = 1.0

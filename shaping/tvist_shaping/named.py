@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from types import MappingProxyType
 from typing import TypeAlias
 
-from tvist_shaping.aimed import AimedFilter
+from tvist_shaping.aimed import AimedFilter, PlannedFilter
 from tvist_shaping.base import Filter
 from tvist_shaping.catalogue import SHAPERS
 from tvist_shaping.errors import DesignError, UnknownShaperError
@@ -33,13 +33,19 @@ def _auto_target() -> Design:
     return ShortDesign(0.026, wanted=FirDesign(residual=(0.035, 0.035, 0.06, 0.2)), name=AIMED)
 
 
-AIMED = "auto-target"
+def _planned() -> Design:
+    return ShortDesign(0.026, wanted=FirDesign(residual=(0.035, 0.035, 0.06, 0.2)), name=PLANNED)
+
+
+AIMED, PLANNED = "auto-target", "planned"
 DESIGNS: Mapping[str, Callable[[], Design]] = MappingProxyType(
-    {"auto": _auto, "short": _short, AIMED: _auto_target}
+    {"auto": _auto, "short": _short, AIMED: _auto_target, PLANNED: _planned}
 )
 """Designs with constant mean delay against an arm's four lowest modes: one with a smaller residual, one that is
-shorter, and one that knows where a motion will end.
+shorter, one that knows where a motion will end, and one that leaves motions unchanged if they are planned to leave no
+vibration.
 """
+_KINDS = {AIMED: AimedFilter, PLANNED: PlannedFilter}
 
 PERIOD = 0.002
 """Tick of every filter that is created by name [s]."""
@@ -116,8 +122,7 @@ class Registry:
         """
         self.check(name)
         if name in DESIGNS:
-            kind = AimedFilter if name == AIMED else SteadyFilter
-            return kind(DESIGNS[name](), estimator, joints=joints)
+            return _KINDS.get(name, SteadyFilter)(DESIGNS[name](), estimator, joints=joints)
         shaper = self.own[name] if name in self.own else SHAPERS[name]
         if isinstance(shaper, FirShaper):
             return SteadyFilter(shaper.design(), estimator, joints=joints)
@@ -133,7 +138,7 @@ def make_filter(shaper: str | AnyShaper, estimator: Estimator, *, joints: int) -
 
     Args:
         shaper: Name of a shaper of this package, as `BUILT_IN.names()` lists them, or a shaper of your own.
-        estimator: The modes as functions of q. Four modes are required for `auto`, `short` and `auto-target`, and the
+        estimator: The modes as functions of q. Four modes are required for the names in `DESIGNS`, and the
             declared number for a `FirShaper`; for others, it determines how many modes are suppressed.
         joints: Number of joints of the arm, >= 1.
 
