@@ -29,6 +29,7 @@ COMMANDS = {
     "shapers": "List the shapers with their durations and their robustness to a wrong frequency.",
     "identify": "Calibrate a robot from its own accelerometer.",
     "evaluate": "Compare the vibration of any moves unshaped and shaped.",
+    "bound": "Compute the least time that moves need to end without vibration, and what shapers take.",
     "paths": "Compare paths shaped along the path with the same paths shaped joint by joint.",
     "tracking": "Measure how closely the arm follows positions sent to servoj, with every shaper.",
     "shaperbench": "Rank shapers, your own included, on eight simulated arms.",

@@ -27,6 +27,9 @@ from tvist_controller.paths.poses import placement_vector
 from tvist_controller.presence import Presence
 from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.programs.socket_traffic import SocketNews
+from tvist_controller.quiet.elastic_arm import ElasticArm
+from tvist_controller.quiet.interior_point import Programme, inside, optimize
+from tvist_controller.quiet.quiet_motion import quiet_motion
 from tvist_controller.refusal import RefusalError
 from tvist_controller.reporting import truth_of
 from tvist_controller.safety import TORQUE_SHARE
@@ -43,6 +46,7 @@ __all__ = [
     "CollisionModel",
     "ControlCycle",
     "Controller",
+    "ElasticArm",
     "ElasticFeedForward",
     "Host",
     "InverseDynamics",
@@ -53,6 +57,7 @@ __all__ = [
     "OwnShaper",
     "PlannedMotion",
     "Presence",
+    "Programme",
     "RecordedShaper",
     "RefusalError",
     "ScriptCompiler",
@@ -70,13 +75,16 @@ __all__ = [
     "elastic_feed_forward",
     "estimator_of",
     "info_of",
+    "inside",
     "load_calibration",
     "mass_matrix",
     "modal_estimator",
+    "optimize",
     "paper_payload",
     "placement_vector",
     "plan_from_rest",
     "quickest_motion",
+    "quiet_motion",
     "resting_after",
     "stopping",
     "truth_of",

@@ -39,6 +39,10 @@ class CommandTable:
         """Plan a command on the present state."""
         return self._planner.plan(command, self._basis())
 
+    def plan_at_once(self, command: Command) -> Plan:
+        """Plan a command on the present state within a tick; see `MovePlanner.move`."""
+        return self._planner.plan(command, self._basis(), at_once=True)
+
     def plan_later(self, command: Command, basis: PlanBasis) -> Callable[[], Plan]:
         """Return what plans a command on a state: an `Order` that needs no thread."""
         return lambda: self._planner.plan(command, basis)

@@ -301,7 +301,7 @@ class Controller:
             peripherals=self.peripherals,
             emit=self._emit,
             send=self._send,
-            plan=self._commands.plan,
+            plan=self._commands.plan_at_once,
             order=lambda command: order(command, self.basis),
             basis=lambda: self.basis,
             latest=lambda: self.latest,

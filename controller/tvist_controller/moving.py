@@ -58,7 +58,7 @@ class RunningMove:
 
     def _begin(self) -> None:
         self._cycle.start(self._trajectory)
-        self._cycle.tvist.aim(self._trajectory.path.end)
+        self._cycle.tvist.aim(self._trajectory.path.end, quiet=self._trajectory.quiet)
 
     def _rate(self, speed: float, slowest: float | None) -> float:
         """Rate of its time [-]: lower if it was not planned for a shaper as slow or as peaked as the present one."""

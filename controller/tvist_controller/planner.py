@@ -14,6 +14,7 @@ from tvist_controller.planning.path_planner import PathPlanner
 from tvist_controller.planning.plan import MOTIONS, QUESTIONS, SCRIPTS, Basis, Found, Plan
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.programs.compiling import ScriptCompiler
+from tvist_controller.quiet.interior_point import rehearse
 from tvist_controller.refusal import RefusalError, check_content, payload_of
 from tvist_controller.setup import Setup
 from tvist_protocol import commands as c
@@ -42,11 +43,18 @@ class Planner:
     def rehearse(self) -> None:
         """Compile what plans use, before any is needed: it takes long where nothing is in numba's cache."""
         self._reachable.rehearse()
+        rehearse()
         self._paths.rehearse()
         self._scripts.rehearse()
 
-    def plan(self, command: c.Command, basis: PlanBasis) -> Plan:
-        """Plan a command; a refusal is a plan, too."""
+    def plan(self, command: c.Command, basis: PlanBasis, *, at_once: bool = False) -> Plan:
+        """Plan a command; a refusal is a plan, too.
+
+        Args:
+            command: The command.
+            basis: The present state.
+            at_once: Whether the plan must be made within a tick; see `MovePlanner.move`.
+        """
         on: Basis | None = basis.filter
         if isinstance(command, MOTIONS):
             on = basis.motion
@@ -58,15 +66,15 @@ class Planner:
             on = ScriptBasis()
         try:
             check_content(command, self._description)
-            return Plan(on, self._find(command, on))
+            return Plan(on, self._find(command, on, at_once=at_once))
         except RefusalError as refusal:
             return Plan(on, refusal)
 
-    def _find(self, command: c.Command, on: Basis | None) -> Found:
+    def _find(self, command: c.Command, on: Basis | None, *, at_once: bool) -> Found:
         found: Found = None
         match on:
             case MotionBasis() if isinstance(command, c.MoveJ):
-                found = self._moves.move(command, on)
+                found = self._moves.move(command, on, at_once=at_once)
             case MotionBasis() if isinstance(command, MoveL | MoveC | MovePath):
                 found = self._paths.plan(command, on)
             case ToolBasis() if isinstance(command, InverseKinematics):

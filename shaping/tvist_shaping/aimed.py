@@ -1,8 +1,9 @@
-"""A filter that knows where a motion will end, and uses the weights for that configuration from the start."""
+"""Filters that know where a motion will end, and use the weights for that configuration from the start."""
 
 import numpy as np
 import numpy.typing as npt
 
+from tvist_shaping.base import FeedForward
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.steady import SMOOTH, Design, SteadyFilter
 
@@ -15,18 +16,22 @@ class AimedFilter(SteadyFilter):
     behaves like a `SteadyFilter`.
     """
 
-    def __init__(self, design: Design, estimator: Estimator, *, joints: int, smooth: int = SMOOTH) -> None:
+    def __init__(
+        self,
+        design: Design,
+        estimator: Estimator,
+        *,
+        joints: int,
+        smooth: int = SMOOTH,
+        feed_forward: FeedForward = "rigid",
+    ) -> None:
         """Take the arguments of `SteadyFilter`."""
         self._aimed = False
-        super().__init__(design, estimator, joints=joints, smooth=smooth)
+        super().__init__(design, estimator, joints=joints, smooth=smooth, feed_forward=feed_forward)
         self.excess = 0.0
 
-    def aim(self, q: npt.ArrayLike | None) -> None:
-        """Use the weights for the end of a motion; the reference must be at rest.
-
-        Args:
-            q: Sample at the end, shape (width,); None if it is not known.
-        """
+    def aim(self, q: npt.ArrayLike | None, *, quiet: bool = False) -> None:  # noqa: ARG002  see `PlannedFilter`
+        """Use the weights for the end of a motion; the reference must be at rest. See `Filter.aim`."""
         if q is None:
             self._start()
             return
@@ -43,3 +48,17 @@ class AimedFilter(SteadyFilter):
             self._line.gather(self._taps, self._delays, self._q_star)
         else:
             super()._weigh()
+
+
+class PlannedFilter(AimedFilter):
+    """Filter for motions that are planned to leave no vibration: it leaves these unchanged.
+
+    It shapes all other motions like an `AimedFilter`.
+    """
+
+    def aim(self, q: npt.ArrayLike | None, *, quiet: bool = False) -> None:
+        """Use the weights for the end of a motion, or leave a quiet one unchanged; see `Filter.aim`."""
+        super().aim(q)
+        if quiet:
+            self._taps[:] = 0.0
+            self._taps[0] = 1.0

@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from types import MappingProxyType
 from typing import TypeAlias
 
-from tvist_shaping.aimed import AimedFilter
+from tvist_shaping.aimed import AimedFilter, PlannedFilter
 from tvist_shaping.base import FeedForward, Filter
 from tvist_shaping.catalogue import SHAPERS
 from tvist_shaping.errors import DesignError, UnknownShaperError
@@ -38,13 +38,25 @@ def _elastic_auto() -> Design:
     return SmoothedDesign(_auto(), running_means(8, 8), ELASTIC_AUTO)
 
 
-AIMED, ELASTIC_AUTO = "auto-target", "elastic-auto"
+def _planned() -> Design:
+    return ShortDesign(0.026, wanted=FirDesign(residual=(0.035, 0.035, 0.06, 0.2)), name=PLANNED)
+
+
+AIMED, PLANNED, ELASTIC_AUTO = "auto-target", "planned", "elastic-auto"
 DESIGNS: Mapping[str, Callable[[], Design]] = MappingProxyType(
-    {"auto": _auto, "short": _short, AIMED: _auto_target, ELASTIC_AUTO: _elastic_auto}
+    {
+        "auto": _auto,
+        "short": _short,
+        AIMED: _auto_target,
+        PLANNED: _planned,
+        ELASTIC_AUTO: _elastic_auto,
+    }
 )
 """Designs with constant mean delay against an arm's four lowest modes: one with a smaller residual, one that is
-shorter, one that knows where a motion will end, and one for what feed-forward of the arm's elasticity leaves.
+shorter, one that knows where a motion will end, one that leaves motions unchanged if they are planned to leave no
+vibration, and one for what feed-forward of the arm's elasticity leaves.
 """
+_KINDS = {AIMED: AimedFilter, PLANNED: PlannedFilter}
 SMOOTHED: Mapping[str, FeedForward] = MappingProxyType(
     {"elastic": "elastic", "elastic-position": "elastic-position"}
 )
@@ -56,6 +68,7 @@ OF_SEVERAL_MODES: Mapping[str, str] = MappingProxyType(
         "auto": "four modes with any payload, at a constant mean delay: keeps the limits",
         "short": "like auto: shorter, leaves slightly more",
         AIMED: "like auto, for motions with a known end: shorter",
+        PLANNED: "moves to a known target are planned to leave no vibration; like auto-target for other motions",
         "elastic": "smoothing alone, and feed-forward of the arm's elasticity: half the delay of auto",
         "elastic-position": "like elastic, for drives that take positions and velocities, but no torques",
         ELASTIC_AUTO: "auto, smoothed, with feed-forward of the arm's elasticity: leaves least",
@@ -151,10 +164,9 @@ class Registry:
         if name in SMOOTHED:
             weights = running_means(*SMOOTHING)
             return SmoothingFilter(name, weights, estimator, joints=joints, feed_forward=feed_forward)
-        if name == AIMED:
-            return AimedFilter(DESIGNS[name](), estimator, joints=joints)
         if name in DESIGNS:
-            return SteadyFilter(DESIGNS[name](), estimator, joints=joints, feed_forward=feed_forward)
+            kind = _KINDS.get(name, SteadyFilter)
+            return kind(DESIGNS[name](), estimator, joints=joints, feed_forward=feed_forward)
         shaper = self.own[name] if name in self.own else SHAPERS[name]
         if isinstance(shaper, FirShaper):
             return SteadyFilter(shaper.design(), estimator, joints=joints)
@@ -170,7 +182,7 @@ def make_filter(shaper: str | AnyShaper, estimator: Estimator, *, joints: int) -
 
     Args:
         shaper: Name of a shaper of this package, as `BUILT_IN.names()` lists them, or a shaper of your own.
-        estimator: The modes as functions of q. Four modes are required for `auto`, `short` and `auto-target`, and the
+        estimator: The modes as functions of q. Four modes are required for the names in `DESIGNS`, and the
             declared number for a `FirShaper`; for others, it determines how many modes are suppressed.
         joints: Number of joints of the arm, >= 1.
 

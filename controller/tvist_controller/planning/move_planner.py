@@ -11,8 +11,10 @@ from tvist_controller.control.differentiator import Floats
 from tvist_controller.control.inverse_dynamics import InverseDynamics
 from tvist_controller.control.shaped_reference import ShapedReference
 from tvist_controller.line_filter import LineFilter
-from tvist_controller.planning.basis import MotionBasis
+from tvist_controller.planning.basis import FilterBasis, MotionBasis
 from tvist_controller.planning.filter_planner import FilterPlanner
+from tvist_controller.quiet.elastic_arm import ElasticArm
+from tvist_controller.quiet.quiet_motion import quiet_motion
 from tvist_controller.refusal import RefusalError
 from tvist_controller.safety import arm_limits, largest_torque, rate_of, torque_along
 from tvist_controller.setup import Setup, body
@@ -26,6 +28,7 @@ from tvist_controller.trajectory import (
 )
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
+from tvist_shaping.named import PLANNED
 
 LOOKS = 64
 """Number of moments of a motion at which the torque is checked before the motion is simulated."""
@@ -71,8 +74,13 @@ class MovePlanner:
         self._dynamics = InverseDynamics(setup.description, payload)
         self._torque = np.array(setup.description.limits.torque)
 
-    def move(self, command: MoveJ, basis: MotionBasis) -> PlannedMove:
+    def move(self, command: MoveJ, basis: MotionBasis, *, at_once: bool = False) -> PlannedMove:
         """Plan a motion from rest; the command's content has been checked.
+
+        Args:
+            command: The command.
+            basis: State that the motion depends on.
+            at_once: Whether the plan must be made within a tick, which is too short for a quiet motion.
 
         Raises:
             RefusalError: There is no such motion, or it would lead to a collision.
@@ -80,7 +88,8 @@ class MovePlanner:
         path = JointLine(basis.q, np.array(command.q, dtype=float))
         limits = MotionLimits(command.velocity, command.acceleration, command.jerk)
         if command.duration is None:
-            return self.along(path, limits, basis)
+            arm = None if at_once else self._arm(basis.filter)
+            return self.along(path, limits, basis, arm=arm)
         limits = self._lasting(path, command.duration, basis)
         return self.along(path, limits, basis, at_least(limits, AGILE.acceleration, AGILE.jerk))
 
@@ -96,7 +105,12 @@ class MovePlanner:
         )
 
     def along(
-        self, path: Path, limits: MotionLimits, basis: MotionBasis, agility: MotionLimits | None = None
+        self,
+        path: Path,
+        limits: MotionLimits,
+        basis: MotionBasis,
+        agility: MotionLimits | None = None,
+        arm: ElasticArm | None = None,
     ) -> PlannedMove:
         """Plan a motion along a path, from rest to rest.
 
@@ -105,6 +119,8 @@ class MovePlanner:
             limits: Limits for every joint.
             basis: State that the motion depends on.
             agility: Limits of pauses and changes of the speed; None for those of the motion.
+            arm: Model of the arm, which a motion along a straight line in joint space is to leave without vibration;
+                None for the quickest motion.
 
         Raises:
             RefusalError: There is no such motion, or it would lead to a collision.
@@ -112,7 +128,10 @@ class MovePlanner:
         spared = replace(limits, acceleration=limits.acceleration * (1.0 - basis.excess))
         rate = rate_of(basis.speed, limits.velocity, basis.slowest)
         try:
-            motion = quickest_motion(path, spared, PERIOD, rate, agility)
+            if arm is not None and isinstance(path, JointLine):
+                motion = quiet_motion(path, spared, arm, PERIOD, rate, agility)
+            else:
+                motion = quickest_motion(path, spared, PERIOD, rate, agility)
         except ValueError as error:
             raise RefusalError("out_of_range", "velocity", str(error)) from error
         found = self.meeting(motion, basis)
@@ -121,6 +140,13 @@ class MovePlanner:
             time = motion.time_at(share)
             raise RefusalError("collision", "q", f"{meeting} {time:.2f} s after the start", CLEARANCE)
         return PlannedMove((motion,), limits.velocity, self.excess_of_torque(motion, basis))
+
+    def _arm(self, basis: FilterBasis) -> ElasticArm | None:
+        """Model of the arm if the filter wants quiet motions; None if it does not, or if there is no model."""
+        calibration = basis.source.calibration
+        if basis.name != PLANNED or calibration is None or calibration.modal is None:
+            return None
+        return ElasticArm(self._description, calibration, basis.declared)
 
     def meeting(self, motion: PlannedMotion, basis: MotionBasis) -> tuple[float, Meeting] | None:
         """Return the share of a motion's way after which two bodies would meet, and which; None if it is clear."""
@@ -161,7 +187,7 @@ class MovePlanner:
         shaped.enter(path.posture_of, path.start)
         line_filter = LineFilter(tvist, motion.limits)
         line_filter.begin(tvist, path.start, path.posture_of)
-        tvist.aim(path.end)
+        tvist.aim(path.end, quiet=motion.quiet)
         ahead = Ahead(motion.fork(), line_filter, shaped)
         ahead.until(MAX_AHEAD)
         return np.array(ahead.references) if ahead.rests else None

@@ -29,7 +29,7 @@ class Access:
     send: Callable[[Command, Plan | None], Reply | None]
     """Carries out a command with a plan that holds, or without one; raises `RefusalError`."""
     plan: Callable[[Command], Plan]
-    """Plans a command on the present state."""
+    """Plans a command on the present state within a tick."""
     order: Callable[[Command], Callable[[], Plan]]
     """Has a command planned on the present state, beside the ticks if the host can; returns what waits for the plan."""
     basis: Callable[[], PlanBasis]

@@ -49,14 +49,24 @@ class PlannedMotion(Trajectory):
         period: Tick [s].
         speed: Initial rate of its time relative to the clock's [-].
         agility: Limits of a change of the rate, at least those of the law, which may be slow; None for the same.
+        quiet: Whether the law leaves no vibration without a filter, if its time passes at the initial rate.
     """
 
     path: Path
     limits: MotionLimits
 
     def __init__(
-        self, path: Path, law: TimeLaw, period: float, speed: float = 1.0, agility: MotionLimits | None = None
+        self,
+        path: Path,
+        law: TimeLaw,
+        period: float,
+        speed: float = 1.0,
+        agility: MotionLimits | None = None,
+        *,
+        quiet: bool = False,
     ) -> None:
+        self.quiet = quiet
+        """Whether the law leaves no vibration without a filter."""
         self.path, self._law, self._period = path, law, period
         self.agility = law.limits if agility is None else agility
         """Limits that a change of the rate keeps."""

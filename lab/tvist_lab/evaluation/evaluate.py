@@ -10,7 +10,8 @@ from tvist_controller.api import ElasticFeedForward, body, paper_payload
 from tvist_lab.evaluation.baselines import Baseline
 from tvist_lab.evaluation.line import PAPER, control_line, point_to_point, shape, simulate
 from tvist_lab.evaluation.moves import Move
-from tvist_lab.evaluation.recipes import Recipe, spared
+from tvist_lab.evaluation.own_moves import own_move
+from tvist_lab.evaluation.recipes import Recipe
 from tvist_lab.evaluation.running import sound
 from tvist_lab.evaluation.workers import spread
 from tvist_lab.metrics import (
@@ -137,11 +138,8 @@ def _record(job: MoveJob) -> tuple[Recording, Recording, dict[str, Recording]]:
     def follow(shaped: Floats, elastic: ElasticFeedForward | None = None) -> Recording:
         return simulate(cycle, start, reference, shaped, job.seed, elastic=elastic)
 
-    tvist = recipe.make(description, move.mass)
-    tvist.reset(start)
-    tvist.aim(target)  # as the robot does before a move
-    elastic = recipe.elastic(description, tvist)
-    shaped = follow(shape(sound(tvist), point_to_point(start, target, spared(PAPER, tvist)))[0], elastic)
+    tvist, own = own_move(recipe, description, move, PAPER)
+    shaped = follow(shape(sound(tvist), own)[0], recipe.elastic(description, tvist))
     ticks = round(motions(shaped)[0].shaped_duration(shaped) / PERIOD)
     others = {
         baseline.name: follow(baseline.shaped(recipe, description, move, reference, ticks))

@@ -74,7 +74,11 @@ class Played(Trajectory):
 
 def point_to_point(start: Floats, target: Floats, limits: MotionLimits = PAPER) -> Floats:
     """Reference of a double S, from the first sample that may move to the one at the target, shape (T, n) [rad]."""
-    trajectory = quickest_motion(JointLine(start, target), limits, PERIOD)
+    return samples_of(quickest_motion(JointLine(start, target), limits, PERIOD))
+
+
+def samples_of(trajectory: Trajectory) -> Floats:
+    """Samples of a trajectory from the first that may move to the last, shape (T, n) [rad]."""
     samples = []
     while not trajectory.finished:
         samples.append(trajectory.next())

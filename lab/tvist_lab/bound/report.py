@@ -1,0 +1,173 @@
+"""The bound of each move beside what each shaper takes."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tvist_controller.api import body, paper_payload
+from tvist_lab.bound.least_time import MODES, bound
+from tvist_lab.evaluation.evaluate import JudgedMove, MoveJob, judge
+from tvist_lab.evaluation.line import PAPER
+from tvist_lab.evaluation.moves import Move
+from tvist_lab.evaluation.recipes import Recipe
+from tvist_lab.evaluation.workers import spread
+from tvist_plant.description import RobotDescription
+from tvist_plant.flexible_arm import FlexibleArm
+from tvist_protocol.calibration import Calibration
+
+SHAPERS = ("zv", "auto", "auto-target", "planned")
+"""Shapers that are compared unless others are named."""
+SHARE, MORE = 1.15, 4.0
+"""A shaper is near the bound if it takes at most this share of it, and this much more [ms]."""
+COLUMNS = ("move", "kg", "bound ms")
+SUMMARY = ("shaper", "delay ms", "less bound ms", "near %", "less %", "p5", "min", "q̈/limit", "q̇/limit")
+TERMS = {
+    "bound": "least extra time in which a motion can leave the four lowest modes at rest, without feed-forward",
+    "delay": "extra duration of the reference compared with the unshaped one, median",
+    "less bound": "median of the difference to the bound; below 0, the shaper leaves some vibration instead of none",
+    "near": f"share of moves whose delay is at most {SHARE:g} times the bound and {MORE:g} ms",
+    "less": "reduction of the largest |α| later than 10 ms after the stop; median, 5th percentile and smallest",
+    "q̈, q̇": "largest acceleration and velocity of a joint, divided by the limit; largest of all moves",
+}
+"""What the columns mean."""
+
+
+@dataclass(frozen=True)
+class BoundJob:
+    """A move to be judged with some shapers."""
+
+    name: str
+    """Name of the move."""
+    description: RobotDescription
+    """The arm, without disturbances."""
+    calibration: Calibration
+    """Calibration of the shapers."""
+    shapers: tuple[str, ...]
+    """Names of the shapers."""
+    move: Move
+
+
+@dataclass(frozen=True)
+class Bounded:
+    """A move with its bound."""
+
+    name: str
+    move: Move
+    bound: float
+    """The bound [ms]."""
+    judged: dict[str, JudgedMove]
+    """What each shaper made of it."""
+
+
+def compare(jobs: Sequence[BoundJob]) -> Iterator[Bounded]:
+    """Yield the results in order, each as soon as it is available."""
+    return spread(bounded, jobs, few=2, chunk=1)
+
+
+def bounded(job: BoundJob) -> Bounded:
+    """Compute the bound of a move, and make the move with each shaper."""
+    start, target = np.array(job.move.start), np.array(job.move.target)
+    arm = FlexibleArm(job.description, body(paper_payload(job.description, job.move.mass)))
+    modes = arm.modes(target)
+    least = bound(start, target, PAPER, modes.f_d[:MODES], modes.zeta[:MODES])
+    made = {
+        name: judge(MoveJob(job.description, job.move, Recipe(name, job.calibration))) for name in job.shapers
+    }
+    return Bounded(job.name, job.move, round(1e3 * least, 6), made)
+
+
+def report(found: Sequence[Bounded]) -> dict[str, Any]:
+    """Return the part of `tvist bound --json` about the moves."""
+    names = list(found[0].judged) if found else []
+    return {
+        "moves": [_row(one) for one in found],
+        "bound_ms": _spread([one.bound for one in found]),
+        "summary": {name: _summary(found, name) for name in names},
+    }
+
+
+def _row(one: Bounded) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "start": list(one.move.start),
+        "target": list(one.move.target),
+        "payload_kg": one.move.mass,
+        "bound_ms": one.bound,
+        "shapers": {
+            name: {
+                "delay_ms": judged.delay(judged.shaped),
+                "near": near(one, name),
+                "reduction_percent": judged.reduction(judged.shaped) if judged.counts else None,
+            }
+            for name, judged in one.judged.items()
+        },
+    }
+
+
+def near(one: Bounded, name: str) -> bool:
+    """Return whether a shaper takes little more than the bound."""
+    judged = one.judged[name]
+    return judged.delay(judged.shaped) <= SHARE * one.bound + MORE
+
+
+def _summary(found: Sequence[Bounded], name: str) -> dict[str, Any]:
+    judged = [one.judged[name] for one in found]
+    delays = np.array([one.delay(one.shaped) for one in judged])
+    bounds = np.array([one.bound for one in found])
+    reductions = [one.reduction(one.shaped) for one in judged if one.counts]
+    return {
+        "delay_ms": _spread(delays.tolist()),
+        "less_bound_ms": _spread((delays - bounds).tolist()),
+        "near_percent": 100.0 * float(np.mean([near(one, name) for one in found])),
+        "reduction_percent": _spread(reductions),
+        "peak_acceleration_ratio": max(one.shaped.acceleration for one in judged),
+        "peak_velocity_ratio": max(one.shaped.velocity for one in judged),
+    }
+
+
+def _spread(values: Sequence[float]) -> dict[str, float | None]:
+    """Median, 5th percentile and both extremes; None without values."""
+    shares = {"median": 50, "p5": 5, "min": 0, "max": 100}
+    return {
+        name: float(np.percentile(values, share)) if len(values) else None for name, share in shares.items()
+    }
+
+
+def move_columns(result: dict[str, Any]) -> tuple[str, ...]:
+    """Columns of the table of moves."""
+    return (*COLUMNS, *(f"{name} {what}" for name in result["summary"] for what in ("ms", "less %")))
+
+
+def move_rows(result: dict[str, Any]) -> list[list[str]]:
+    """Rows of the table of moves."""
+    return [
+        [row["name"], f"{row['payload_kg']:.1f}", f"{row['bound_ms']:.0f}"]
+        + [
+            cell
+            for one in row["shapers"].values()
+            for cell in (f"{one['delay_ms']:.0f}", _percent(one["reduction_percent"]))
+        ]
+        for row in result["moves"]
+    ]
+
+
+def summary_rows(result: dict[str, Any]) -> list[list[str]]:
+    """Rows of the table of shapers."""
+    return [
+        [
+            name,
+            f"{one['delay_ms']['median']:.0f}",
+            f"{one['less_bound_ms']['median']:.0f}",
+            f"{one['near_percent']:.0f}",
+            *(_percent(one["reduction_percent"][share]) for share in ("median", "p5", "min")),
+            f"{one['peak_acceleration_ratio']:.3f}",
+            f"{one['peak_velocity_ratio']:.3f}",
+        ]
+        for name, one in result["summary"].items()
+    ]
+
+
+def _percent(value: float | None) -> str:
+    return "–" if value is None else f"{value:.1f}"
