@@ -198,7 +198,8 @@ class TestRecipes:
 class TestReport:
     @staticmethod
     def judged(unshaped, shaped):
-        return JudgedMove(Made(unshaped, 1.0, 1.2, 1.0, 0.9), Made(shaped, 1.1, None, 1.01, 1.0))
+        before = Made(unshaped, 1.0, 1.2, 1.4, 1.0, 0.9, unshaped)
+        return JudgedMove(before, Made(shaped, 1.1, None, None, 1.01, 1.0, 0.5 * unshaped))
 
     def test_percentages_leave_out_what_did_not_vibrate_and_list_it(self, ur5e, paper, move):
         peaks = [(1.0, 0.1), (2.0, 0.5), (0.5 * WORTH, 0.1 * WORTH)]

@@ -13,6 +13,7 @@ from tvist_cli.simulated_arm import disturbed, masses_of, named
 
 if TYPE_CHECKING:
     from tvist_controller.own_shapers import OwnShaper
+    from tvist_lab.evaluation.conditions import Conditions
     from tvist_lab.evaluation.evaluate import JudgedMove, MoveJob
     from tvist_lab.evaluation.moves import Move
     from tvist_plant.description import RobotDescription
@@ -33,6 +34,10 @@ def evaluate(
     clean: bool = False,
     disturbances: str | None = None,
     frequency_error: float = 0.0,
+    payload_error: float = 0.0,
+    stiffness_error: float = 0.0,
+    limits: str = "gentle",
+    stroke: tuple[float, float] | None = None,
     baselines: Annotated[bool, Parameter(negative="--no-baselines")] = True,
     save_moves: Path | None = None,
     figures: Path | None = None,
@@ -61,6 +66,12 @@ def evaluate(
         clean: Simulate without nonlinear friction, gear errors and noise.
         disturbances: Disturbances to simulate, separated by commas: friction, gear, noise, or none [all].
         frequency_error: Percentage by which the controller overestimates every frequency.
+        payload_error: Percentage by which the declared mass exceeds the carried one.
+        stiffness_error: Percentage by which each gear, link and velocity loop of the arm is stiffer or softer, at
+            random, than the controller knows.
+        limits: gentle for the paper's limits, 1.5 rad/s, 2 rad/s² and 100 rad/s³; or industrial for 3 rad/s, 8 rad/s²
+            and 2000 rad/s³. Moves for which the drives are too weak are left out.
+        stroke: Smallest and largest length of random moves, as a share of the way between two configurations [0.3 1].
         baselines: Run the baselines as well; this takes three and a half times as long.
         save_moves: File to write the moves and their payloads to.
         figures: Folder to write figures to.
@@ -72,16 +83,20 @@ def evaluate(
     from tvist_plant.description import DescriptionError, load
 
     _check(moves, random, seed, modes, frequency_error, wrists=wrists)
+    conditions = _conditions(limits, payload_error, stiffness_error)
+    length = _stroke(stroke, moves)
     with told(DescriptionError, code=2):
         description = load(robot)
     masses = masses_of(payload, description)
     shaper, own = loaded(shaper)
     known = _calibration(calibration, shaper, own, modes, description)
-    chosen, share = _moves(moves, random, seed, masses, description, wrists=wrists)
+    chosen, share = _moves(moves, random, seed, masses, description, length, wrists=wrists)
+    drawn, chosen = len(chosen), _feasible(chosen, description, conditions)
     plant, kept = disturbed(description, disturbances, clean=clean)
     recipe, others = _recipe(shaper, own, modes, known, plant, frequency_error, masses, baselines=baselines)
     jobs = [
-        MoveJob(plant, move, recipe, others, seed=_arm_seed(seed, place)) for place, move in enumerate(chosen)
+        MoveJob(plant, move, recipe, others, seed=_arm_seed(seed, place), conditions=conditions)
+        for place, move in enumerate(chosen)
     ]
     judged: list[JudgedMove] = []
     with told(OSError):
@@ -107,10 +122,17 @@ def evaluate(
         "plant": named(kept),
         "disturbances": list(kept),
         "seed": seed,
+        "limits": limits,
+        "payload_error_percent": payload_error,
+        "stiffness_error_percent": stiffness_error,
         "free_of_collision": share,
         **report(jobs, judged),
     }
     result["notes"] = _notes(result, met, known, chosen, share)
+    if len(chosen) < drawn:
+        result["notes"].append(
+            f"{drawn - len(chosen)} of {drawn} moves were left out: the drives are too weak"
+        )
     if baselines and not others:
         result["notes"].append("there are no baselines: they need a calibration of this arm")
     if json:
@@ -134,6 +156,45 @@ def _check(
         raise Failure(f"modes is {modes}: must be 1 to 6", code=2)
     if not -90.0 <= frequency_error <= 900.0:
         raise Failure(f"frequency-error is {frequency_error:g} %: must be -90 to 900 %", code=2)
+
+
+def _conditions(limits: str, payload_error: float, stiffness_error: float) -> "Conditions":
+    from tvist_lab.evaluation.conditions import LIMITS, Conditions
+
+    if limits not in LIMITS:
+        raise Failure(f"limits is {limits!r}: must be {' or '.join(LIMITS)}", code=2)
+    if not -100.0 <= payload_error <= 900.0:
+        raise Failure(f"payload-error is {payload_error:g} %: must be -100 to 900 %", code=2)
+    if not 0.0 <= stiffness_error <= 90.0:
+        raise Failure(f"stiffness-error is {stiffness_error:g} %: must be 0 to 90 %", code=2)
+    return Conditions(LIMITS[limits], 0.01 * payload_error, 0.01 * stiffness_error)
+
+
+def _stroke(stroke: tuple[float, float] | None, moves: Path | None) -> tuple[float, float]:
+    from tvist_lab.evaluation.moves import STROKE
+
+    if stroke is None:
+        return STROKE
+    if moves is not None:
+        raise Failure("--stroke needs --random: it does not change the moves of a file", code=2)
+    low, high = stroke
+    if not 0.001 <= low <= high <= 1.0:
+        raise Failure(f"stroke is {low:g} {high:g}: must be two increasing shares of 0.001 to 1", code=2)
+    return stroke
+
+
+def _feasible(moves: list["Move"], description: "RobotDescription", conditions: "Conditions") -> list["Move"]:
+    """Return the moves for which the drives are strong enough.
+
+    Raises:
+        Failure: There are none.
+    """
+    from tvist_lab.evaluation.conditions import torque_share
+
+    found = [move for move in moves if torque_share(description, move, conditions.limits) <= 1.0]
+    if not found:
+        raise Failure("the drives are too weak for all of these moves at these limits", code=2)
+    return found
 
 
 def _calibration(
@@ -171,6 +232,7 @@ def _moves(
     seed: int,
     masses: tuple[float, float],
     description: "RobotDescription",
+    stroke: tuple[float, float],
     *,
     wrists: bool,
 ) -> tuple[list["Move"], float | None]:
@@ -184,7 +246,7 @@ def _moves(
             drawn_masses = np.random.default_rng(seed)
             return read_moves(path, description, lambda: float(drawn_masses.uniform(*masses))), None
         assert count is not None
-        drawn = draw_moves(description, count, seed, masses, wrists=wrists)
+        drawn = draw_moves(description, count, seed, masses, wrists=wrists, stroke=stroke)
     return drawn.moves, drawn.share
 
 

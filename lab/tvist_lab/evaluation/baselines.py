@@ -1,11 +1,12 @@
 """Baselines for the comparison of shapers, besides waiting (the unshaped motion)."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tvist_lab.evaluation.line import lengthened, shape
+from tvist_controller.api import MotionLimits
+from tvist_lab.evaluation.line import PAPER, lengthened, point_to_point, shape
 from tvist_lab.evaluation.moves import Move
 from tvist_lab.evaluation.recipes import Recipe
 from tvist_lab.recordings import Floats
@@ -37,9 +38,26 @@ class Baseline:
     """Design frequency [Hz]; None for the estimate at the move's target."""
     zeta: float | None = None
     """Design damping ratio [-]; None for the estimate at the move's target."""
+    modes: int = 1
+    """Number of lowest modes at the move's target, each of which gets a shaper."""
+    for_payload: bool = False
+    """Whether it is designed for the range of the lowest mode over the workspace with the declared payload."""
+    jerk_time: bool = False
+    """Whether the motion's jerk lasts a period of the lowest mode at the target, which then is not excited."""
+
+    @property
+    def told_target(self) -> bool:
+        """Whether it is designed for the end of each move."""
+        return self.f_d is None and not self.for_payload
 
     def shaped(
-        self, recipe: Recipe, description: RobotDescription, move: Move, reference: Floats, ticks: int
+        self,
+        recipe: Recipe,
+        description: RobotDescription,
+        move: Move,
+        reference: Floats,
+        ticks: int,
+        limits: MotionLimits = PAPER,
     ) -> Floats:
         """Samples of the whole motion, shape (T, n) [rad].
 
@@ -49,10 +67,14 @@ class Baseline:
             move: The move.
             reference: Its reference, shape (T', n) [rad].
             ticks: Duration of the shaped motion that it is compared with.
+            limits: Limits of the motion.
         """
         start, target = np.array(move.start), np.array(move.target)
+        if self.jerk_time:
+            f_d = float(recipe.estimator(description, move.mass, 1).estimate(target)[0][0])
+            return point_to_point(start, target, replace(limits, jerk=limits.acceleration * f_d))
         if self.shaper is None:
-            return lengthened(start, target, ticks)
+            return lengthened(start, target, ticks, limits)
         tvist = self.tvist(recipe, description, move)
         tvist.reset(start)
         return shape(tvist.filter, reference)[0]
@@ -66,18 +88,27 @@ class Baseline:
             move: The move.
         """
         assert self.shaper is not None
-        f_d, zeta = self.f_d, self.zeta
+        made, f_d, zeta = shaper(self.shaper), self.f_d, self.zeta
+        if self.for_payload:
+            f_d, zeta = _robust(self.shaper, recipe, description, (move.mass, move.mass))
         if f_d is None or zeta is None:
-            there = recipe.estimator(description, move.mass, 1).estimate(np.array(move.target))
-            f_d, zeta = float(there[0][0]), float(there[1][0])
-        made = shaper(self.shaper)
+            there = recipe.estimator(description, move.mass, self.modes).estimate(np.array(move.target))
+            frequencies, damping = there[0].tolist(), there[1].tolist()
+        else:
+            frequencies, damping = [f_d], [zeta]
         # Sufficient even if the estimate is too low.
-        longest = max(1.0, 1.01 * made.duration_periods / f_d)
-        return TvistFilter(made, Fixed([f_d], [zeta]), joints=description.joints, max_delay=longest)
+        longest = max(1.0, 1.01 * sum(made.duration_periods / f for f in frequencies))
+        return TvistFilter(made, Fixed(frequencies, damping), joints=description.joints, max_delay=longest)
 
 
 EQUAL_DURATION = Baseline("equal_duration_double_s", "longer double S")
 FROZEN = Baseline("zv_frozen_at_end", "ZV for the end pose", "zv")
+FROZEN_3 = Baseline("zv_3_modes_frozen_at_end", "ZV of three modes for the end pose", "zv", modes=3)
+TUNED_JERK = Baseline("double_s_of_one_period", "double S whose jerk lasts a period", jerk_time=True)
+FOR_PAYLOAD = tuple(
+    Baseline(f"{name}_for_payload", f"fixed {name.upper()} for the declared payload", name, for_payload=True)
+    for name in ("mzv", "ei", "ei3")
+)
 
 
 def baselines(
@@ -90,13 +121,21 @@ def baselines(
         description: The robot.
         masses: Smallest and largest payload [kg].
     """
+    fixed = [
+        Baseline(f"fixed_{name}", f"fixed {name.upper()}", name, *_robust(name, recipe, description, masses))
+        for name in ("mzv", "ei2", "ei3")
+    ]
+    known = recipe.calibration
+    several = (FROZEN_3,) if known is not None and known.modal is not None else ()
+    return (EQUAL_DURATION, TUNED_JERK, FROZEN, *several, *FOR_PAYLOAD, *fixed)
+
+
+def _robust(
+    name: str, recipe: Recipe, description: RobotDescription, masses: tuple[float, float]
+) -> tuple[float, float]:
+    """Design frequency [Hz] and damping ratio [-] of a fixed shaper for the lowest mode's range over the workspace."""
     f_d, zeta = workspace_range(recipe, description, masses)
-    fixed = []
-    for name in ("mzv", "ei2", "ei3"):
-        bounded = (zeta[0], min(zeta[1], 0.999 * shaper(name).zeta_max))
-        design = robust_over(name, f_d, bounded)
-        fixed.append(Baseline(f"fixed_{name}", f"fixed {name.upper()}", name, *design))
-    return (EQUAL_DURATION, FROZEN, *fixed)
+    return robust_over(name, f_d, (zeta[0], min(zeta[1], 0.999 * shaper(name).zeta_max)))
 
 
 def workspace_range(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tvist_controller.api import ElasticFeedForward
 from tvist_lab.evaluation.baselines import Baseline
 from tvist_lab.evaluation.line import PAPER, lengthened
 from tvist_lab.evaluation.moves import Move
@@ -48,6 +49,10 @@ class Candidate(ABC):
     def stepper(self, task: Task) -> RunningShaper | None:
         """Return the shaper, at rest at the start; None if it plans the whole motion instead of shaping a reference."""
 
+    def elastic(self, task: Task) -> ElasticFeedForward | None:  # noqa: ARG002  most do without
+        """Return the elastic feed-forward that the drives need; None for that of the paper's controller."""
+        return None
+
     def shaped(self, task: Task) -> Shaped:
         """Shape a whole motion, and check it for tails.
 
@@ -75,6 +80,10 @@ class Named(Candidate):
     def stepper(self, task: Task) -> "Filtering":
         """Return the filter, reset and given the target."""
         return _from_rest(self.recipe.make(task.description, task.move.mass), task)
+
+    def elastic(self, task: Task) -> ElasticFeedForward | None:
+        """Return what the filter needs."""
+        return self.recipe.elastic(task.description, self.recipe.make(task.description, task.move.mass))
 
 
 @dataclass(frozen=True)
@@ -110,7 +119,7 @@ class Shaping(Candidate):
     @property
     def told_target(self) -> bool:
         """Whether it is designed for the target."""
-        return self.baseline.f_d is None
+        return self.baseline.told_target
 
     def stepper(self, task: Task) -> "Filtering":
         """Return the fixed filter, reset; it knows the target if it is designed for it."""

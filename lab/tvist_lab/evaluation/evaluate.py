@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from tvist_controller.api import ElasticFeedForward, body, paper_payload
+from tvist_controller.api import ElasticFeedForward, MotionLimits, body, paper_payload
 from tvist_lab.evaluation.baselines import Baseline
+from tvist_lab.evaluation.conditions import AS_KNOWN, Conditions
 from tvist_lab.evaluation.line import PAPER, control_line, point_to_point, shape, simulate
 from tvist_lab.evaluation.moves import Move
 from tvist_lab.evaluation.own_moves import own_move
@@ -22,12 +23,17 @@ from tvist_lab.metrics import (
     peak_velocity,
     still_after,
 )
+from tvist_lab.metrics.common_clock import AFTER_STOP, STILL, peak_later_than
+from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import RobotDescription
+from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD
 
 WORTH = 0.2
 """Unshaped peak [m/s²] below which a move has no vibration to reduce, so that it is listed but not in percentages."""
+QUIET = 0.02
+"""A lower threshold of the acceleration below which an arm is still [m/s²]."""
 RESAMPLED = 2000
 """Number of bootstrap samples for an interval."""
 AT_ONCE = 8
@@ -45,7 +51,9 @@ class MoveJob:
     baselines: tuple[Baseline, ...] = ()
     """Baselines to run as well."""
     seed: int = 0
-    """Seed of gear errors."""
+    """Seed of gear errors, and of the arm's deviations."""
+    conditions: Conditions = AS_KNOWN
+    """Limits, and what the controller does not know."""
 
     @property
     def motions(self) -> int:
@@ -63,10 +71,14 @@ class Made:
     """Duration of the shaped reference [s]."""
     still_after: float | None
     """Time until still, from the start of the unshaped reference [s]; None if not still at the end of the recording."""
+    quiet_after: float | None
+    """Time until |α| stays below 0.02 m/s², likewise [s]."""
     acceleration: float
     """Largest |q̈*| relative to the limit of the unshaped reference [-]."""
     velocity: float
     """Largest |q̇*| relative to the limit of the unshaped reference [-]."""
+    waited: float
+    """Largest true |α| of the unshaped motion later than 10 ms after this one's stop [m/s²]."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +99,10 @@ class JudgedMove:
         """Reduction of the peak compared with the unshaped move [%]."""
         return 100.0 * (1.0 - made.peak / self.unshaped.peak)
 
+    def reduction_by_waiting(self, made: Made) -> float:
+        """Reduction of the peak compared with an unshaped arm that waits equally long [%]."""
+        return 100.0 * (1.0 - made.peak / made.waited)
+
     def delay(self, made: Made) -> float:
         """Extra duration of the reference compared with the unshaped one [ms]."""
         return round(1e3 * (made.duration - self.unshaped.duration), 6)
@@ -102,7 +118,9 @@ def judge(job: MoveJob) -> JudgedMove:
     """Make a move in every way, and measure it."""
     unshaped, shaped, others = _record(job)
     return JudgedMove(
-        measured(unshaped), measured(shaped), {name: measured(other) for name, other in others.items()}
+        measured(unshaped, limits=job.conditions.limits),
+        measured(shaped, unshaped, limits=job.conditions.limits),
+        {name: measured(other, unshaped, limits=job.conditions.limits) for name, other in others.items()},
     )
 
 
@@ -112,37 +130,54 @@ def evaluate(jobs: Sequence[MoveJob]) -> Iterator[JudgedMove]:
     return spread(judge, jobs, few=2 * AT_ONCE // motions, chunk=max(AT_ONCE // motions, 1))
 
 
-def measured(recording: Recording) -> Made:
-    """Measure the one motion of a recording."""
-    motion = motions(recording)[0]
-    try:
-        still: float | None = still_after(recording, motion)
-    except NotMeasurableError:
-        still = None
+def measured(
+    recording: Recording, unshaped: Recording | None = None, *, limits: MotionLimits = PAPER
+) -> Made:
+    """Measure the one motion of a recording.
+
+    Args:
+        recording: The recording.
+        unshaped: Recording of the same motion unshaped, which is waited with; None for the first one itself.
+        limits: Limits of the unshaped reference.
+    """
+    unshaped = unshaped or recording
+    motion, waiting = motions(recording)[0], motions(unshaped)[0]
+    stop = recording.time[motion.shaped_stop] + AFTER_STOP
     return Made(
         peak=peak_after_stop(recording, motion),
         duration=motion.shaped_duration(recording),
-        still_after=still,
-        acceleration=peak_acceleration(recording, motion) / PAPER.acceleration,
-        velocity=peak_velocity(recording, motion) / PAPER.velocity,
+        still_after=_still_after(recording, motion, STILL),
+        quiet_after=_still_after(recording, motion, QUIET),
+        acceleration=peak_acceleration(recording, motion) / limits.acceleration,
+        velocity=peak_velocity(recording, motion) / limits.velocity,
+        waited=peak_later_than(unshaped, waiting, min(stop, unshaped.time[-2])),
     )
 
 
+def _still_after(recording: Recording, motion: MotionRows, threshold: float) -> float | None:
+    try:
+        return still_after(recording, motion, threshold)
+    except NotMeasurableError:
+        return None
+
+
 def _record(job: MoveJob) -> tuple[Recording, Recording, dict[str, Recording]]:
-    description, move, recipe = job.description, job.move, job.recipe
+    description, recipe, limits = job.description, job.recipe, job.conditions.limits
+    move = job.conditions.declared(job.move)
     start, target = np.array(move.start), np.array(move.target)
-    carried = body(paper_payload(description, move.mass))
-    cycle = control_line(description, start, carried, carried)
-    reference = point_to_point(start, target)
+    carried, declared = (body(paper_payload(description, one.mass)) for one in (job.move, move))
+    arm = FlexibleArm(job.conditions.arm(description, job.seed), carried)
+    cycle = control_line(description, start, declared, carried, arm)
+    reference = point_to_point(start, target, limits)
 
     def follow(shaped: Floats, elastic: ElasticFeedForward | None = None) -> Recording:
         return simulate(cycle, start, reference, shaped, job.seed, elastic=elastic)
 
-    tvist, own = own_move(recipe, description, move, PAPER)
+    tvist, own = own_move(recipe, description, move, limits)
     shaped = follow(shape(sound(tvist), own)[0], recipe.elastic(description, tvist))
     ticks = round(motions(shaped)[0].shaped_duration(shaped) / PERIOD)
     others = {
-        baseline.name: follow(baseline.shaped(recipe, description, move, reference, ticks))
+        baseline.name: follow(baseline.shaped(recipe, description, move, reference, ticks, limits))
         for baseline in job.baselines
     }
     return follow(reference), shaped, others
@@ -202,11 +237,14 @@ def _summary(pairs: list[tuple[JudgedMove, Made]]) -> dict[str, Any]:
     accelerations, velocities = np.array([[made.acceleration, made.velocity] for _, made in pairs]).T
     quiet = [made.peak for one, made in pairs if not one.counts]
     # Count the time until still from the stop of the unshaped reference, since the lengths of moves differ.
-    late = [
-        round(1e3 * (made.still_after - one.unshaped.duration), 6)
-        for one, made in pairs
-        if made.still_after is not None
-    ]
+    late, later = (
+        [round(1e3 * (at - one.unshaped.duration), 6) for one, at in times if at is not None]
+        for times in (
+            [(one, made.still_after) for one, made in pairs],
+            [(one, made.quiet_after) for one, made in pairs],
+        )
+    )
+    waiting = np.array([one.reduction_by_waiting(made) for one, made in pairs if one.counts])
     return {
         "peak_m_s2": _of(
             np.array([made.peak for one, made in pairs if one.counts]), median=50, p95=95, max=100
@@ -218,7 +256,9 @@ def _summary(pairs: list[tuple[JudgedMove, Made]]) -> dict[str, Any]:
         "delay_ms": _of(delays, median=50, max=100),
         "peak_acceleration_ratio": _of(accelerations, median=50, p90=90, max=100),
         "peak_velocity_ratio": _of(velocities, median=50, p90=90, max=100),
+        "less_than_waiting_percent": _of(waiting, median=50, p5=5, min=0),
         "still_after_unshaped_stop_ms": _of(np.array(late), median=50, p90=90, max=100),
+        "quiet_after_unshaped_stop_ms": _of(np.array(later), median=50, p90=90, max=100),
         "never_still": len(pairs) - len(late),
         "left_out_largest_peak_m_s2": max(quiet, default=None),
     }

@@ -111,6 +111,7 @@ def draw_moves(
     masses: tuple[float, float],
     *,
     wrists: bool = False,
+    stroke: tuple[float, float] = STROKE,
     progress: Callable[[], None] = lambda: None,
 ) -> Drawn:
     """Draw random moves between configurations of the workspace, free of collisions from start to target.
@@ -121,6 +122,7 @@ def draw_moves(
         seed: Seed of all random numbers.
         masses: Smallest and largest carried mass, uniformly distributed between them [kg].
         wrists: Whether to turn the two outer joints of the wrist, too; otherwise they stay at zero.
+        stroke: Smallest and largest length, as a share of the way to an independent configuration [-].
         progress: Called after each move found.
 
     Raises:
@@ -135,7 +137,7 @@ def draw_moves(
     region = WITH_WRISTS if wrists else workspace(ranges(description))
     moves: list[Move] = []
     draws = 0
-    for draws, move in enumerate(_draws(random, region, description.joints, masses), 1):
+    for draws, move in enumerate(_draws(random, region, description.joints, masses, stroke), 1):
         collision.carry(body(paper_payload(description, move.mass)))
         if is_free(collision, move):
             moves.append(move)
@@ -178,7 +180,11 @@ def collisions(description: RobotDescription, moves: Sequence[Move]) -> list[str
 
 
 def _draws(
-    random: np.random.Generator, region: Region, joints: int, masses: tuple[float, float]
+    random: np.random.Generator,
+    region: Region,
+    joints: int,
+    masses: tuple[float, float],
+    stroke: tuple[float, float],
 ) -> Iterator[Move]:
     """Yield candidates without end."""
     used = min(len(region.low), joints)
@@ -186,8 +192,8 @@ def _draws(
     while True:
         start, far = np.zeros((2, joints))
         start[:used], far[:used] = random.uniform(low, high), random.uniform(low, high)
-        mass, stroke = random.uniform(*masses), random.uniform(*STROKE)
-        target: Floats = start + stroke * (far - start)
+        mass, share = random.uniform(*masses), random.uniform(*stroke)
+        target: Floats = start + share * (far - start)
         yield Move(tuple(start.tolist()), tuple(target.tolist()), mass)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tvist_controller.api import RefusalError, body, paper_payload
+from tvist_controller.api import RefusalError, body, elastic_feed_forward, paper_payload
 from tvist_lab.evaluation.evaluate import WORTH, measured
 from tvist_lab.evaluation.line import control_line, simulate
 from tvist_lab.evaluation.path_shaping import ALONG, JOINTS, UNSLOWED, WAYS, Reference, planned, shaped
@@ -131,9 +131,11 @@ def judge(job: PathJob) -> JudgedPath:
     unshaped = found.plans["none"][0]
     path = ToolPath(at, unshaped.sampled())
 
-    def follow(reference: Reference, q: Floats) -> Followed:
+    def follow(reference: Reference, q: Floats, tvist: Filter | None = None) -> Followed:
         # As for `tvist evaluate`, each path has gear errors of its own, and all ways of it have the same.
-        recording = simulate(cycle, start, reference.q, q, (1_000_003 * job.seed + job.place) % 2**63)
+        seed = (1_000_003 * job.seed + job.place) % 2**63
+        elastic = None if tvist is None else elastic_feed_forward(tvist, description, job.calibration)
+        recording = simulate(cycle, start, reference.q, q, seed, elastic=elastic)
         made, (distance, angle) = measured(recording), path.off(q)
         peaks = [
             [_peak(samples, order) for order in (1, 2)] for samples in (_resting(q), _resting(reference.q))
@@ -149,9 +151,9 @@ def judge(job: PathJob) -> JudgedPath:
         )
 
     def in_every_way(reference: Reference, tvist: Filter) -> dict[str, Followed]:
-        ways = {way: follow(reference, shaped(reference, tvist, way)) for way in (ALONG, JOINTS)}
+        ways = {way: follow(reference, shaped(reference, tvist, way), tvist) for way in (ALONG, JOINTS)}
         same = np.array_equal(reference.q, unshaped.q)
-        ways[UNSLOWED] = ways[JOINTS] if same else follow(unshaped, shaped(unshaped, tvist, UNSLOWED))
+        ways[UNSLOWED] = ways[JOINTS] if same else follow(unshaped, shaped(unshaped, tvist, UNSLOWED), tvist)
         return ways
 
     return JudgedPath(

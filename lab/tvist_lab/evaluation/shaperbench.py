@@ -69,7 +69,7 @@ class Scores:
 
     scores: tuple[Score, ...]
     delay: float
-    """Delay of the shaped reference [s]."""
+    """Delay of what the drives get [s]."""
     acceleration: float
     """Largest acceleration relative to the limit of the reference [-]."""
     velocity: float
@@ -128,16 +128,17 @@ def judge(job: BenchJob) -> Scores:
         shaped = job.candidate.shaped(task)
     except ShaperFaultError as fault:
         return Scores((), 0.0, 0.0, 0.0, None, str(fault))
+    elastic = job.candidate.elastic(task)
     scores = []
     for number in job.arms:
         arm = ARMS[number].make(description, carried, job.seed)
         cycle = control_line(description, start, believed, carried, arm)
-        recording = simulate(cycle, start, task.reference, shaped.q, job.seed, shaped.delay)
+        recording = simulate(cycle, start, task.reference, shaped.q, job.seed, shaped.delay, elastic)
         scores.append(_score(number, job, recording))
     qd, qdd = np.diff(shaped.q, axis=0) / PERIOD, np.diff(shaped.q, 2, axis=0) / PERIOD**2
     return Scores(
         tuple(scores),
-        shaped.delay,
+        shaped.delay + (0.0 if elastic is None else elastic.delay),
         float(np.abs(qdd).max()) / PAPER.acceleration,
         float(np.abs(qd).max()) / PAPER.velocity,
         shaped.cost,

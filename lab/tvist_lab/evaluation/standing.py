@@ -19,6 +19,9 @@ OWN = (
     ("auto", 1, "constant mean delay, auto"),
     ("short", 1, "constant mean delay, short"),
     ("auto-target", 1, "constant mean delay, given the end of each move"),
+    ("elastic", 1, "smoothing, elastic feed-forward"),
+    ("elastic-position", 1, "smoothing, elastic feed-forward without torques"),
+    ("elastic-auto", 1, "auto, smoothing, elastic feed-forward"),
 )
 """Our shapers: name, number of modes, description."""
 PRODUCT_MODES = 3

@@ -79,7 +79,17 @@ def peak_after_stop(recording: Recording, motion: MotionRows, after: float = AFT
         RecordingError: Truth was not recorded.
         NotMeasurableError: Nothing was recorded after that moment.
     """
-    rows = _later_than(recording, motion, recording.time[motion.shaped_stop] + after)
+    return peak_later_than(recording, motion, recording.time[motion.shaped_stop] + after)
+
+
+def peak_later_than(recording: Recording, motion: MotionRows, moment: float) -> float:
+    """Largest true |α| later than a moment of the recording [m/s²].
+
+    Raises:
+        RecordingError: Truth was not recorded.
+        NotMeasurableError: Nothing was recorded after that moment.
+    """
+    rows = _later_than(recording, motion, moment)
     return float(np.max(amplitude(tool_acceleration(recording, truth=True)[rows])))
 
 
