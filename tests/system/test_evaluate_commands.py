@@ -50,7 +50,9 @@ class TestEvaluate:
             tvist("evaluate", "--moves", moves, "--payload", 5, "--shaper", "zv", "--json").assert_done().json
         )
         assert list(told["baselines"]) == [
-            "waiting", "equal_duration_double_s", "zv_frozen_at_end", "fixed_mzv", "fixed_ei2", "fixed_ei3"
+            "waiting", "equal_duration_double_s", "double_s_of_one_period", "zv_frozen_at_end",
+            "zv_3_modes_frozen_at_end", "mzv_for_payload", "ei_for_payload", "ei3_for_payload", "fixed_mzv", "fixed_ei2",
+            "fixed_ei3",
         ]  # fmt: skip
         assert told["disturbances"] == ["friction", "gear", "noise"]
         assert len(told["moves"]) == 2
@@ -206,7 +208,7 @@ class TestShaperBench:
         assert "peeks at the future" in rows["file"]["fault"]
         assert json.loads(board.read_text(encoding="utf-8")) == ended.json
         assert set(rows["zv"]["by_arm"]) == set(ended.json["arms"])
-        assert len(ended.json["arms"]) == 8
+        assert len(ended.json["arms"]) == 10
 
     @pytest.mark.parametrize(
         ("arguments", "words"),

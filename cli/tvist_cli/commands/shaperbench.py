@@ -1,4 +1,4 @@
-"""`tvist shaperbench`: rank shapers, your own included, on eight simulated arms."""
+"""`tvist shaperbench`: rank shapers, your own included, on ten simulated arms."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -34,10 +34,10 @@ def shaperbench(
     markdown: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Rank shapers by how soon eight different arms come to rest, and by the vibration until then.
+    """Rank shapers by how soon ten different arms come to rest, and by the vibration until then.
 
     Every shaper gets the same random moves with payloads of 0 to 5 kg, of which the controller assumes 100, 110 and
-    90 %. Eight arms follow its reference; all but one differ from the controller's model. A shaper that uses future
+    90 %. Ten arms follow its reference; all but one differ from the controller's model. A shaper that uses future
     samples or does not report its full delay is listed but not ranked.
 
     Args:
@@ -182,14 +182,15 @@ def _print(result: dict[str, Any]) -> None:
         f"{result['moves']} moves on {len(result['arms'])} arms with {errors} payload errors; "
         "* keeps the limits, and no other shaper that keeps them is better in both still and ring",
         (
-            "shaper", "still ms", "p90", "ring m/s²", "less %", "p5", "delay ms", "moving", "q̈/limit", "q̇/limit",
-            "bend mrad", "µs",
+            "shaper", "still ms", "p90", "ring m/s²", "less %", "p5", "worst arm", "delay ms", "moving", "q̈/limit",
+            "q̇/limit", "bend mrad", "µs",
         ),
         [_row(row) for row in result["shapers"] if row["ranked"]],
     )  # fmt: skip
     out.print(
         "still: last time |α| exceeds 0.1 m/s², from the stop of the unshaped reference, median and p90;\n"
         "ring: envelope within 3 to 60 Hz after the shaper's own stop; less: reduction compared with waiting;\n"
+        "worst arm: the arm with the smallest median of it;\n"
         "moving: vibration during the motion relative to waiting; q̈ and q̇: largest peaks;\n"
         "bend: deviation from a path round a corner; µs: time per tick on this machine, including its estimates.",
         markup=False,
@@ -202,11 +203,16 @@ def _print(result: dict[str, Any]) -> None:
             say(f"{row['name']} ({row['label']}) is not ranked: it {row['fault']}")
 
 
+def _worst(worst: dict[str, Any] | None) -> str:
+    return "–" if worst is None else f"{worst['name']} {worst['reduction_percent']['median']:.1f}"
+
+
 def _row(row: dict[str, Any]) -> tuple[str, ...]:
     still, less = row["time_until_still_ms"], row["reduction_percent"]
     return (
         row["name"] + (" *" if row["pareto"] else ""), number(still["median"], 0), number(still["p90"], 0),
         number(row["residual_m_s2"]["median"]), number(less["median"], 1), number(less["p5"], 1),
+        _worst(row["worst_arm"]),
         number(row["delay_ms"]["median"], 0), number(row["in_motion_ratio"], 2),
         number(row["peak_acceleration_ratio"]["max"]), number(row["peak_velocity_ratio"]["max"]),
         number(row["path_error_mrad"], 1), number(row["cost_us"], 0),

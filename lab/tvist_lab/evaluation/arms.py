@@ -1,7 +1,8 @@
-"""The eight arms of the benchmark."""
+"""The arms of the benchmark: eight of which each differs in one way from the description, and two in all ways."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
@@ -16,6 +17,10 @@ SUBSTEPS = 8
 """Number of integrator steps per period for an arm with imperfections, which are integrated explicitly."""
 SCATTER = 0.15
 """Relative deviation of each stiffness and gain from the description, with random sign [-]."""
+MASS_SCATTER, COM_SCATTER = 0.07, 0.010
+"""Relative deviation of each link's mass [-], and deviation of its centre of mass along each axis [m], where the
+description is wrong about all of them; random signs.
+"""
 
 
 @dataclass(frozen=True)
@@ -57,6 +62,10 @@ def _piecewise(description: RobotDescription, carried: Payload, seed: int) -> Fl
 
 
 def _scattered(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:
+    return FlexibleArm(_softer_and_stiffer(description, seed), carried)
+
+
+def _softer_and_stiffer(description: RobotDescription, seed: int) -> RobotDescription:
     random = np.random.default_rng([seed, 15])
 
     def scattered(values: tuple[float, ...]) -> tuple[float, ...]:
@@ -66,7 +75,33 @@ def _scattered(description: RobotDescription, carried: Payload, seed: int) -> Fl
     names = ("gear_stiffness", "velocity_gain", "position_gain")
     other = replace(drives, **{name: scattered(getattr(drives, name)) for name in names})
     bending = replace(links, stiffness=scattered(links.stiffness))
-    return FlexibleArm(replace(description, drives=other, link_flexibility=bending), carried)
+    return replace(description, drives=other, link_flexibility=bending)
+
+
+def _unlike(description: RobotDescription, seed: int) -> RobotDescription:
+    """Return an arm of which the description knows neither masses nor springs, gains and friction exactly."""
+    random, links = np.random.default_rng([seed, 47]), description.links
+
+    def signs(*shape: int) -> np.ndarray[Any, Any]:
+        return random.choice([-1.0, 1.0], shape)
+
+    heavier = 1.0 + MASS_SCATTER * signs(len(links.mass))
+    masses = tuple((np.array(links.mass) * heavier).tolist())
+    centres = tuple(map(tuple, (np.array(links.com) + COM_SCATTER * signs(len(links.mass), 3)).tolist()))
+    inertias = tuple(
+        tuple((factor * np.array(one)).tolist()) for factor, one in zip(heavier, links.inertia, strict=True)
+    )
+    drives = replace(description.drives, friction_width=0.5 * description.drives.friction_width)
+    other = replace(links, mass=masses, com=centres, inertia=inertias)
+    return _softer_and_stiffer(replace(description, links=other, drives=drives), seed)
+
+
+def _blind(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:
+    return _imperfect(_unlike(description, seed), carried, Imperfections(base=YieldingBase()))
+
+
+def _blind_mujoco(description: RobotDescription, carried: Payload, seed: int) -> MujocoArm:
+    return MujocoArm(_unlike(description, seed), carried)
 
 
 def _on_base(description: RobotDescription, carried: Payload, seed: int) -> FlexibleArm:  # noqa: ARG001
@@ -94,4 +129,15 @@ ARMS = (
     ),
     ArmVariant("base", "a flexible base, 150 kN m/rad about two axes", _on_base),
     ArmVariant("mujoco", "simulated in MuJoCo, without gear error", _mujoco),
+    ArmVariant(
+        "blind",
+        "unlike the description in every mass (7 %), centre of mass (10 mm per axis), stiffness and gain (15 %), with "
+        "sharper friction, and bending in its base as well",
+        _blind,
+    ),
+    ArmVariant(
+        "blind_mujoco",
+        "unlike the description in every mass, centre of mass, stiffness and gain, with sharper friction, in MuJoCo",
+        _blind_mujoco,
+    ),
 )

@@ -95,6 +95,11 @@ def _row(
     accelerations = [scores.acceleration for _, scores in mine]
     velocities = [scores.velocity for _, scores in mine]
     delays = [1e3 * scores.delay for _, scores in mine]
+    by_arm = {
+        arm.name: _summary([pair for pair in pairs if pair[0].arm == number])
+        for number, arm in enumerate(ARMS)
+        if any(pair[0].arm == number for pair in pairs)
+    }
     return {
         **_summary(pairs),
         "delay_ms": {"median": round(float(np.median(delays)), 6), "max": round(max(delays), 6)},
@@ -103,17 +108,27 @@ def _row(
         "keeps_limits": max(*accelerations, *velocities) <= KEPT,
         "path_error_mrad": 1e3 * max(bent) if bent else None,
         "cost_us": 1e6 * float(np.median(costs)) if costs else None,
-        "by_arm": {
-            arm.name: _summary([pair for pair in pairs if pair[0].arm == number])
-            for number, arm in enumerate(ARMS)
-            if any(pair[0].arm == number for pair in pairs)
-        },
+        "by_arm": by_arm,
+        "worst_arm": _worst(by_arm),
         "by_payload_error": {
             f"{100 * error:+.0f} %": _summary([pair for pair in pairs if pair[0].error == error])
             for error in PAYLOAD_ERRORS
             if any(pair[0].error == error for pair in pairs)
         },
     }
+
+
+def _worst(by_arm: dict[str, dict[str, Any]]) -> dict[str, Any] | None:
+    """Return the arm with the smallest median reduction; None if no arm vibrates enough for a percentage."""
+    known = {
+        name: one["reduction_percent"]
+        for name, one in by_arm.items()
+        if one["reduction_percent"]["median"] is not None
+    }
+    if not known:
+        return None
+    name = min(known, key=lambda arm: float(known[arm]["median"]))
+    return {"name": name, "reduction_percent": known[name]}
 
 
 def _summary(pairs: list[tuple[Score, Score]]) -> dict[str, Any]:

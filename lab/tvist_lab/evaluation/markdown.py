@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import Any
 
 COLUMNS = (
-    "shaper", "still ms", "p90", "ring m/s²", "less %", "p5", "delay ms", "in motion", "q̈/limit", "q̇/limit",
-    "bend mrad", "µs",
+    "shaper", "still ms", "p90", "ring m/s²", "less %", "p5", "worst arm: less %", "delay ms", "in motion", "q̈/limit",
+    "q̇/limit", "bend mrad", "µs",
 )  # fmt: skip
 
 
@@ -28,7 +28,9 @@ The command also writes the numbers with all digits to [leaderboard.json](leader
     } random
 moves, seed {
         result["seed"]
-    }, with payloads of 0 to 5 kg, of which 100, 110 and 90 % are declared to the controller, and eight arms.
+    }, with payloads of 0 to 5 kg, of which 100, 110 and 90 % are declared to the controller, and {
+        len(arms)
+    } arms.
 The calibration is `{result["calibration"]}`, which was made for the first of these.
 [Evaluate a shaper](../how-to/evaluate-a-shaper.md) says how to add a shaper of your own.
 
@@ -52,7 +54,7 @@ are medians over moves, arms and payload errors, except for the peaks and *bend*
 - *still*: last time at which |α|, the true acceleration of the tool, exceeds 0.1 m/s², from the stop of the
   **unshaped** reference;
 - *ring*: envelope of α from 3 to 60 Hz after the shaped reference's own stop; *less*: reduction of *ring* compared with
-  waiting, for moves where waiting leaves at least 0.2 m/s²;
+  waiting, for moves where waiting leaves at least 0.2 m/s²; *worst arm*: the arm with the smallest median of it;
 - *in motion*: rms of the difference between α and that of the rigid arm, divided by the value for waiting;
 - *q̈/limit*, *q̇/limit*: peaks of the shaped reference divided by the limits, which the unshaped reference uses fully. A
   robot plans its motions with less acceleration if a shaper exceeds 1 (`move_j` with `auto` and `short`); the bench
@@ -109,10 +111,15 @@ def _figures(row: dict[str, Any]) -> list[str]:
     still, less = row["time_until_still_ms"], row["reduction_percent"]
     return [
         _said(still["median"], 0), _said(still["p90"], 0), _said(row["residual_m_s2"]["median"], 3),
-        _said(less["median"], 1), _said(less["p5"], 1), _said(row["delay_ms"]["median"], 0),
+        _said(less["median"], 1), _said(less["p5"], 1), _worst(row), _said(row["delay_ms"]["median"], 0),
         _said(row["in_motion_ratio"], 2), _said(row["peak_acceleration_ratio"]["max"], 3),
         _said(row["peak_velocity_ratio"]["max"], 3), _said(row["path_error_mrad"], 1), _said(row["cost_us"], 0),
     ]  # fmt: skip
+
+
+def _worst(row: dict[str, Any]) -> str:
+    worst = row["worst_arm"]
+    return "–" if worst is None else f"{worst['name']}: {worst['reduction_percent']['median']:.1f}"
 
 
 def _by(

@@ -1,4 +1,4 @@
-"""ShaperBench: all shapers on eight arms, with the same random moves, and payloads other than declared."""
+"""ShaperBench: all shapers on ten arms, with the same random moves, and payloads other than declared."""
 
 import math
 from collections.abc import Iterator, Sequence
