@@ -51,8 +51,7 @@ class TestEvaluate:
         )
         assert list(told["baselines"]) == [
             "waiting", "equal_duration_double_s", "double_s_of_one_period", "zv_frozen_at_end",
-            "zv_3_modes_frozen_at_end", "mzv_for_payload", "ei_for_payload", "ei3_for_payload", "fixed_mzv", "fixed_ei2",
-            "fixed_ei3",
+            "mzv_for_payload", "ei_for_payload", "ei3_for_payload", "fixed_mzv", "fixed_ei2", "fixed_ei3",
         ]  # fmt: skip
         assert told["disturbances"] == ["friction", "gear", "noise"]
         assert len(told["moves"]) == 2
