@@ -156,9 +156,11 @@ class ControlCycle:
         self.inverse_dynamics.advance()
         torque = self.inverse_dynamics.torque(target.q, target.qd, target.qdd)  # τ* [N m]
         gravity = self.inverse_dynamics.gravity(target.q)
-        smooth = not self.unshaped or self.stopping
         carried = self.inverse_dynamics.carried
-        command = self._feed_forward.command(target, torque, gravity, carried, smooth=smooth)
+        command = self._feed_forward.command(
+            target, torque, gravity, carried,
+            may_begin=not (self.unshaped or self.line_filter.fading), may_go_on=not self.unshaped or self.stopping,
+        )  # fmt: skip
         measured = self._plant.step(command)
         self._settle(reference, target)
         motors = self._feed_forward.reference

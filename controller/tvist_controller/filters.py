@@ -113,7 +113,7 @@ class Filters:
             self._emit("warning", code="out_of_range", why=why)
         self._clipped = clipped
         limited = sample.motors is not None and sample.motors.limited
-        if limited and not self._limited and not self._cycle.stopping:
+        if limited and not self._limited and not (self._cycle.stopping or self._cycle.at_rest):
             why = "the torque limits keep the motors from leading enough: the arm will vibrate more after this motion"
             self._emit("warning", code="limit_torque", why=why)
             self._limited = True

@@ -107,7 +107,7 @@ class State(Struct, frozen=True, kw_only=True, tag_field="type", tag="state", gc
     motor_qdd: list[float] | None = None
     """Acceleration of that motion; null without it [rad/s²]."""
     motor_moment: list[float] | None = None
-    """Torque that they are given with it, within the drives' limits in `info`; null without it [N m]."""
+    """Torque that they are given with it; null without it [N m]."""
     motor_limited: bool = False
     """Whether the torque limits keep the motors from leading by as much as the arm's elasticity wants."""
 

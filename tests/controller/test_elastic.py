@@ -363,3 +363,51 @@ def test_a_lead_that_the_torque_does_not_permit_is_limited_and_told():
         feed.command(target, torque, dynamics.carried)
         told.append(feed.limited)
     assert any(told)
+
+
+def watched_commands(robot):
+    """Commands that the drives get from now on."""
+    commands, step = [], robot.controller.cycle.plant.step
+
+    def watched(command):
+        commands.append(command)
+        return step(command)
+
+    robot.controller.cycle.plant.step = watched
+    return commands
+
+
+def roughness(commands):
+    """Largest acceleration of the commanded positions [rad/s^2]."""
+    return np.abs(np.diff([command.q for command in commands], 2, axis=0)).max() / H**2
+
+
+@pytest.mark.parametrize("other", ["zv", "elastic", "elastic-auto"])
+def test_another_shaper_right_after_a_stop_waits_until_the_motors_have_come_back(other):
+    robot = Robot(calibration=calibration(), shaper="elastic", q=tuple(Q3))
+    robot.send(c.MoveJ, q=tuple(Q1), velocity=3.0, acceleration=8.0, jerk=2000.0)
+    robot.tick(380)
+    robot.send(c.Stop)
+    robot.until_rest()
+    commands = watched_commands(robot)
+    robot.tick(2)
+    assert robot.send(c.SetShaper, name=other) == Done()
+    robot.tick(400)
+    assert roughness(commands) < 60.0
+    assert (robot.states[-1].motor_qd is None) == (other == "zv")
+
+
+@pytest.mark.parametrize("speed", [0.3, 1.0])
+def test_a_stop_of_a_guided_motion_is_no_rougher_than_without_elastic_feed_forward(speed):
+    rough = {}
+    for name in ("none", "elastic"):
+        robot = Robot(calibration=calibration(), shaper=name, q=tuple(Q1))
+        for _ in range(200):
+            robot.send(SpeedJ, qd=(speed, 0.0, 0.5 * speed, 0.0, 0.0, 0.0), acceleration=5.0)
+            robot.tick()
+        commands = watched_commands(robot)
+        robot.send(c.Stop)
+        robot.until_rest()
+        robot.tick(300)
+        rough[name] = roughness(commands)
+    assert rough["elastic"] <= 1.1 * rough["none"]

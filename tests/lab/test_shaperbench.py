@@ -10,7 +10,7 @@ import pytest
 
 from tvist_controller.calibrations import load as load_calibration
 from tvist_lab.evaluation.arms import ARMS
-from tvist_lab.evaluation.candidates import Named, Task
+from tvist_lab.evaluation.candidates import Candidate, Named, Task
 from tvist_lab.evaluation.causality import check_causal
 from tvist_lab.evaluation.curves import bends, path_error
 from tvist_lab.evaluation.foreign import CandidateError, FromFile, load_shaper
@@ -20,7 +20,7 @@ from tvist_lab.evaluation.markdown import page
 from tvist_lab.evaluation.moves import Move
 from tvist_lab.evaluation.recipes import Recipe
 from tvist_lab.evaluation.running import ShaperFaultError, run
-from tvist_lab.evaluation.shaperbench import draw, inspect, jobs, judge
+from tvist_lab.evaluation.shaperbench import BenchJob, draw, inspect, jobs, judge
 from tvist_lab.evaluation.standing import candidates
 from tvist_lab.metrics import best_tool_acceleration
 from tvist_lab.mujoco_arm import MujocoArm
@@ -266,6 +266,21 @@ class TestDishonesty:
         check_causal(Named(aimed, "auto-target", ""), task)
         with pytest.raises(ShaperFaultError, match=r"up to tick .* from tick"):
             check_causal(Untold(aimed, "auto-target", ""), task)
+
+
+class TestElastic:
+    def test_the_drives_get_the_stage_with_its_tick_on_every_arm(self, ur5e, calibration, task):
+        class Bare(Named):
+            elastic = Candidate.elastic
+
+        recipe = Recipe("elastic", calibration)
+        job = BenchJob(ur5e, Named(recipe, "elastic", ""), task.move, 0.0, 0, (0, 7))
+        whole = judge(job)
+        bare = judge(replace(job, candidate=Bare(recipe, "elastic", "")))
+        assert whole.delay == pytest.approx(bare.delay + PERIOD)
+        for ours, theirs in zip(whole.scores, bare.scores, strict=True):
+            assert ours.residual < 0.5 * theirs.residual
+        assert judge(replace(job, arms=(7,))).scores == whole.scores[1:]  # nothing stays of the arm before
 
 
 class TestOwn:

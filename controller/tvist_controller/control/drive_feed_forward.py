@@ -59,8 +59,10 @@ class DriveFeedForward:
         self.wanted = elastic
 
     def rest(self) -> None:
-        """Complete a transition at once, since the arm is at rest."""
-        if self._elastic is not self.wanted or self._share != self._full:
+        """Complete a transition at once if the motors do not lead either, since the reference rests: both are equal."""
+        if self._elastic is self.wanted and self._share == self._full:
+            return
+        if self._elastic is None or self._share == 0 or self._elastic.settled:
             self._begin()
             self._share = self._full
 
@@ -76,7 +78,14 @@ class DriveFeedForward:
         self._share = self._full
 
     def command(
-        self, target: Target, torque: Floats, gravity: Floats, carried: Floats, *, smooth: bool = True
+        self,
+        target: Target,
+        torque: Floats,
+        gravity: Floats,
+        carried: Floats,
+        *,
+        may_begin: bool = True,
+        may_go_on: bool = True,
     ) -> DriveCommand:
         """Drive command for a target.
 
@@ -85,9 +94,10 @@ class DriveFeedForward:
             torque: τ* of the rigid arm, shape (n,) [N m].
             gravity: The part of the torque that balances gravity, shape (n,) [N m].
             carried: Inertial parameters of the payload, see `InverseDynamics.carried`.
-            smooth: Whether the reference is smooth enough for elastic feed-forward.
+            may_begin: Whether the reference is smooth enough to begin with elastic feed-forward.
+            may_go_on: Whether it is smooth enough to go on with it, as a stop is.
         """
-        self._fade(smooth=smooth)
+        self._fade(may_begin if self._share == 0 else may_go_on)
         elastic = self._elastic
         if elastic is None or self._share == 0:
             self.reference = None
@@ -111,7 +121,7 @@ class DriveFeedForward:
         if self._elastic is not None:
             self._elastic.reset()
 
-    def _fade(self, *, smooth: bool) -> None:
+    def _fade(self, smooth: bool) -> None:
         """Advance the transition by a tick; one that is under way is completed before it turns back."""
         if self._share == 0 and self._elastic is not self.wanted:
             self._begin()

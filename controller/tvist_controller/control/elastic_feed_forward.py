@@ -8,10 +8,12 @@ from tvist_controller.control.elastic_model import ElasticModel
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
 
-TORQUE_SHARE = 0.9
+TORQUE_SHARE = 0.95
 """Share of a drive's torque limit that target and lead may need together [-]."""
-LEAST_ROOM = 0.1
+LEAST_ROOM = 0.05
 """Share of a drive's torque limit that the lead may always need, however much the target needs [-]."""
+SETTLED = 1e-8
+"""A lead below this counts as none [rad]."""
 
 
 class ElasticFeedForward:
@@ -39,8 +41,8 @@ class ElasticFeedForward:
         self._model, self._loads = model, model.loads()
         self._damping = model.damping_time / period
         self._rotor = np.array(drives.rotor_inertia)
-        self._most, self._least = TORQUE_SHARE * limits, LEAST_ROOM * limits
         friction = np.array(drives.coulomb_friction)
+        self._most, self._least = TORQUE_SHARE * limits - friction, LEAST_ROOM * limits
         self._linear, self._width = drives.linear_friction, drives.friction_width
         self._friction = friction / self._width if self._linear else drives.friction_feedforward * friction
         self._wanted, self._led = np.zeros((2, 3, description.joints))
@@ -56,6 +58,18 @@ class ElasticFeedForward:
     def reset(self) -> None:
         """Restart with the lead of the next targets."""
         self._late, self._ticks, self.limited = None, 0, False
+
+    @property
+    def settled(self) -> bool:
+        """Whether the motors do not lead, and have not led for some ticks."""
+        return self._late is None or float(np.abs(self._led).max()) < SETTLED
+
+    def rehearse(self) -> None:
+        """Compute commands at rest, since the first ones load compiled code, which takes many ticks."""
+        still = np.zeros((3, len(self._rotor)))
+        for _ in range(len(self._led) + 2):
+            self.command(Target(*still), still[0], np.zeros(10))
+        self.reset()
 
     def command(
         self, target: Target, torque: Floats, carried: Floats, sag: Floats | None = None
@@ -90,7 +104,7 @@ class ElasticFeedForward:
             wanted[self._ticks + 1 :] = wanted[0]
             led[:], self.limited, self._ticks = wanted, False, self._ticks + 1
         else:
-            room = np.maximum(self._most - np.abs(needed), self._least) / self._rotor
+            room = np.maximum(self._most - np.abs(self._late[1]), self._least) / self._rotor
             self.limited = follow(wanted, led, room, self._period)
         late, its_torque, its_sag = self._late
         self._late = (target, needed, sag)

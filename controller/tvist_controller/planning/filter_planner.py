@@ -55,6 +55,8 @@ class FilterPlanner:
         if self._modal is not None:
             ready = self.choose("elastic-auto", 1, self._modal, setup.payload)
             ready.tvist.filter(np.zeros(setup.description.joints))
+            if ready.elastic is not None:
+                ready.elastic.rehearse()
         return chosen
 
     def choose(

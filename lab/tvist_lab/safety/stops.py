@@ -45,6 +45,7 @@ SHAPERS = (
     "auto-target",
     "short",
     "elastic",
+    "elastic-position",
     "elastic-auto",
 )
 
