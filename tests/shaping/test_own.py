@@ -265,7 +265,7 @@ class TestRegistry:
             Registry([mean(), custom("mean", [1.0], [0.0])])
 
     def test_an_unknown_name_lists_the_own_ones_too(self):
-        with pytest.raises(UnknownShaperError, match=r"did you mean 'mean'.* auto-target, mean"):
+        with pytest.raises(UnknownShaperError, match=r"did you mean 'mean'.* auto-target, planned, mean"):
             Registry([mean()]).check("meen")
 
     def test_it_cannot_be_changed(self):

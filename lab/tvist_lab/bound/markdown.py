@@ -13,9 +13,9 @@ A motion within limits of velocity, acceleration and jerk needs some time more i
 much more is a property of the arm, the limits and the move, not of a shaper. Let s(t) be the way, with a jerk that is
 constant in each tick, and let each of the arm's four lowest modes be ẍ + 2ζωẋ + ω²x = -s̈, as at the end pose. The
 least T for which s goes from rest to rest within the limits and x = ẋ = 0 at its end follows from a linear programme
-and a search for the number of ticks ([`least_time.py`](../../lab/tvist_lab/bound/least_time.py)). The **bound** is T less
-the least time without modes. Limits are the paper's: 1.5 rad/s, 2 rad/s², 100 rad/s³. The modes are those of the arm
-in the robot file, the shapers know the calibration `{calibration}`, and the arm is {plant}.
+and a search for the number of ticks ([`least_time.py`](../../lab/tvist_lab/bound/least_time.py)). The **bound** is T
+less the least time without modes. Limits are the paper's: 1.5 rad/s, 2 rad/s², 100 rad/s³. The modes are those of the
+arm in the robot file, the shapers know the calibration `{calibration}`, and the arm is {plant}.
 
 This is the bound *without* feed-forward of the elasticity: it assumes that the arm answers to the reference alone. A
 controller that feeds the elastic deflection forward may be faster. It is also the bound for *no* vibration of these
