@@ -28,7 +28,7 @@ def ringing(robot: Robot) -> float:
     return np.linalg.norm(np.array(felt) - felt[-1], axis=1)[:200].max()
 
 
-@pytest.mark.parametrize("name", ["auto", "short", "auto-target", "elastic-auto"])
+@pytest.mark.parametrize("name", ["auto", "short", "auto-target", "planned", "elastic-auto"])
 def test_it_brings_its_own_estimator_and_leaves_less_than_the_papers_shaper(name):
     left = {}
     for shaper in ("none", "zv", name):
@@ -43,7 +43,7 @@ def test_it_brings_its_own_estimator_and_leaves_less_than_the_papers_shaper(name
     assert left[name] < left["zv"]
 
 
-@pytest.mark.parametrize("name", ["auto", "short", "auto-target", "elastic-auto"])
+@pytest.mark.parametrize("name", ["auto", "short", "auto-target", "planned", "elastic-auto"])
 @pytest.mark.parametrize("target", [Q2, Q3])
 def test_a_motion_of_our_own_keeps_its_limits_to_the_last_digit(target, name):
     robot = Robot(calibration=POLYNOMIAL, shaper=name)
