@@ -24,6 +24,7 @@ from tvist_controller.loopback import LoopbackHost
 from tvist_controller.mode_source import ModeSource
 from tvist_controller.own_shapers import OwnShaper, RecordedShaper
 from tvist_controller.paths.poses import placement_vector
+from tvist_controller.planning.keeping import keeping_motion
 from tvist_controller.presence import Presence
 from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.programs.socket_traffic import SocketNews
@@ -76,6 +77,7 @@ __all__ = [
     "estimator_of",
     "info_of",
     "inside",
+    "keeping_motion",
     "load_calibration",
     "mass_matrix",
     "modal_estimator",

@@ -241,7 +241,8 @@ class TestMoves:
         assert one.reduction(one.shaped) > 80.0
         assert 28.0 <= one.delay(one.shaped) <= 38.0  # half a period at Q3, where the mode is at 15 Hz
         assert set(one.baselines) == {
-            "equal_duration_double_s", "zv_frozen_at_end", "fixed_mzv", "fixed_ei2", "fixed_ei3"
+            "equal_duration_double_s", "double_s_of_one_period", "zv_frozen_at_end", "mzv_for_payload",
+            "ei_for_payload", "ei3_for_payload", "fixed_mzv", "fixed_ei2", "fixed_ei3",
         }  # fmt: skip
         longer = one.baselines[EQUAL_DURATION.name]
         assert longer.duration == pytest.approx(one.shaped.duration, abs=1.5 * PERIOD)

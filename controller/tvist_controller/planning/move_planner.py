@@ -5,14 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tvist_controller.ahead import MAX_AHEAD, Ahead
 from tvist_controller.collision import CLEARANCE, CollisionModel, Meeting
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.control.inverse_dynamics import InverseDynamics
-from tvist_controller.control.shaped_reference import ShapedReference
-from tvist_controller.line_filter import LineFilter
 from tvist_controller.planning.basis import FilterBasis, MotionBasis
 from tvist_controller.planning.filter_planner import FilterPlanner
+from tvist_controller.planning.keeping import keeping_motion, shaped_ahead
 from tvist_controller.quiet.elastic_arm import ElasticArm
 from tvist_controller.quiet.quiet_motion import quiet_motion
 from tvist_controller.refusal import RefusalError
@@ -89,9 +87,10 @@ class MovePlanner:
         limits = MotionLimits(command.velocity, command.acceleration, command.jerk)
         if command.duration is None:
             arm = None if at_once else self._arm(basis.filter)
-            return self.along(path, limits, basis, arm=arm)
+            return self.along(path, limits, basis, arm=arm, at_once=at_once)
         limits = self._lasting(path, command.duration, basis)
-        return self.along(path, limits, basis, at_least(limits, AGILE.acceleration, AGILE.jerk))
+        agility = at_least(limits, AGILE.acceleration, AGILE.jerk)
+        return self.along(path, limits, basis, agility, at_once=at_once)
 
     def _lasting(self, path: JointLine, duration: float, basis: MotionBasis) -> MotionLimits:
         """Limits with which a motion takes a duration [s], or those of the arm if it takes longer with these."""
@@ -111,6 +110,8 @@ class MovePlanner:
         basis: MotionBasis,
         agility: MotionLimits | None = None,
         arm: ElasticArm | None = None,
+        *,
+        at_once: bool = False,
     ) -> PlannedMove:
         """Plan a motion along a path, from rest to rest.
 
@@ -121,6 +122,7 @@ class MovePlanner:
             agility: Limits of pauses and changes of the speed; None for those of the motion.
             arm: Model of the arm, which a motion along a straight line in joint space is to leave without vibration;
                 None for the quickest motion.
+            at_once: Whether the plan must be made within a tick, which is too short to shape the motion ahead.
 
         Raises:
             RefusalError: There is no such motion, or it would lead to a collision.
@@ -130,6 +132,8 @@ class MovePlanner:
         try:
             if arm is not None and isinstance(path, JointLine):
                 motion = quiet_motion(path, spared, arm, PERIOD, rate, agility)
+            elif isinstance(path, JointLine) and basis.excess > 0.0 and not at_once:
+                motion = keeping_motion(path, limits, self._filters.present(basis.filter), rate, agility)
             else:
                 motion = quickest_motion(path, spared, PERIOD, rate, agility)
         except ValueError as error:
@@ -161,7 +165,7 @@ class MovePlanner:
         bound = largest_torque(dynamics, motion.path, limits.velocity, limits.acceleration)
         if (bound <= allowed).all() or (BLUNTED * self._before_shaping(motion) <= allowed).all():
             return None
-        ahead = self._shaped(motion, basis)
+        ahead = shaped_ahead(motion, self._filters.present(basis.filter))
         if ahead is None:
             return None
         most = torque_along(dynamics, ahead, PERIOD)
@@ -178,16 +182,3 @@ class MovePlanner:
         """Largest torques that the motion would need without a filter, shape (n,) [N m]."""
         most: Floats = np.max([self._dynamics.effort(*state) for state in motion.states(LOOKS)], axis=0)
         return most
-
-    def _shaped(self, motion: PlannedMotion, basis: MotionBasis) -> Floats | None:
-        """References of the shaped motion, shape (k, n) [rad]; None if it lasts too long to simulate."""
-        tvist = self._filters.present(basis.filter)
-        path = motion.path
-        shaped = ShapedReference(path.posture(path.start), PERIOD)
-        shaped.enter(path.posture_of, path.start)
-        line_filter = LineFilter(tvist, motion.limits)
-        line_filter.begin(tvist, path.start, path.posture_of)
-        tvist.aim(path.end, quiet=motion.quiet)
-        ahead = Ahead(motion.fork(), line_filter, shaped)
-        ahead.until(MAX_AHEAD)
-        return np.array(ahead.references) if ahead.rests else None

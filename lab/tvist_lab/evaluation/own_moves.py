@@ -3,10 +3,17 @@
 import numpy as np
 from msgspec.structs import replace
 
-from tvist_controller.api import ElasticArm, JointLine, MotionLimits, paper_payload, quiet_motion
-from tvist_lab.evaluation.line import point_to_point, samples_of
+from tvist_controller.api import (
+    ElasticArm,
+    JointLine,
+    MotionLimits,
+    keeping_motion,
+    paper_payload,
+    quiet_motion,
+)
+from tvist_lab.evaluation.line import samples_of
 from tvist_lab.evaluation.moves import Move
-from tvist_lab.evaluation.recipes import Recipe, RecipeError, spared
+from tvist_lab.evaluation.recipes import Recipe, RecipeError
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
@@ -38,7 +45,7 @@ def own_move(
     quiet = tvist.name == PLANNED
     tvist.aim(target, quiet=quiet)
     if not quiet:
-        return tvist, point_to_point(start, target, spared(limits, tvist))
+        return tvist, samples_of(keeping_motion(JointLine(start, target), limits, tvist))
     arm = believed(recipe, description, move.mass)
     return tvist, samples_of(quiet_motion(JointLine(start, target), limits, arm, PERIOD))
 

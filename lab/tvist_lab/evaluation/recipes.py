@@ -1,11 +1,10 @@
 """Filters for a move, as the server creates them, and optionally with a deliberately wrong frequency."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from tvist_controller.api import (
     ElasticFeedForward,
     ModeSource,
-    MotionLimits,
     OwnShaper,
     choose_filter,
     elastic_feed_forward,
@@ -148,8 +147,3 @@ class Recipe:
             )
         right = source.estimator(modes, paper_payload(description, mass))
         return Mistaken(right, self.frequency_error) if self.frequency_error else right
-
-
-def spared(limits: MotionLimits, tvist: Filter) -> MotionLimits:
-    """Limits of a reference such that the shaped reference keeps the given limits."""
-    return replace(limits, acceleration=(1.0 - tvist.excess) * limits.acceleration)
