@@ -32,6 +32,7 @@ COMMANDS = {
     "bound": "Compute the least time that moves need to end without vibration, and what shapers take.",
     "paths": "Compare paths shaped along the path with the same paths shaped joint by joint.",
     "tracking": "Measure how closely the arm follows positions sent to servoj, with every shaper.",
+    "robustness": "Compare shapers on arms that are stiffer, softer or loaded otherwise than they are told.",
     "shaperbench": "Rank shapers, your own included, on ten simulated arms.",
     "search": "Search for cases in which a robot breaks its promises.",
     "bench": "Measure how fast tvist runs on this machine.",

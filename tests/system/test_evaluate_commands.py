@@ -8,6 +8,7 @@ from tests.system.test_command_line import tvist
 
 from tvist_cli.commands.evaluate import evaluate
 from tvist_cli.commands.paths import paths
+from tvist_cli.commands.robustness import robustness
 from tvist_cli.commands.shaperbench import shaperbench
 from tvist_cli.failure import Failure
 
@@ -134,6 +135,21 @@ class TestEvaluate:
         path = tmp_path / "moves.json"
         path.write_text(json.dumps([MOVES[0], {**MOVES[0], "target": [0, 0, 7, 0, 0, 0]}]), encoding="utf-8")
         tvist("evaluate", "--moves", path).assert_failed(2, "move 2", "joint 3", "elbow", "6.28319")
+
+
+class TestRobustness:
+    @pytest.mark.parametrize(
+        ("arguments", "words"),
+        [
+            ({"moves": 0}, ("moves is 0", "1 to 10000")),
+            ({"seed": -1}, ("seed is -1",)),
+            ({"against": ["zz"]}, ("zz", "elastic")),
+            ({"against": ["none"]}, ("waiting",)),
+            ({"calibration": "ur5e_5kg"}, ("ur5e_5kg", "modal")),
+        ],
+    )
+    def test_misuse_is_said(self, arguments, words):
+        assert_misuse(robustness, arguments, words)
 
 
 class TestPaths:

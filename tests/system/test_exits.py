@@ -224,7 +224,12 @@ class TestDoesNotBegin:
         assert code == 2
         assert "start" in said
 
-    @pytest.mark.parametrize("endpoint", ["nonsense", "tcp/127.0.0.1:99999", "tcp/192.0.2.1:7447"])
+    def test_an_endpoint_without_a_protocol_is_misuse(self):
+        code, said = refused_to_start("--insecure", endpoint="nonsense")
+        assert code == 2
+        assert "nonsense" in said
+
+    @pytest.mark.parametrize("endpoint", ["tcp/127.0.0.1:99999", "tcp/192.0.2.1:7447"])
     def test_an_endpoint_that_cannot_be_listened_on_is_named(self, endpoint):
         code, said = refused_to_start("--insecure", endpoint=endpoint)
         assert code == 1  # which endpoints there are is Zenoh's to say

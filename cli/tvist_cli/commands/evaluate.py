@@ -38,6 +38,7 @@ def evaluate(
     stiffness_error: float = 0.0,
     limits: str = "gentle",
     stroke: tuple[float, float] | None = None,
+    streams: bool = False,
     baselines: Annotated[bool, Parameter(negative="--no-baselines")] = True,
     save_moves: Path | None = None,
     figures: Path | None = None,
@@ -72,6 +73,8 @@ def evaluate(
         limits: gentle for the paper's limits, 1.5 rad/s, 2 rad/s² and 100 rad/s³; or industrial for 3 rad/s, 8 rad/s²
             and 2000 rad/s³. Moves for which the drives are too weak are left out.
         stroke: Smallest and largest length of random moves, as a share of the way between two configurations [0.3 1].
+        streams: Follow a stream of set-points from the start of each move, which turns to other targets on the way and
+            is then stopped, instead of making the move.
         baselines: Run the baselines as well; this takes three and a half times as long.
         save_moves: File to write the moves and their payloads to.
         figures: Folder to write figures to.
@@ -85,17 +88,23 @@ def evaluate(
     _check(moves, random, seed, modes, frequency_error, wrists=wrists)
     conditions = _conditions(limits, payload_error, stiffness_error)
     length = _stroke(stroke, moves)
+    if streams and save_moves is not None:
+        raise Failure("--save-moves writes moves, but --streams follows streams: leave one out", code=2)
     with told(DescriptionError, code=2):
         description = load(robot)
     masses = masses_of(payload, description)
     shaper, own = loaded(shaper)
     known = _calibration(calibration, shaper, own, modes, description)
     chosen, share = _moves(moves, random, seed, masses, description, length, wrists=wrists)
-    drawn, chosen = len(chosen), _feasible(chosen, description, conditions)
+    drawn, chosen = len(chosen), chosen if streams else _feasible(chosen, description, conditions)
     plant, kept = disturbed(description, disturbances, clean=clean)
     recipe, others = _recipe(shaper, own, modes, known, plant, frequency_error, masses, baselines=baselines)
+    if streams:  # the end of a stream is not known
+        others = tuple(one for one in others if not one.told_target)
     jobs = [
-        MoveJob(plant, move, recipe, others, seed=_arm_seed(seed, place), conditions=conditions)
+        MoveJob(
+            plant, move, recipe, others, seed=_arm_seed(seed, place), conditions=conditions, stream=streams
+        )
         for place, move in enumerate(chosen)
     ]
     judged: list[JudgedMove] = []
@@ -115,7 +124,7 @@ def evaluate(
             _draw(jobs, judged, figures)
     from tvist_lab.evaluation.moves import collisions
 
-    met = collisions(description, chosen) if moves is not None else []
+    met = collisions(description, chosen) if moves is not None and not streams else []
     result = {
         "shaper": shaper,
         "calibration": None if known is None else known.name,
@@ -123,6 +132,7 @@ def evaluate(
         "disturbances": list(kept),
         "seed": seed,
         "limits": limits,
+        "streams": streams,
         "payload_error_percent": payload_error,
         "stiffness_error_percent": stiffness_error,
         "free_of_collision": share,

@@ -65,10 +65,10 @@ def shaperbench(
     if not 0 <= seed < 2**62:
         raise Failure(f"seed is {seed}: must be at least 0 and less than 2^62", code=2)
     description = load("ur5e")
-    known = _calibration(calibration)
+    known = modal_calibration(calibration)
     against = None if against is None else [name.lower() for name in against]
     mine = None if shaper is None else _mine(shaper)
-    standing = _candidates(mine, against, known)
+    standing = candidates_of(mine, against, known)
     drawn = bench.draw(description, count, seed)
     faults = [bench.inspect(one, description, drawn) for one in standing]
     sound = [one for one, fault in zip(standing, faults, strict=True) if fault is None]
@@ -104,7 +104,12 @@ def shaperbench(
         raise Failure(f"shaper {shaper} is not ranked: it {unranked['fault']}")
 
 
-def _calibration(name: str | None) -> "Calibration":
+def modal_calibration(name: str | None) -> "Calibration":
+    """Return a calibration with a modal model, by default that of the UR5e.
+
+    Raises:
+        Failure: There is no such calibration, or it has no modal model.
+    """
     from tvist_controller.calibrations import load
     from tvist_protocol.calibration import CalibrationError
 
@@ -128,9 +133,14 @@ def _mine(shaper: str) -> "str | OwnShaper":
     return shaper
 
 
-def _candidates(
+def candidates_of(
     mine: "str | OwnShaper | None", against: list[str] | None, known: "Calibration"
 ) -> "list[Candidate]":
+    """Return waiting and the shapers to compare; see `tvist_lab.evaluation.standing.candidates`.
+
+    Raises:
+        Failure: There is no shaper of a name.
+    """
     from tvist_lab.evaluation.recipes import RecipeError
     from tvist_lab.evaluation.standing import candidates
     from tvist_plant.description import load

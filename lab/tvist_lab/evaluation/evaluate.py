@@ -14,6 +14,7 @@ from tvist_lab.evaluation.moves import Move
 from tvist_lab.evaluation.own_moves import own_move
 from tvist_lab.evaluation.recipes import Recipe
 from tvist_lab.evaluation.running import sound
+from tvist_lab.evaluation.streams import stopped_stream
 from tvist_lab.evaluation.workers import spread
 from tvist_lab.metrics import (
     NotMeasurableError,
@@ -54,6 +55,8 @@ class MoveJob:
     """Seed of gear errors, and of the arm's deviations."""
     conditions: Conditions = AS_KNOWN
     """Limits, and what the controller does not know."""
+    stream: bool = False
+    """Whether to follow a stream from the move's start that is stopped somewhere, instead of making the move."""
 
     @property
     def motions(self) -> int:
@@ -168,12 +171,20 @@ def _record(job: MoveJob) -> tuple[Recording, Recording, dict[str, Recording]]:
     carried, declared = (body(paper_payload(description, one.mass)) for one in (job.move, move))
     arm = FlexibleArm(job.conditions.arm(description, job.seed), carried)
     cycle = control_line(description, start, declared, carried, arm)
-    reference = point_to_point(start, target, limits)
+    if job.stream:
+        reference = stopped_stream(description, start, job.seed, limits)
+    else:
+        reference = point_to_point(start, target, limits)
 
     def follow(shaped: Floats, elastic: ElasticFeedForward | None = None) -> Recording:
         return simulate(cycle, start, reference, shaped, job.seed, elastic=elastic)
 
-    tvist, own = own_move(recipe, description, move, limits)
+    if job.stream:
+        tvist, own = recipe.make(description, move.mass), reference
+        tvist.reset(start)
+        tvist.aim(None)
+    else:
+        tvist, own = own_move(recipe, description, move, limits)
     shaped = follow(shape(sound(tvist), own)[0], recipe.elastic(description, tvist))
     ticks = round(motions(shaped)[0].shaped_duration(shaped) / PERIOD)
     others = {
