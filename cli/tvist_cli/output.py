@@ -102,3 +102,12 @@ def words(meanings: Mapping[str, str]) -> None:
 def number(value: float | None, digits: int = 3) -> str:
     """Format a number; None gives a dash."""
     return "–" if value is None else f"{value:.{digits}f}"
+
+
+def write_json(path: Path, result: dict[str, Any]) -> None:
+    """Write a result to a file, indented for people.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    path.write_bytes(msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n")

@@ -3,9 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from tvist_shaping.base import FeedForward
-from tvist_shaping.estimators.base import Estimator
-from tvist_shaping.steady import SMOOTH, Design, SteadyFilter
+from tvist_shaping.steady import SteadyFilter
 
 
 class AimedFilter(SteadyFilter):
@@ -16,19 +14,8 @@ class AimedFilter(SteadyFilter):
     behaves like a `SteadyFilter`.
     """
 
-    def __init__(
-        self,
-        design: Design,
-        estimator: Estimator,
-        *,
-        joints: int,
-        smooth: int = SMOOTH,
-        feed_forward: FeedForward = "rigid",
-    ) -> None:
-        """Take the arguments of `SteadyFilter`."""
-        self._aimed = False
-        super().__init__(design, estimator, joints=joints, smooth=smooth, feed_forward=feed_forward)
-        self.excess = 0.0
+    spared = 0.0
+    _aimed = False
 
     def aim(self, q: npt.ArrayLike | None, *, quiet: bool = False) -> None:  # noqa: ARG002  see `PlannedFilter`
         """Use the weights for the end of a motion; the reference must be at rest. See `Filter.aim`."""

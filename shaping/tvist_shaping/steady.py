@@ -201,6 +201,8 @@ class SteadyFilter(Filter):
     """
 
     design: Design
+    spared = EXCESS
+    """Initial value of `excess` [-]."""
 
     def __init__(
         self,
@@ -232,7 +234,7 @@ class SteadyFilter(Filter):
                 "take an estimator of that many modes, or another design",
             )  # fmt: skip
         super().__init__(design.name, estimator, joints, design.period, design.taps + 4)
-        self.design, self.excess, self.feed_forward = design, EXCESS, feed_forward
+        self.design, self.excess, self.feed_forward = design, self.spared, feed_forward
         self._reach = design.taps
         self._smooth = smooth
         self._delays = np.arange(design.taps, dtype=float)

@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from tvist_cli.commands.shaperbench import candidates_of, modal_calibration
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import err, number, print_json, progress, table
+from tvist_cli.output import err, number, print_json, progress, table, write_json
 
 
 def robustness(
@@ -89,11 +89,9 @@ def _row(row: dict[str, Any], kind: str, names: list[str]) -> tuple[str, ...]:
 
 
 def _write(result: dict[str, Any], output: Path | None, figures: Path | None, markdown: Path | None) -> None:
-    import msgspec
-
     with told(OSError):
         if output is not None:
-            output.write_bytes(msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n")
+            write_json(output, result)
         if markdown is not None:
             from tvist_lab.evaluation.robustness_page import robustness_page
 

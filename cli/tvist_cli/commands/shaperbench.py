@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import err, number, out, print_json, progress, say, table
+from tvist_cli.output import err, number, out, print_json, progress, say, table, write_json
 from tvist_cli.shapers_of import load_given
 
 if TYPE_CHECKING:
@@ -171,11 +171,9 @@ def _command(
 
 
 def _write(result: dict[str, Any], output: Path | None, figures: Path | None, markdown: Path | None) -> None:
-    import msgspec
-
     with told(OSError):
         if output is not None:
-            output.write_bytes(msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n")
+            write_json(output, result)
         if markdown is not None:
             from tvist_lab.evaluation.markdown import page
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
+from tvist_lab.evaluation.conditions import softer_and_stiffer
 from tvist_lab.mujoco_arm import MujocoArm
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
@@ -66,16 +67,7 @@ def _scattered(description: RobotDescription, carried: Payload, seed: int) -> Fl
 
 
 def _softer_and_stiffer(description: RobotDescription, seed: int) -> RobotDescription:
-    random = np.random.default_rng([seed, 15])
-
-    def scattered(values: tuple[float, ...]) -> tuple[float, ...]:
-        return tuple((np.array(values) * random.choice([1.0 - SCATTER, 1.0 + SCATTER], len(values))).tolist())
-
-    drives, links = description.drives, description.link_flexibility
-    names = ("gear_stiffness", "velocity_gain", "position_gain")
-    other = replace(drives, **{name: scattered(getattr(drives, name)) for name in names})
-    bending = replace(links, stiffness=scattered(links.stiffness))
-    return replace(description, drives=other, link_flexibility=bending)
+    return softer_and_stiffer(description, SCATTER, np.random.default_rng([seed, 15]))
 
 
 def _unlike(description: RobotDescription, seed: int) -> RobotDescription:

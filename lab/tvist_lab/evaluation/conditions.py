@@ -34,21 +34,26 @@ class Conditions:
         """Return the arm that makes a move: gears, links and velocity loops stiffer or softer at random."""
         if self.stiffness_error == 0.0:
             return description
-        random = np.random.default_rng([seed, 29])
-
-        def scattered(values: tuple[float, ...]) -> tuple[float, ...]:
-            signs = random.choice([-1.0, 1.0], len(values))
-            return tuple((np.array(values) * (1.0 + self.stiffness_error * signs)).tolist())
-
-        drives, links = description.drives, description.link_flexibility
-        names = ("gear_stiffness", "velocity_gain", "position_gain")
-        other = replace(drives, **{name: scattered(getattr(drives, name)) for name in names})
-        bending = replace(links, stiffness=scattered(links.stiffness))
-        return replace(description, drives=other, link_flexibility=bending)
+        return softer_and_stiffer(description, self.stiffness_error, np.random.default_rng([seed, 29]))
 
 
 AS_KNOWN = Conditions()
 """The paper's limits, and an arm that is as the controller knows it."""
+
+
+def softer_and_stiffer(
+    description: RobotDescription, share: float, random: np.random.Generator
+) -> RobotDescription:
+    """Return an arm with each gear, link and gain of the drives' loops changed by a share, up or down at random."""
+
+    def scattered(values: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple((np.array(values) * random.choice([1.0 - share, 1.0 + share], len(values))).tolist())
+
+    drives, links = description.drives, description.link_flexibility
+    names = ("gear_stiffness", "velocity_gain", "position_gain")
+    other = replace(drives, **{name: scattered(getattr(drives, name)) for name in names})
+    bending = replace(links, stiffness=scattered(links.stiffness))
+    return replace(description, drives=other, link_flexibility=bending)
 
 
 def torque_share(description: RobotDescription, move: Move, limits: MotionLimits) -> float:

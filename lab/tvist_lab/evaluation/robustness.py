@@ -37,7 +37,7 @@ class ErrorJob:
     move: Move
     """The move, with the carried mass."""
     kind: str
-    """What is wrong: a key of `ERRORS`."""
+    """Kind of the error, a key of `ERRORS`."""
     error: float
     """Relative error [-]."""
     seed: int
