@@ -7,7 +7,7 @@ from tvist_cli.failure import Failure, told
 from tvist_cli.pages import serve_page
 
 if TYPE_CHECKING:
-    from tvist_lab.mcap_file import RecordingFile
+    from tvist_lab.recordings.mcap_file import RecordingFile
     from tvist_protocol.geometry import Geometry
     from tvist_protocol.values import Payload
     from tvist_view.track import Track
@@ -31,8 +31,8 @@ def show_tracks(tracks: "list[Track]", factor: float, place: tuple[str, int], *,
 
 def recorded(file: Path) -> "list[Track]":
     """The run in a recording."""
-    from tvist_lab.mcap_file import read
     from tvist_lab.recordings import RecordingError
+    from tvist_lab.recordings.mcap_file import read
     from tvist_view.chain import Chain
     from tvist_view.track import Shown, Track, TrackError
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from tvist_lab.mcap_file import RecordingFile, read
 from tvist_lab.metrics import NotMeasurableError
 from tvist_lab.paper.drawing import draw, draw_overview
 from tvist_lab.paper.experiment import Experiment, judge, run, table_1
@@ -16,6 +15,7 @@ from tvist_lab.paper.methods import TimeVarying, Unshaped
 from tvist_lab.paper.published import MOTIONS
 from tvist_lab.paper.report import as_dict
 from tvist_lab.recordings import Recording, RecordingError
+from tvist_lab.recordings.mcap_file import RecordingFile, read
 from tvist_lab.replay import replay_file
 from tvist_lab.served import served_robot
 

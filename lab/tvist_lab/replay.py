@@ -8,7 +8,7 @@ from typing import Any
 from msgspec.structs import fields
 
 from tvist_controller.api import Controller, OwnShaper, Presence, RecordedShaper, Setup, SocketNews
-from tvist_lab.mcap_file import RecordingFile
+from tvist_lab.recordings.mcap_file import RecordingFile
 from tvist_protocol.commands import HandOver, Setpoint, TakeControl
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError, TvistError

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tvist_lab.mcap_file import read
+from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import known_fields, replay_file
 
 RUNS = sorted(Path(__file__).parent.glob("*.mcap"))

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from tvist_lab.mcap_file import read
+from tvist_lab.recordings.mcap_file import read
 from tvist_server.recording import Recorder
 
 EVERY = 50

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
 
-from tvist_lab.mcap_file import RecordingFileError, read
 from tvist_lab.recordings import RecordingError
+from tvist_lab.recordings.mcap_file import RecordingFileError, read
 from tvist_protocol import Event, Info, Setpoint, State, Truth
 from tvist_protocol.generate import FOLDER
 from tvist_protocol.journal import Entry, entry_of, message_of

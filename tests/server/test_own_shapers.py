@@ -11,7 +11,7 @@ from tvist_controller.about import info_of
 from tvist_controller.own_shapers import OwnShaper, OwnShaperError, is_file, load_own
 from tvist_controller.planner import Planner
 from tvist_controller.setup import Setup
-from tvist_lab.mcap_file import RecordingFile
+from tvist_lab.recordings.mcap_file import RecordingFile
 from tvist_lab.replay import ReplayError, replay_file
 from tvist_plant.user_file import UserFileError
 from tvist_protocol import commands as c

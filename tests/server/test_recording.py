@@ -373,7 +373,7 @@ def recording_process(path, size, limit=0):
 
 
 def test_a_killed_process_leaves_its_complete_chunks_behind(path):
-    from tvist_lab.mcap_file import read as read_file
+    from tvist_lab.recordings.mcap_file import read as read_file
 
     with recording_process(path, size=60_000) as process:
         assert process.stdout.readline() == "recording\n"
@@ -389,7 +389,7 @@ def test_a_killed_process_leaves_its_complete_chunks_behind(path):
 
 
 def test_a_file_that_may_grow_no_further_is_readable_up_to_there(path):
-    from tvist_lab.mcap_file import read as read_file
+    from tvist_lab.recordings.mcap_file import read as read_file
 
     with recording_process(path, size=10**9, limit=100_000) as process:
         assert process.stdout.readline().endswith("is incomplete: File too large\n")

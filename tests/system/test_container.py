@@ -15,7 +15,7 @@ from tests.system.containers import ROOT, Contained, Engine, install
 from zenoh.handlers import Callback
 
 from tvist_client.check import check
-from tvist_lab.mcap_file import read
+from tvist_lab.recordings.mcap_file import read
 
 pytestmark = [pytest.mark.nightly, pytest.mark.timeout(1500)]
 

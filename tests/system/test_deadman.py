@@ -14,7 +14,7 @@ import pytest
 from tests.conformance.served import PATIENCE, Served
 from tests.conformance.wire import Q1, STOPPED, TICK
 
-from tvist_lab.mcap_file import read
+from tvist_lab.recordings.mcap_file import read
 
 from .bystander import Bystander
 

@@ -13,7 +13,7 @@ import zenoh
 from tests.conformance.served import PATIENCE, Served, free_endpoint, refused_to_start
 from tests.conformance.wire import Wire
 
-from tvist_lab.mcap_file import read
+from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 
 FAR = [1.5, -3.0, 0.2, -1.5, 0.1, 0.3]

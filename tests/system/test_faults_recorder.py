@@ -8,7 +8,7 @@ import subprocess
 import pytest
 from tests.conformance.served import Served
 
-from tvist_lab.mcap_file import read
+from tvist_lab.recordings.mcap_file import read
 
 from .bystander import Bystander
 from .interposed import Interposed

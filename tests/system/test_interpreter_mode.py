@@ -7,7 +7,7 @@ import pytest
 from tests.conformance.served import PATIENCE, Served
 from tests.places import own_address
 
-from tvist_lab.mcap_file import read
+from tvist_lab.recordings.mcap_file import read
 
 from .test_live_replay import tvist
 

@@ -12,7 +12,7 @@ from tests.conformance.served import PATIENCE, Served
 
 from tvist_client.robot import Robot
 from tvist_lab.collect import collect
-from tvist_lab.mcap_file import read
+from tvist_lab.recordings.mcap_file import read
 
 pytestmark = [pytest.mark.realtime, pytest.mark.slow]
 Q1 = (0.0, -math.pi, 0.0, -math.pi / 2, 0.0, 0.0)

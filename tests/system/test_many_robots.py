@@ -9,7 +9,7 @@ from tests.conformance.served import PATIENCE, Served, free_endpoint
 from tests.conformance.wire import Q1, Wire
 
 from tvist_client.check import check
-from tvist_lab.mcap_file import read
+from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 
 from .keyring import free_tls_endpoint, made, shown

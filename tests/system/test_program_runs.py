@@ -8,7 +8,7 @@ from tests.conformance.served import Served
 from tvist_client.robot import Robot
 from tvist_lab.collect import collect
 from tvist_lab.in_process import free_setup, robot_in_process
-from tvist_lab.mcap_file import read
+from tvist_lab.recordings.mcap_file import read
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.programs import ProgramInterpret, ProgramSkip
 

@@ -11,7 +11,7 @@ from tests.conformance.served import NOISE, PATIENCE, free_endpoint
 from tests.conformance.wire import Wire
 from tests.places import own_address
 
-from tvist_lab.mcap_file import read
+from tvist_lab.recordings.mcap_file import read
 from tvist_plant.description import load
 
 MOVES = """def moves():

@@ -10,7 +10,7 @@ import pytest
 from tests.conformance.served import NOISE, PATIENCE, Served, free_endpoint
 from tests.conformance.wire import Wire
 
-from tvist_lab.mcap_file import read
+from tvist_lab.recordings.mcap_file import read
 
 pytestmark = pytest.mark.realtime
 

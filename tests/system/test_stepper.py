@@ -11,7 +11,7 @@ from tests.conformance.wire import Q1, Wire
 
 from tvist_client.robot import Robot
 from tvist_lab.collect import collect
-from tvist_lab.mcap_file import read
+from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 from tvist_protocol.errors import RefusedError
 

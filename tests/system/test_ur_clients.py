@@ -14,7 +14,7 @@ from tests.places import own_address
 from tests.system.ur_object import Client, started
 
 from tvist_controller.instruments.snapshot import Instruments
-from tvist_lab.mcap_file import read
+from tvist_lab.recordings.mcap_file import read
 from tvist_plant.description import load
 from tvist_protocol.io import Io
 

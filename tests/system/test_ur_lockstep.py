@@ -12,7 +12,7 @@ from tests.places import own_address
 from tests.server.ur import decoders, rtde_client
 
 from tvist_controller.programs.built_in import PAPER, built_in
-from tvist_lab.mcap_file import read
+from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 from tvist_plant.description import load
 

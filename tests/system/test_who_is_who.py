@@ -10,7 +10,7 @@ import zenoh
 from tests.conformance.served import PATIENCE, Served
 from tests.conformance.wire import Q1, Wire
 
-from tvist_lab.mcap_file import read
+from tvist_lab.recordings.mcap_file import read
 
 pytestmark = pytest.mark.realtime
 

@@ -23,9 +23,9 @@ def analyze(file: Path, *, figures: Path | None = None, json: bool = False) -> N
         figures: Folder for a figure of each motion.
         json: Print one JSON object.
     """
-    from tvist_lab.mcap_file import read
     from tvist_lab.metrics import measure, motions
     from tvist_lab.recordings import RecordingError
+    from tvist_lab.recordings.mcap_file import read
 
     with told(RecordingError):
         content = read(file)

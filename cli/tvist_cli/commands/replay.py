@@ -19,8 +19,8 @@ def replay(
             but replay runs it only if it is given here.
         json: Print one JSON object.
     """
-    from tvist_lab.mcap_file import read
     from tvist_lab.recordings import RecordingError
+    from tvist_lab.recordings.mcap_file import read
     from tvist_lab.replay import ReplayError, replay_file
     from tvist_server.recording import RecorderError
 

@@ -14,7 +14,7 @@ from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
 from mcap.stream_reader import StreamReader, breakup_chunk
 from zstandard import ZstdError
 
-from tvist_lab.recordings import Recording, RecordingError
+from tvist_lab.recordings.recording import Recording, RecordingError
 from tvist_protocol.channels import tag
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError

@@ -1,0 +1,11 @@
+"""Recordings in memory and in files: data in and out."""
+
+from tvist_lab.recordings.recording import (
+    STATE_COLUMNS,
+    TRUTH_PREFIX,
+    Floats,
+    Recording,
+    RecordingError,
+)
+
+__all__ = ["STATE_COLUMNS", "TRUTH_PREFIX", "Floats", "Recording", "RecordingError"]
