@@ -1,4 +1,4 @@
-"""`tvist analyze`: measure the motions of a recording."""
+"""`tvist analyze`: measure the motions of a recording or of a robot's log."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -7,49 +7,70 @@ from tvist_cli.failure import told
 from tvist_cli.output import number, out, print_json, say, table
 
 if TYPE_CHECKING:
-    from tvist_lab.metrics import MotionResult
+    from tvist_lab.metrics import MotionResult, MotionRows
+    from tvist_lab.recordings import Recording
 
 COLUMNS = (
     "motion", "start s", "stop s", "delay ms", "stabil. ms", "cycle ms", "overshoot m", "RV m/s²", "still after ms",
-    "f_d Hz", "ζ",
+    "peak m/s²", "f_d Hz", "ζ",
 )  # fmt: skip
 
 
 def analyze(file: Path, *, figures: Path | None = None, json: bool = False) -> None:
-    """Measure each motion of a recording and print the columns of the paper's Table 2.
+    """Measure each motion of a recording or a robot's log, and print the columns of the paper's Table 2.
+
+    Frequency and damping have 95 % intervals. A dash has its reason in a line below the table.
 
     Args:
-        file: MCAP file that `tvist serve --record` or `tvist record` wrote.
+        file: Recording of `tvist serve --record`, `tvist record` or `tvist export`; or a log of another robot: CSV
+            with RTDE's names, a dump of UR's port 30003, a rosbag2 in MCAP.
         figures: Folder for a figure of each motion.
         json: Print one JSON object.
     """
     from tvist_lab.metrics import measure, motions
-    from tvist_lab.recordings import RecordingError
-    from tvist_lab.recordings.mcap_file import read
+    from tvist_lab.recordings import RecordingError, read
 
     with told(RecordingError):
-        content = read(file)
-    recording = content.recording
-    found = motions(recording)
+        recording = read(file)
+        found = motions(recording)
     results = [measure(recording, motion) for motion in found]
-    if content.note:
-        say(f"{file}: {content.note}")
+    for note in recording.notes:
+        say(f"{file}: {note}")
     if figures is not None:
-        from tvist_lab.figures import observed_figure, save
-
-        figures.mkdir(parents=True, exist_ok=True)
-        for index, motion in enumerate(found, 1):
-            drawn = observed_figure(f"motion {index}", (recording, motion))
-            say(str(save(drawn, figures / f"motion_{index}.png")))
+        _draw(recording, found, figures)
     if json:
         print_json(
-            {"file": str(file), "motions": [result.as_dict() for result in results], "note": content.note}
+            {
+                "file": str(file),
+                "motions": [result.as_dict() for result in results],
+                "notes": list(recording.notes),
+            }
         )
         return
     table(f"{file}: {len(results)} motions", COLUMNS, [_row(index, r) for index, r in enumerate(results, 1)])
-    for index, result in enumerate(results, 1):
-        for name, note in result.notes.items():
-            out.print(f"motion {index}, {name}: {note}")
+    for note in _grouped(results):
+        out.print(note)
+
+
+def _draw(recording: "Recording", found: "list[MotionRows]", folder: Path) -> None:
+    """Write a figure of each motion, as far as it was recorded, and one of its vibration after the stop."""
+    from tvist_lab.figures import observed_figure, ringing_figure, save
+    from tvist_lab.metrics import NotMeasurableError
+
+    folder.mkdir(parents=True, exist_ok=True)
+    kinds = (
+        {"ringing": ringing_figure}
+        if recording.foreign
+        else {"motion": observed_figure, "ringing": ringing_figure}
+    )
+    for index, motion in enumerate(found, 1):
+        for kind, figure_of in kinds.items():
+            try:
+                drawn = figure_of(f"motion {index}", (recording, motion))
+            except NotMeasurableError as error:
+                say(f"motion {index}: no figure of its {kind}: {error}")
+            else:
+                say(str(save(drawn, folder / f"{kind}_{index}.png")))
 
 
 def _row(index: int, result: "MotionResult") -> tuple[str, ...]:
@@ -64,6 +85,29 @@ def _row(index: int, result: "MotionResult") -> tuple[str, ...]:
         "–" if overshoot is None else f"{overshoot:.1e}",
         number(result.residual_vibration_m_s2),
         number(result.still_after_ms, 0),
-        number(result.f_d_hz, 2),
-        number(result.zeta),
+        number(result.peak_m_s2),
+        _with_interval(result.f_d_hz, result.f_d_interval_hz, 2),
+        _with_interval(result.zeta, result.zeta_interval, 3),
     )
+
+
+def _with_interval(value: float | None, interval: tuple[float, float] | None, digits: int) -> str:
+    if value is None or interval is None:
+        return "–"
+    return f"{value:.{digits}f} ± {max(interval[1] - value, 0.0):.{digits}f}"
+
+
+def _grouped(results: "list[MotionResult]") -> list[str]:
+    """One line for each note, with all motions and figures to which it applies."""
+    places: dict[str, dict[str, list[int]]] = {}
+    for index, result in enumerate(results, 1):
+        for name, note in result.notes.items():
+            places.setdefault(note, {}).setdefault(name, []).append(index)
+    lines = []
+    for note, names in places.items():
+        numbers = sorted({index for indices in names.values() for index in indices})
+        which = (
+            "all motions" if len(numbers) == len(results) > 1 else f"motion {', '.join(map(str, numbers))}"
+        )
+        lines.append(f"{which}, {', '.join(names)}: {note}")
+    return lines

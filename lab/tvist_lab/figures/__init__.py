@@ -12,6 +12,7 @@ from tvist_lab.figures.pareto import pareto_figure
 from tvist_lab.figures.path_shaping import corner_figure, path_shaping_figure
 from tvist_lab.figures.recorded import Recorded, motion_figure, observed_figure
 from tvist_lab.figures.residual import figure_16
+from tvist_lab.figures.ringing import ringing_figure
 from tvist_lab.figures.robustness import robustness_figure
 from tvist_lab.figures.sensitivity import figure_4
 from tvist_lab.figures.style import save
@@ -33,6 +34,7 @@ __all__ = [
     "pareto_figure",
     "path_shaping_figure",
     "residual_by_move_figure",
+    "ringing_figure",
     "robustness_figure",
     "save",
     "vibration_figure",

@@ -11,6 +11,7 @@ from tvist_lab.metrics.common_clock import (
     rigid_acceleration,
     still_after,
 )
+from tvist_lab.metrics.comparison import ComparedMotion, Comparison, compare
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.motion import MotionRows, motions
 from tvist_lab.metrics.residual import ModalResidual, Residual, residual, residual_by_modes
@@ -22,6 +23,8 @@ from tvist_lab.metrics.vibration import amplitude, best_tool_acceleration, tool_
 __all__ = [
     "SLOW_POLE",
     "CommonClock",
+    "ComparedMotion",
+    "Comparison",
     "ModalResidual",
     "MotionResult",
     "MotionRows",
@@ -36,6 +39,7 @@ __all__ = [
     "attained_position",
     "best_tool_acceleration",
     "common_clock",
+    "compare",
     "distance",
     "envelope",
     "fit_ring_down",

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.signal import hilbert
 
 from tvist_lab.metrics.errors import NotMeasurableError
+from tvist_lab.metrics.felt import felt
 from tvist_lab.metrics.motion import DIFFERENTIATOR_TICKS, MotionRows
 from tvist_lab.metrics.vibration import amplitude, band_pass, best_tool_acceleration, tool_acceleration
 from tvist_lab.recordings import Floats, Recording
@@ -15,6 +16,11 @@ STILL = 0.1
 """An arm is still if |α| stays below this [m/s²]."""
 AFTER_STOP = 0.010
 """Time after the stop at which `evaluate` begins to search for the peak [s], when the last ramp has passed."""
+
+NOISE_PEAK = 5.0
+"""Largest |α| that noise reaches in some seconds, over its rms in one axis [-]."""
+NOISE_TAIL = 0.2
+"""Time at the end of a rest in which the sensor shows its noise [s]."""
 
 Kinematics = Callable[[Floats], tuple[Floats, Floats]]
 """Converts joint angles, shape (n,) [rad], to the flange's position, shape (3,) [m], and rotation, shape (3, 3)."""
@@ -44,15 +50,28 @@ def common_clock(
     Raises:
         NotMeasurableError: The arm was not still at the end of the recording.
     """
-    after = _after_declared_stop(recording, motion)
-    alpha = best_tool_acceleration(recording)
+    peak, largest = vibration_after_stop(recording, motion)
     return CommonClock(
         still_after=still_after(recording, motion),
-        peak=float(np.max(amplitude(alpha[after]))),
-        envelope=float(np.max(envelope(alpha[after], recording.period))),
+        peak=peak,
+        envelope=largest,
         in_motion=float("nan") if kinematics is None else in_motion_rms(recording, motion, kinematics),
         peak_acceleration=peak_acceleration(recording, motion),
     )
+
+
+def vibration_after_stop(recording: Recording, motion: MotionRows) -> tuple[float, float]:
+    """Largest |α| and largest envelope after the stop of the reference before shaping plus the declared delay [m/s²].
+
+    In a log of another controller it is the arm's own stop that counts, and 10 ms more.
+
+    Raises:
+        NotMeasurableError: Nothing was recorded after that moment.
+    """
+    _, alpha = felt(recording, motion, _after_declared_stop(recording, motion), smooth=True)
+    if len(alpha) < 2:
+        raise NotMeasurableError("nothing was recorded after the stop")
+    return float(np.max(amplitude(alpha))), float(np.max(envelope(alpha, recording.period)))
 
 
 def still_after(recording: Recording, motion: MotionRows, threshold: float = STILL) -> float:
@@ -61,15 +80,21 @@ def still_after(recording: Recording, motion: MotionRows, threshold: float = STI
     The truth channel is used if there is one, otherwise the sensor below 60 Hz.
 
     Raises:
-        NotMeasurableError: |α| still exceeds the threshold when the recording ends or the next motion starts.
+        NotMeasurableError: |α| still exceeds the threshold when the recording ends or the next motion starts; or the
+            sensor's noise alone exceeds it, in a log of another controller.
     """
-    alpha = amplitude(best_tool_acceleration(recording)[motion.start : motion.end])
+    time, alpha_xyz = felt(recording, motion, slice(motion.start, motion.end), smooth=True)
+    alpha = amplitude(alpha_xyz)
+    if recording.foreign and (noise := _noise(time, alpha_xyz)) * NOISE_PEAK > threshold:
+        raise NotMeasurableError(
+            f"the sensor's noise of {noise:.3f} m/s² rms alone exceeds {threshold:g} m/s²"
+        )
     loud = np.flatnonzero(alpha > threshold)
     if not loud.size:
         return 0.0
     if loud[-1] == len(alpha) - 1:
         raise NotMeasurableError(f"|α| still exceeded {threshold:g} m/s² when the rest ended")
-    return float(recording.time[motion.start + loud[-1]] - recording.time[motion.start])
+    return float(time[loud[-1]] - recording.time[motion.start])
 
 
 def peak_after_stop(recording: Recording, motion: MotionRows, after: float = AFTER_STOP) -> float:
@@ -157,8 +182,16 @@ def in_motion_rms(recording: Recording, motion: MotionRows, kinematics: Kinemati
     return float(np.sqrt(np.mean(np.sum((alpha - rigid) ** 2, axis=1))))
 
 
+def _noise(time: Floats, alpha: Floats) -> float:
+    """Largest rms of an axis at the end of the rest [m/s²]."""
+    tail = alpha[time >= time[-1] - NOISE_TAIL] if len(time) else alpha
+    return float(np.max(np.std(tail, axis=0))) if len(tail) else 0.0
+
+
 def _after_declared_stop(recording: Recording, motion: MotionRows) -> slice:
     """Rows after the stop of the reference before shaping plus the delay that its shaper declares at that time."""
+    if recording.foreign:
+        return _later_than(recording, motion, recording.time[motion.arm_stop(recording)] + AFTER_STOP)
     delay = float(np.nan_to_num(recording["shaper_delay"][motion.reference_stop]))
     published = DIFFERENTIATOR_TICKS * recording.period
     return _later_than(recording, motion, recording.time[motion.reference_stop] + delay + published)

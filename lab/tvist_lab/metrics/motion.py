@@ -7,14 +7,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tvist_lab.metrics.measured_motion import measured_spans
+from tvist_lab.metrics.servo_lag import servo_lag
 from tvist_lab.recordings import Floats, Recording
 
 MOVING = 1e-7
 """A reference that changes by more than this from one tick to the next moves [rad]."""
 JUMP = 0.05
 """A reference that changes by more than this in a tick was set elsewhere, for example by a reset [rad]; 25 rad/s."""
+TICK = 0.002
+"""Time in which that change counts as a jump [s]; more in a log with longer ticks."""
 REST = 0.02
 """A reference that rests for less than this, as in a reversal, is still in the same motion [s]."""
+EARLY = 0.05
+"""Time before a motion found in the measured angles that does not count as rest any more [s]."""
 DIFFERENTIATOR_TICKS = 1
 """The published target of tick i is the shaped reference of tick i-1, since a central difference costs a tick."""
 
@@ -28,13 +34,24 @@ class MotionRows:
     reference_stop: int
     """Last row in which the reference before shaping moves by more than 1e-7 rad."""
     shaped_stop: int
-    """Last row in which the published target, the shaped reference, moves by more than 1e-7 rad."""
+    """Last row in which the published target, the shaped reference, moves by more than 1e-7 rad. In a log without a
+    target, the row in which the measured angles come to rest.
+    """
     end: int
     """First row after this motion: the next one's start, or the end of the recording."""
     id: Any = None
     """Number of the motion, if events contain it."""
     stopped: bool = False
     """Whether it was stopped before its target."""
+    lag: float = 0.0
+    """Time by which the arm follows its target, in a log of another controller [s]."""
+
+    def arm_stop(self, recording: Recording) -> int:
+        """First row from which the arm is not driven any more, so that it only vibrates."""
+        if not self.lag:
+            return self.shaped_stop
+        stop = recording.time[self.shaped_stop] + self.lag
+        return min(int(np.searchsorted(recording.time, stop - 1e-9)), self.end - 1)
 
     def duration(self, recording: Recording) -> float:
         """Duration of the reference before shaping [s]."""
@@ -58,27 +75,45 @@ def motions(recording: Recording) -> list[MotionRows]:
     """Find the motions of a recording, in order.
 
     They are taken from the events `motion_started`, `motion_done` and `motion_stopped` if there are any, otherwise
-    from the reference itself. Motions without any movement are left out.
+    from the reference itself, and in a log without reference from the target or the measured angles. Motions without
+    any movement are left out.
+
+    Raises:
+        RecordingError: There is neither `reference_q` nor `target_q` nor `actual_q`.
     """
     if len(recording) < 2:
         return []
-    step = _step_per_tick(recording, "reference_q")
-    moving = (step > MOVING) & (step <= JUMP)
+    if "target_q" not in recording:
+        return _measured_motions(recording)
+    step = _step_per_tick(recording, "reference_q" if "reference_q" in recording else "target_q")
+    jump = JUMP * recording.period / TICK if recording.foreign else JUMP
+    moving = (step > MOVING) & (step <= jump)
     spans = _spans_of_events(recording) or _spans_of_reference(recording, moving)
     found: list[MotionRows] = []
     for lo, hi, identifier, stopped in spans:
         rows = lo + np.flatnonzero(moving[lo:hi])
         if rows.size:
             found.append(MotionRows(int(rows[0]) - 1, int(rows[-1]), 0, 0, identifier, stopped))
-    jumps = np.flatnonzero(step > JUMP)
+    jumps = np.flatnonzero(step > jump)
     target_moving = _step_per_tick(recording, "target_q") > MOVING
     for index, motion in enumerate(found):
         end = found[index + 1].start + 1 if index + 1 < len(found) else len(recording)
         end = min([end, *jumps[jumps > motion.start]])
         rows = motion.start + 1 + np.flatnonzero(target_moving[motion.start + 1 : end])
         shaped_stop = int(rows[-1]) if rows.size else motion.reference_stop
-        found[index] = replace(motion, shaped_stop=shaped_stop, end=int(end))
+        lag = servo_lag(recording, motion.start, shaped_stop) if recording.foreign else 0.0
+        found[index] = replace(motion, shaped_stop=shaped_stop, end=int(end), lag=lag)
     return found
+
+
+def _measured_motions(recording: Recording) -> list[MotionRows]:
+    spans = measured_spans(recording)
+    # A start that is found late must not count as vibration of the motion before.
+    starts = [int(np.searchsorted(recording.time, recording.time[first] - EARLY)) for first, _ in spans]
+    return [
+        MotionRows(first, last, last, max(end, last + 1))
+        for (first, last), end in zip(spans, [*starts[1:], len(recording)], strict=True)
+    ]
 
 
 def _step_per_tick(recording: Recording, name: str) -> Floats:

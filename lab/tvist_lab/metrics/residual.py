@@ -7,6 +7,7 @@ from scipy.optimize import least_squares
 from scipy.signal import find_peaks
 
 from tvist_lab.metrics.errors import NotMeasurableError
+from tvist_lab.metrics.felt import felt
 from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.metrics.vibration import amplitude, tool_acceleration
 from tvist_lab.recordings import Floats, Recording
@@ -28,7 +29,7 @@ class Residual:
     decay: float
     """Rate λ of the fitted exponential [1/s]; NaN if there is none."""
     stop: float
-    """Time t_b at which the shaped reference stops [s]."""
+    """Time t_b at which the shaped reference stops, or in a log the arm itself [s]."""
     peak_times: Floats
     """Times of the peaks [s], shape (P,)."""
     peaks: Floats
@@ -68,8 +69,8 @@ def residual(recording: Recording, motion: MotionRows) -> Residual:
     window = _window(recording, motion, WINDOW)
     stop = float(recording.time[window][0])
     # In the tick of the stop the reference still decelerates, so the measurement there is not a ring-down.
-    time = recording.time[window][1:]
-    alpha = amplitude(tool_acceleration(recording)[window])[1:]
+    time, alpha_xyz = felt(recording, motion, slice(window.start + 1, window.stop))
+    alpha = amplitude(alpha_xyz)
     at, _ = find_peaks(alpha, prominence=PROMINENCE)
     if len(at) < 2:
         return Residual(float(np.max(alpha)), float("nan"), stop, time[at], alpha[at], fitted=False)
@@ -143,9 +144,10 @@ def _major_axis(cosine: Floats, sine: Floats) -> float:
 
 
 def _window(recording: Recording, motion: MotionRows, length: float) -> slice:
-    """Rows of a given duration, beginning at the shaped stop."""
-    past = int(np.searchsorted(recording.time, recording.time[motion.shaped_stop] + length - 1e-9)) + 1
+    """Rows of a given duration, beginning at the stop."""
+    first = motion.arm_stop(recording)
+    past = int(np.searchsorted(recording.time, recording.time[first] + length - 1e-9)) + 1
     if past > motion.end:
-        seen = recording.time[motion.end - 1] - recording.time[motion.shaped_stop]
+        seen = recording.time[motion.end - 1] - recording.time[first]
         raise NotMeasurableError(f"only {seen:.3f} s were recorded after the stop, {length} s are needed")
-    return slice(motion.shaped_stop, past)
+    return slice(first, past)

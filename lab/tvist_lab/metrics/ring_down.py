@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 from tvist_lab.recordings import Floats
 
 FREQUENCIES = (3.0, 45.0)
-"""Range of damped frequencies that are searched [Hz]."""
+"""Range of damped frequencies that are searched [Hz]; of slow samples, up to 0.45 of their rate."""
 DAMPING = (0.002, 0.7)
 """Range of damping ratios that are searched [-]."""
 SLOW_POLE = 17.5
@@ -22,6 +22,10 @@ LEAST_R_SQUARED = 0.2
 """Smallest share of the signal's energy that a fit must explain; a fit of pure noise explains a tenth [-]."""
 WINDOWS = (0.2, 1.0)
 """Shortest and longest duration of the final fit [s]."""
+CERTAIN = 1.96
+"""Half-width of a 95 % interval over its standard error [-]."""
+CORRELATED = 0.02
+"""Time over which the residual of a fit may be correlated, as of an unmodelled mode [s]."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +55,25 @@ class RingDown:
     reason: str = ""
     """Why it is not measurable, for people."""
 
+    @property
+    def f_d_interval(self) -> tuple[float, float]:
+        """Interval that contains the true f_d with a probability of 95 % [Hz]."""
+        return _interval(self.f_d, self.f_d_error)
+
+    @property
+    def zeta_interval(self) -> tuple[float, float]:
+        """Interval that contains the true ζ with a probability of 95 % [-]."""
+        return _interval(self.zeta, self.zeta_error)
+
 
 def fit_ring_down(
     alpha: Floats,
     period: float,
     *,
     modes: int = 1,
+    time: Floats | None = None,
     slow_poles: tuple[float, ...] = (),
+    offset: bool = False,
     skip: float = SKIP,
     window: float | None = None,
     share: float = 1.0,
@@ -73,8 +89,10 @@ def fit_ring_down(
     Args:
         alpha: Acceleration of the tool without gravity, beginning at the stop, shape (T, 3) [m/s²].
         period: Time between samples [s].
+        time: Times of the samples after the stop, shape (T,) [s]; None if none is missing.
         modes: Largest number of modes; another mode is kept only if it explains more than noise would.
         slow_poles: Rates of the non-oscillatory tails to include [1/s].
+        offset: Whether to include a constant, as of gravity that is not known exactly.
         skip: Time after the stop that is left out [s].
         window: Duration of the fit [s]; None to choose it automatically.
         share: Select the lowest mode with at least this share of the largest amplitude [-]; 1 for the strongest.
@@ -83,7 +101,12 @@ def fit_ring_down(
         The selected mode. `ok` is false, with a `reason`, if no mode is measurable.
     """
     first = round(skip / period)
-    ring = _Ring(alpha[first:], period, skip, slow_poles, share)
+    if time is None:
+        late: Floats = skip + period * np.arange(len(alpha) - first, dtype=np.float64)
+    else:
+        first = int(np.searchsorted(time, skip - 1e-9))
+        late = time[first:]
+    ring = _Ring(alpha[first:], late, period, (*slow_poles, 0.0) if offset else slow_poles, share)
     if window is not None:
         return ring.cut(window).fit(modes)
     if ring.length < WINDOWS[0]:
@@ -101,22 +124,20 @@ class _Ring:
     """A ring-down and the projection that eliminates its amplitudes."""
 
     def __init__(
-        self, alpha: Floats, period: float, skip: float, slow_poles: tuple[float, ...], share: float
+        self, alpha: Floats, time: Floats, period: float, slow_poles: tuple[float, ...], share: float
     ) -> None:
-        self.alpha = alpha
+        self.alpha, self.time = alpha, time
         self.share = share
         self.period = period
-        self.skip = skip
         self.slow_poles = slow_poles
-        self.time = skip + period * np.arange(len(alpha))
-        self.length = len(alpha) * period
-        self._slow = [np.exp(-pole * self.time) for pole in slow_poles]
+        self.length = float(time[-1] - time[0]) + period if len(time) else 0.0
+        self.highest = min(FREQUENCIES[1], 0.45 / period)
+        self._slow = [np.exp(-pole * time) for pole in slow_poles]
 
     def cut(self, window: float) -> "_Ring":
         """Return the first part of the ring-down."""
-        return _Ring(
-            self.alpha[: round(window / self.period)], self.period, self.skip, self.slow_poles, self.share
-        )
+        past = int(np.searchsorted(self.time, self.time[0] + window - 0.5 * self.period))
+        return _Ring(self.alpha[:past], self.time[:past], self.period, self.slow_poles, self.share)
 
     def basis(self, parameters: Floats) -> Floats:
         """Columns of the linear part for (f_d, ζ) of each mode, shape (T, 2 modes + slow poles)."""
@@ -146,7 +167,7 @@ class _Ring:
         """Add a mode found by a grid search, and refine all parameters."""
         grid = [
             (float(np.sum(self.unexplained(np.append(parameters, [f_d, zeta])) ** 2)), f_d, zeta)
-            for f_d in np.geomspace(1.1 * FREQUENCIES[0], 0.9 * FREQUENCIES[1], 28)
+            for f_d in np.geomspace(1.1 * FREQUENCIES[0], 0.9 * self.highest, 28)
             for zeta in (0.04, 0.12, 0.3)
         ]
         starts = sorted(grid)[:3]
@@ -156,7 +177,7 @@ class _Ring:
     def _refine(self, start: Floats) -> tuple[float, Floats]:
         count = start.size // 2
         lower = np.tile([FREQUENCIES[0], DAMPING[0]], count)
-        upper = np.tile([FREQUENCIES[1], DAMPING[1]], count)
+        upper = np.tile([self.highest, DAMPING[1]], count)
         fit = least_squares(
             self.unexplained, start, bounds=(lower, upper), x_scale=np.tile([1.0, 0.03], count), max_nfev=60
         )
@@ -193,11 +214,15 @@ class _Ring:
             modes=count,
             ok=True,
         )
-        reason = _objection(fit)
+        reason = _objection(fit, self.highest)
         return RingDown(**{**vars(fit), "ok": not reason, "reason": reason})
 
     def _standard_errors(self, parameters: Floats, left: Floats, linear: int) -> Floats:
-        """Return the standard errors of each mode's f_d and ζ, from the Jacobian without the amplitudes' share."""
+        """Return the standard errors of each mode's f_d and ζ, from the Jacobian without the amplitudes' share.
+
+        A residual that is correlated in time, as of a mode that was not fitted, has a larger error than white noise:
+        the larger one of both counts (Newey and West, Econometrica 55, 1987, Bartlett's weights).
+        """
         step = np.tile([1e-4, 1e-5], parameters.size // 2)
         jacobian = np.column_stack(
             [
@@ -209,8 +234,21 @@ class _Ring:
         information = jacobian.T @ jacobian
         if not np.linalg.cond(information) < 1e14:
             return np.full(parameters.size, np.inf)
-        covariance = np.linalg.inv(information) * float(left @ left) / freedom
-        return np.asarray(np.sqrt(np.diag(covariance)))
+        inverse = np.linalg.inv(information)
+        white = np.diag(inverse) * float(left @ left) / freedom
+        correlated = np.diag(inverse @ self._score_covariance(jacobian, left) @ inverse) * left.size / freedom
+        return np.asarray(np.sqrt(np.maximum(white, correlated)))
+
+    def _score_covariance(self, jacobian: Floats, left: Floats) -> Floats:
+        """Covariance of the residual's share in the direction of each parameter, shape (P, P)."""
+        axes = self.alpha.shape[1]
+        scores = (jacobian * left[:, None]).reshape(-1, axes, jacobian.shape[1]).sum(axis=1)
+        total = scores.T @ scores
+        lags = round(CORRELATED / self.period)
+        for lag in range(1, lags + 1):
+            product = scores[lag:].T @ scores[:-lag]
+            total += (1.0 - lag / (lags + 1.0)) * (product + product.T)
+        return np.asarray(total)
 
 
 def _sigma(f_d: float, zeta: float) -> float:
@@ -218,7 +256,11 @@ def _sigma(f_d: float, zeta: float) -> float:
     return float(2.0 * np.pi * f_d * zeta / np.sqrt(1.0 - zeta * zeta))
 
 
-def _objection(fit: RingDown) -> str:
+def _interval(value: float, error: float) -> tuple[float, float]:
+    return max(value - CERTAIN * error, 0.0), value + CERTAIN * error
+
+
+def _objection(fit: RingDown, highest: float) -> str:
     """Return why a fit must not be used; empty if it may."""
     if fit.amplitude < 3.0 * fit.rms:
         return (
@@ -226,7 +268,7 @@ def _objection(fit: RingDown) -> str:
         )
     if fit.r_squared < LEAST_R_SQUARED:
         return f"damped sines explain only {100.0 * fit.r_squared:.0f} % of the signal"
-    for name, value, bounds in (("f_d", fit.f_d, FREQUENCIES), ("zeta", fit.zeta, DAMPING)):
+    for name, value, bounds in (("f_d", fit.f_d, (FREQUENCIES[0], highest)), ("zeta", fit.zeta, DAMPING)):
         if not bounds[0] * 1.001 < value < bounds[1] * 0.999:
             return (
                 f"{name} = {value:.4g} is at the end of the range looked in, {bounds[0]:g} to {bounds[1]:g}"

@@ -50,6 +50,8 @@ def distance(recording: Recording, motion: MotionRows) -> Floats:
         NotMeasurableError: See `attained_position`.
     """
     position = recording["actual_TCP_pose"][motion.start : motion.end, :3]
+    if not np.isfinite(position).all():
+        raise NotMeasurableError("actual_TCP_pose is empty in some rows")
     return np.asarray(
         np.linalg.norm(position - attained_position(recording, motion), axis=1), dtype=np.float64
     )

@@ -6,14 +6,14 @@ from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
-from tvist_lab.metrics.common_clock import still_after
+from tvist_lab.metrics.common_clock import peak_acceleration, still_after, vibration_after_stop
 from tvist_lab.metrics.errors import NotMeasurableError
+from tvist_lab.metrics.felt import felt
 from tvist_lab.metrics.motion import MotionRows, motions
 from tvist_lab.metrics.residual import Residual, residual
-from tvist_lab.metrics.ring_down import SLOW_POLE, RingDown, fit_ring_down
+from tvist_lab.metrics.ring_down import SKIP, SLOW_POLE, RingDown, fit_ring_down
 from tvist_lab.metrics.settling import Settling, settling
-from tvist_lab.metrics.vibration import tool_acceleration
-from tvist_lab.recordings import Recording
+from tvist_lab.recordings import MissingColumnError, Recording
 
 COLUMNS = ("delay_ms", "stabilisation_ms", "cycle_ms", "overshoot_m", "residual_vibration_m_s2")
 """Columns of Table 2, in the paper's order."""
@@ -24,6 +24,9 @@ IMPACTS = {
     "residual_vibration": "residual_vibration_m_s2",
 }
 """Impacts listed in the paper, and their columns."""
+
+SKIP_OF_MEASURED = 0.03
+"""Time after a stop found in the measured angles that is left out of the ring-down [s]: it may be too early."""
 
 Row: TypeAlias = dict[str, float | None]
 Table: TypeAlias = dict[str, dict[str, Row]]
@@ -39,7 +42,7 @@ class MotionResult:
     """Time at which the reference starts [s]."""
     stop_s: float
     """Time at which the shaped reference stops [s]."""
-    delay_ms: float
+    delay_ms: float | None = None
     """Δ: shaped minus unshaped duration of the reference [ms]."""
     stabilisation_ms: float | None = None
     """t_stb [ms]."""
@@ -51,10 +54,24 @@ class MotionResult:
     """RV [m/s²]; a note says if it is the largest |α| instead of a fitted decay."""
     still_after_ms: float | None = None
     """Last time at which |α| exceeds 0.1 m/s², from the start of the reference [ms]."""
+    peak_m_s2: float | None = None
+    """Largest |α| after the reference's stop plus the delay that the shaper declares, in a log after the arm's own
+    stop [m/s²].
+    """
+    envelope_m_s2: float | None = None
+    """Largest envelope of α within 3 to 60 Hz after the same moment [m/s²]."""
+    peak_acceleration_rad_s2: float | None = None
+    """Largest |q̈*| of any joint during the motion [rad/s²]."""
     f_d_hz: float | None = None
-    """Damped frequency of the ring-down after the stop [Hz]."""
+    """Damped frequency of the ring-down after the stop [Hz]; of several modes, the one that is strongest then."""
+    f_d_interval_hz: tuple[float, float] | None = None
+    """Interval that contains the true frequency with a probability of 95 % [Hz]."""
     zeta: float | None = None
-    """Damping ratio of the ring-down after the stop [-]."""
+    """Damping ratio of the same mode [-]."""
+    zeta_interval: tuple[float, float] | None = None
+    """Interval that contains the true damping ratio with a probability of 95 % [-]."""
+    servo_lag_ms: float | None = None
+    """Time by which the arm follows its target, in a log of another controller [ms]."""
     notes: Mapping[str, str] = field(default_factory=dict)
     """Field to a note about its value."""
 
@@ -83,39 +100,64 @@ def measure(recording: Recording, motion: MotionRows) -> MotionResult:
     notes: dict[str, str] = {}
     if motion.stopped:
         notes["stop_s"] = "the motion was stopped before its target"
+    if "target_q" not in recording:
+        notes["start_s"] = notes["stop_s"] = (
+            "found in actual_q, since the log has no target_q: good to about 20 ms"
+        )
+    shaping = "reference_q" in recording
+    if not shaping:
+        notes["delay_ms"] = "the log has no reference before shaping"
 
     def attempt(take: Callable[[Recording, MotionRows], T], *fields: str) -> T | None:
         try:
             return take(recording, motion)
         except NotMeasurableError as error:
             notes.update(dict.fromkeys(fields, str(error)))
-            return None
+        except MissingColumnError as error:
+            if not recording.foreign:
+                raise
+            notes.update(dict.fromkeys(fields, f"the log has no {error.column}"))
+        return None
 
     settled: Settling | None = attempt(settling, "stabilisation_ms", "cycle_ms", "overshoot_m")
     vibration: Residual | None = attempt(residual, "residual_vibration_m_s2")
     still = attempt(still_after, "still_after_ms")
-    ringing = attempt(_ring_down, "f_d_hz", "zeta")
+    after = attempt(vibration_after_stop, "peak_m_s2", "envelope_m_s2")
+    strongest = attempt(peak_acceleration, "peak_acceleration_rad_s2")
+    ringing = attempt(_ring_down, "f_d_hz", "f_d_interval_hz", "zeta", "zeta_interval")
     if vibration is not None and not vibration.fitted:
         notes["residual_vibration_m_s2"] = "fewer than two peaks: the largest |α| after the stop"
     return MotionResult(
         start_s=float(recording.time[motion.start]),
         stop_s=float(recording.time[motion.shaped_stop]),
-        delay_ms=1e3 * motion.delay(recording),
+        delay_ms=1e3 * motion.delay(recording) if shaping else None,
         stabilisation_ms=None if settled is None else 1e3 * settled.stabilisation,
         cycle_ms=None if settled is None else 1e3 * settled.cycle,
         overshoot_m=None if settled is None else settled.overshoot,
         residual_vibration_m_s2=None if vibration is None else vibration.value,
         still_after_ms=None if still is None else 1e3 * still,
+        peak_m_s2=None if after is None else after[0],
+        envelope_m_s2=None if after is None else after[1],
+        peak_acceleration_rad_s2=strongest,
         f_d_hz=None if ringing is None else ringing.f_d,
+        f_d_interval_hz=None if ringing is None else ringing.f_d_interval,
         zeta=None if ringing is None else ringing.zeta,
+        zeta_interval=None if ringing is None else ringing.zeta_interval,
+        servo_lag_ms=1e3 * motion.lag if recording.foreign and "target_q" in recording else None,
         notes=notes,
     )
 
 
 def _ring_down(recording: Recording, motion: MotionRows) -> RingDown:
     """Fit the mode that vibrates after the stop."""
-    alpha = tool_acceleration(recording)[motion.shaped_stop : motion.end]
-    fit = fit_ring_down(alpha, recording.period, modes=2, slow_poles=(SLOW_POLE,))
+    first = motion.arm_stop(recording)
+    time, alpha = felt(recording, motion, slice(first, motion.end))
+    if recording.foreign:
+        late = time - recording.time[first]
+        skip = SKIP if "target_q" in recording else SKIP_OF_MEASURED
+        fit = fit_ring_down(alpha, recording.period, modes=2, time=late, offset=True, skip=skip)
+    else:
+        fit = fit_ring_down(alpha, recording.period, modes=2, slow_poles=(SLOW_POLE,))
     if not fit.ok:
         raise NotMeasurableError(fit.reason)
     return fit
@@ -135,7 +177,7 @@ def table_2(runs: Mapping[str, Runs]) -> Table:
     table: Table = {}
     for name, repeated in runs.items():
         unshaped, shaped = _means(repeated.unshaped), _means(repeated.shaped)
-        impact = {key: _impact_percent(unshaped[column], shaped[column]) for key, column in IMPACTS.items()}
+        impact = {key: impact_percent(unshaped[column], shaped[column]) for key, column in IMPACTS.items()}
         table[name] = {"unshaped": unshaped, "shaped": shaped, "impact_percent": impact}
     return table
 
@@ -163,8 +205,8 @@ def _means(results: Sequence[MotionResult]) -> Row:
     return row
 
 
-def _impact_percent(unshaped: float | None, shaped: float | None) -> float | None:
-    """Change by shaping in percent of the unshaped mean."""
+def impact_percent(unshaped: float | None, shaped: float | None) -> float | None:
+    """Change from the first to the second value in percent of the first; None where it is not defined."""
     if unshaped is None or shaped is None or unshaped == 0.0:
         return None
     return 100.0 * (shaped / unshaped - 1.0)

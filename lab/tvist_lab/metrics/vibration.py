@@ -59,12 +59,14 @@ def amplitude(alpha: Floats) -> Floats:
 
 
 def low_pass(signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
-    """Low-pass filter a signal with zero phase (Butterworth, forwards and backwards)."""
+    """Low-pass filter a signal with zero phase (Butterworth, forwards and backwards), below 0.45 of its rate."""
+    cut_off = min(cut_off, 0.45 / period)
     return _both_ways(butter(4, cut_off, "lowpass", fs=1.0 / period, output="sos"), signal)
 
 
 def band_pass(signal: Floats, period: float, band: tuple[float, float] = BAND) -> Floats:
     """Band-pass filter a signal with zero phase (Butterworth, forwards and backwards)."""
+    band = (band[0], min(band[1], 0.45 / period))
     return _both_ways(butter(2, band, "bandpass", fs=1.0 / period, output="sos"), signal)
 
 

@@ -1,11 +1,21 @@
 """Recordings in memory and in files: data in and out."""
 
+from tvist_lab.recordings.read import read
 from tvist_lab.recordings.recording import (
     STATE_COLUMNS,
     TRUTH_PREFIX,
     Floats,
+    MissingColumnError,
     Recording,
     RecordingError,
 )
 
-__all__ = ["STATE_COLUMNS", "TRUTH_PREFIX", "Floats", "Recording", "RecordingError"]
+__all__ = [
+    "STATE_COLUMNS",
+    "TRUTH_PREFIX",
+    "Floats",
+    "MissingColumnError",
+    "Recording",
+    "RecordingError",
+    "read",
+]

@@ -52,6 +52,14 @@ class RecordingError(ValueError):
     """A recording lacks requested data, or its parts do not fit together."""
 
 
+class MissingColumnError(RecordingError):
+    """A recording lacks a column."""
+
+    def __init__(self, column: str, why: str) -> None:
+        super().__init__(why)
+        self.column = column
+
+
 @dataclass(frozen=True)
 class Recording:
     """States of one robot at increasing ticks, with the events between them.
@@ -69,6 +77,12 @@ class Recording:
     """Events in the order of their ticks; each has `tick`, `kind`, `id`, `code`, `why`."""
     info: Any = None
     """The robot's `info` message, if there is one."""
+    notes: tuple[str, ...] = ()
+    """What was repaired or left out when a file was read, in sentences for people."""
+    foreign: bool = False
+    """Whether another controller was recorded: columns may be missing, `actual_TCP_pose` may be that of a tool which
+    is rotated against the flange, and the arm may follow its target late.
+    """
 
     def __post_init__(self) -> None:
         lengths = {name: len(column) for name, column in self.columns.items()}
@@ -127,14 +141,14 @@ class Recording:
         """Return the values of a column, shape (T,) or (T, k).
 
         Raises:
-            RecordingError: There is no column of that name.
+            MissingColumnError: There is no column of that name.
         """
         try:
             return self.columns[name]
         except KeyError:
             hint = " (was truth recorded?)" if name.startswith(TRUTH_PREFIX) else ""
-            raise RecordingError(
-                f"the recording has no column {name}{hint}; it has {', '.join(sorted(self.columns))}"
+            raise MissingColumnError(
+                name, f"the recording has no column {name}{hint}; it has {', '.join(sorted(self.columns))}"
             ) from None
 
     @property
@@ -145,7 +159,7 @@ class Recording:
     @property
     def joints(self) -> int:
         """Number of joints of the arm."""
-        return int(self["reference_q"].shape[1])
+        return int(self["target_q" if "target_q" in self else "actual_q"].shape[1])
 
     @cached_property
     def period(self) -> float:
@@ -178,6 +192,10 @@ class Recording:
         columns = {name: column[first:past] for name, column in self.columns.items()}
         events = tuple(event for event in self.events if first_tick <= event.tick <= last_tick)
         return replace(self, columns=columns, events=events)
+
+    def noted(self, *notes: str) -> "Recording":
+        """Return the same recording with further notes."""
+        return replace(self, notes=(*self.notes, *notes))
 
     def index(self, tick: int) -> int:
         """Index of the first row at or after a tick; the length of the recording if there is none."""

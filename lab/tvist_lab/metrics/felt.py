@@ -1,0 +1,74 @@
+"""α of one motion, for recordings of this controller and for logs of others."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tvist_lab.metrics.errors import NotMeasurableError
+from tvist_lab.metrics.motion import MotionRows
+from tvist_lab.metrics.vibration import SENSOR, best_tool_acceleration, low_pass, tool_acceleration
+from tvist_lab.recordings import Floats, Recording
+
+REST = (0.2, 1.0)
+"""Shortest and longest time at the end of a rest over which the sensor shows gravity [s]."""
+
+
+def felt(
+    recording: Recording, motion: MotionRows, rows: slice, *, smooth: bool = False
+) -> tuple[Floats, Floats]:
+    """Acceleration of the tool without gravity in some rows of a motion.
+
+    In a log of another controller, gravity is what the sensor shows at the end of the rest, since nobody knows how
+    its tool is mounted; rows in which the sensor shows nothing are left out.
+
+    Args:
+        recording: The recording.
+        motion: One of its motions.
+        rows: Rows of the recording, within the motion and its rest.
+        smooth: Whether to take the truth channel if there is one, or else the sensor below 60 Hz.
+
+    Returns:
+        Time of each row, shape (T,) [s], and α, shape (T, 3) [m/s²].
+
+    Raises:
+        NotMeasurableError: The sensor was not recorded, or there was too little rest to know gravity.
+    """
+    if not recording.foreign:
+        alpha = best_tool_acceleration(recording) if smooth else tool_acceleration(recording)
+        return recording.time[rows], alpha[rows]
+    if SENSOR not in recording:
+        raise NotMeasurableError(f"the log has no {SENSOR}")
+    shown = np.asarray(np.isfinite(recording[SENSOR]).all(axis=1))
+    gravity = _gravity(recording, motion, shown)
+    if not smooth:
+        kept = shown[rows]
+        return recording.time[rows][kept], (recording[SENSOR][rows] - gravity)[kept]
+    whole = np.flatnonzero(shown[motion.start : motion.end]) + motion.start
+    alpha = _smooth(recording.time[whole], recording[SENSOR][whole] - gravity, recording.period)
+    chosen = (whole >= rows.start) & (whole < rows.stop)
+    return recording.time[whole[chosen]], alpha[chosen]
+
+
+def _gravity(recording: Recording, motion: MotionRows, shown: NDArray[np.bool_]) -> Floats:
+    """Mean of the sensor in the last half of a rest, at most a second [m/s²], shape (3,)."""
+    end = float(recording.time[motion.end - 1])
+    rest = end - float(recording.time[motion.arm_stop(recording)])
+    if rest < 1.5 * REST[0]:
+        raise NotMeasurableError(
+            f"only {rest:.3f} s of rest were recorded after the stop; {1.5 * REST[0]:g} s show gravity"
+        )
+    length = min(max(0.5 * rest, REST[0]), REST[1])
+    first = int(np.searchsorted(recording.time, end - length))
+    at_rest = recording[SENSOR][first : motion.end][shown[first : motion.end]]
+    if not len(at_rest):
+        raise NotMeasurableError(f"{SENSOR} is empty in the rest after the stop")
+    return np.asarray(at_rest.mean(axis=0))
+
+
+def _smooth(time: Floats, alpha: Floats, period: float) -> Floats:
+    """Low-pass filter samples of which some are missing: these are interpolated before and left out after."""
+    if len(time) < 2:
+        return alpha
+    grid = np.arange(time[0], time[-1] + 0.5 * period, period)
+    even = np.column_stack([np.interp(grid, time, axis) for axis in alpha.T])
+    below = low_pass(even, period)
+    return np.column_stack([np.interp(time, grid, axis) for axis in below.T])

@@ -1,0 +1,65 @@
+"""Motions of an arm from its measured joint angles, for logs that lack the target."""
+
+import math
+
+import numpy as np
+
+from tvist_lab.metrics.vibration import low_pass
+from tvist_lab.recordings import Floats, Recording
+
+SMOOTHED = 20.0
+"""Cut-off frequency of the angles before they are differentiated [Hz]."""
+SLOW = 0.01
+"""A joint that is slower than this may be at rest [rad/s]."""
+PAUSE = 0.1
+"""Rests shorter than this belong to a motion, as at a reversal or while the arm vibrates [s]."""
+SMALLEST = 0.005
+"""Smallest displacement of a motion [rad]; less is vibration."""
+TAPER = 0.03
+"""Longest time for which a joint may have moved below `SLOW` before and after [s]."""
+
+
+def measured_spans(recording: Recording) -> list[tuple[int, int]]:
+    """First and last row of each motion of `actual_q`, in order.
+
+    A joint moves while its speed exceeds 0.01 rad/s, or six times what the encoders' noise adds. Start and stop are
+    then shifted outwards by the time in which a speed that changes steadily reaches this threshold, at most 30 ms.
+    """
+    time = recording.time
+    if len(time) < 16:
+        return []
+    q = low_pass(recording["actual_q"], recording.period, min(SMOOTHED, 0.4 / recording.period))
+    velocity = np.asarray(np.gradient(q, time, axis=0))
+    speed = np.max(np.abs(velocity), axis=1)
+    threshold = max(SLOW, 6.0 * _noise_of_speed(recording))
+    rows = np.flatnonzero(speed > threshold)
+    if not rows.size:
+        return []
+    breaks = np.flatnonzero(np.diff(time[rows]) > PAUSE)
+    firsts = rows[np.concatenate([[0], breaks + 1])]
+    lasts = rows[np.concatenate([breaks, [rows.size - 1]])]
+    spans = []
+    for first, last in zip(firsts, lasts, strict=True):
+        if np.max(np.abs(q[last] - q[first])) < SMALLEST:
+            continue
+        first_row = np.searchsorted(time, time[first] - _taper(time, speed, int(first), 1))
+        last_row = np.searchsorted(time, time[last] + _taper(time, speed, int(last), -1))
+        spans.append((int(max(first_row, 1)), int(min(last_row, len(time) - 1))))
+    return spans
+
+
+def _noise_of_speed(recording: Recording) -> float:
+    """Standard deviation of the speed that is differentiated from resting, smoothed encoders [rad/s]."""
+    second = np.diff(recording["actual_q"], n=2, axis=0)
+    noise = float(np.max(np.median(np.abs(second), axis=0))) / (0.6745 * math.sqrt(6.0))
+    cut_off = min(SMOOTHED, 0.4 / recording.period)
+    return noise * 2.0 * math.pi * cut_off * math.sqrt(2.0 * cut_off * recording.period / 3.0)
+
+
+def _taper(time: Floats, speed: Floats, row: int, inwards: int) -> float:
+    """Time in which a speed that grows with the square of time reaches its value in a row [s]."""
+    other = row + 3 * inwards
+    if not 0 <= other < len(time):
+        return 0.0
+    slope = abs(float(speed[other] - speed[row]) / float(time[other] - time[row]))
+    return min(2.0 * float(speed[row]) / slope, TAPER) if slope > 0.0 else 0.0

@@ -1,0 +1,165 @@
+"""Logs in CSV with RTDE's names, as UR's record.py, ur_rtde and `tvist export` write them."""
+
+import io
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from tvist_lab.recordings.log_columns import LogError, Rows, recording_of
+from tvist_lab.recordings.recording import Floats, Recording
+
+SEPARATORS = (";", "\t", ",", " ")
+"""Characters between cells, in the order in which they are looked for in the header."""
+EMPTY = ("", "nan", "NaN", "NAN", "None", "null", "NULL", "NA", "-")
+"""Cells without a number."""
+TIMES = ("timestamp", "time", "t")
+"""Names of the column of times; the first is RTDE's."""
+REALTIME = {
+    "q_target": "target_q",
+    "qd_target": "target_qd",
+    "qdd_target": "target_qdd",
+    "M_target": "target_moment",
+    "q_actual": "actual_q",
+    "qd_actual": "actual_qd",
+    "tool_vector_actual": "actual_TCP_pose",
+    "TCP_speed_actual": "actual_TCP_speed",
+    "tool_accelerometer": "actual_tool_accelerometer",
+}
+"""Names of UR's real-time interface, and RTDE's for the same."""
+
+_COMMA = re.compile(r"[-+]?\d+,\d+(e[-+]?\d+)?", re.IGNORECASE)
+_BLANK = re.compile(rb"[ \t]*\r?\n?")
+
+
+@dataclass(frozen=True)
+class _Lines:
+    """Lines of a file that have as many cells as its header."""
+
+    names: list[str]
+    separator: str
+    text: bytes
+    """Complete lines, without the header."""
+    numbers: Floats
+    """Number of each line in the file, from 1."""
+    notes: tuple[str, ...]
+
+
+def read_csv(path: Path) -> Recording:
+    """Read a log in CSV: separated by spaces, commas, semicolons or tabs, with a header of RTDE's names.
+
+    Torn lines, which have too few or too many cells, are left out, and a note names the first.
+
+    Raises:
+        LogError: The file has no header of names, cells that are no numbers, decimal commas, or no rows; or see
+            `recording_of`.
+        OSError: The file cannot be read.
+    """
+    lines = _lines(path)
+    values = _numbers(path, lines)
+    names = [_rtde_name(name, lines.names) for name in lines.names]
+    return recording_of(Rows(path, names, values, lines.numbers, notes=lines.notes))
+
+
+def _rtde_name(name: str, names: list[str]) -> str:
+    """RTDE's name of a column that has the name of the real-time interface; other names stay."""
+    if name.lower() in TIMES and TIMES[0] not in names:
+        return TIMES[0]
+    stem, _, index = name.rpartition("_")
+    return f"{REALTIME[stem]}_{index}" if stem in REALTIME else name
+
+
+def _lines(path: Path) -> _Lines:
+    raw = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
+    ends_whole = raw.endswith(b"\n")
+    all_lines = raw.splitlines()
+    top = next(
+        (at for at, line in enumerate(all_lines) if line.strip() and not line.lstrip().startswith(b"#")), None
+    )
+    if top is None:
+        raise LogError(f"{path} holds no rows")
+    try:
+        header = all_lines[top].decode("utf-8").strip()
+    except UnicodeDecodeError:
+        raise LogError(f"{path} is neither a recording nor a log: its line {top + 1} is no text") from None
+    separator = next((one for one in SEPARATORS if one in header), ",")
+    names = [
+        name.strip().strip('"') for name in (header.split() if separator == " " else header.split(separator))
+    ]
+    if not any(re.match(r"[A-Za-z_]", name) for name in names):
+        raise LogError(
+            f"{path}, line {top + 1}: there must be a header with RTDE's names, as in timestamp,actual_q_0"
+        )
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise LogError(f"{path}, line {top + 1}: the column {twice[0] or 'without a name'} is there twice")
+    body = [(at + 1, line) for at, line in enumerate(all_lines[top + 1 :], top + 1) if line.strip()]
+    if separator == " ":
+        body = [(at, b" ".join(line.split())) for at, line in body]
+    cells = np.array([line.count(separator.encode()) + 1 for _, line in body], dtype=np.int64)
+    whole = cells == len(names)
+    if body and not whole.any() and (cells > len(names)).all() and separator == ",":
+        raise LogError(
+            f"{path}, line {body[0][0]}: {cells[0]} cells under a header of {len(names)}: are there decimal commas? "
+            "Write numbers with a decimal point"
+        )
+    notes = []
+    torn = np.flatnonzero(~whole)
+    if torn.size:
+        first = body[torn[0]][0]
+        notes.append(
+            f"{torn.size} torn line{'' if torn.size == 1 else 's'} left out, the first is line {first} with "
+            f"{cells[torn[0]]} cells instead of {len(names)}"
+        )
+    elif body and not ends_whole and len(body) > 1:
+        # Nobody knows whether the last number is complete.
+        whole[-1] = False
+        notes.append(f"line {body[-1][0]} has no end and was left out")
+    if not whole.any():
+        raise LogError(f"{path} holds no rows" if not body else f"{path} holds no complete row: {notes[0]}")
+    kept = [body[at] for at in np.flatnonzero(whole)]
+    return _Lines(
+        names,
+        separator,
+        b"\n".join(line for _, line in kept) + b"\n",
+        np.array([at for at, _ in kept], dtype=np.float64),
+        tuple(notes),
+    )
+
+
+def _numbers(path: Path, lines: _Lines) -> Floats:
+    """Values of all cells, shape (T, columns); NaN where a cell is empty."""
+    names = [str(place) for place in range(len(lines.names))]
+    try:
+        frame = _frame(lines, dict.fromkeys(names, pl.Float64()))
+    except pl.exceptions.PolarsError:
+        text = _frame(lines, dict.fromkeys(names, pl.String()))
+        text = text.select(pl.col(names).str.strip_chars().str.strip_chars('"'))
+        frame = text.select(pl.col(names).cast(pl.Float64, strict=False))
+        _check_cells(path, lines, text, frame)
+    return np.asarray(frame.to_numpy().astype(np.float64))
+
+
+def _frame(lines: _Lines, schema: dict[str, pl.DataType]) -> pl.DataFrame:
+    return pl.read_csv(
+        io.BytesIO(lines.text),
+        has_header=False,
+        separator=lines.separator,
+        schema=schema,
+        null_values=list(EMPTY),
+        truncate_ragged_lines=True,
+    )
+
+
+def _check_cells(path: Path, lines: _Lines, text: pl.DataFrame, frame: pl.DataFrame) -> None:
+    """Refuse a cell that has something but no number, with its line and column."""
+    for place, name in enumerate(lines.names):
+        cells, numbers = text.to_series(place), frame.to_series(place)
+        bad = (numbers.is_null() & cells.is_not_null() & ~cells.is_in(EMPTY)).arg_true()
+        if len(bad):
+            cell = cells[bad[0]]
+            where = f"{path}, line {int(lines.numbers[bad[0]])}, column {name}"
+            if _COMMA.fullmatch(cell):
+                raise LogError(f"{where}: {cell} has a decimal comma; write numbers with a decimal point")
+            raise LogError(f"{where}: {cell[:40]!r} is no number")

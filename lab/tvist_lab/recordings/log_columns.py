@@ -1,0 +1,152 @@
+"""Columns of a robot's log, from any file, as a recording."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tvist_lab.recordings.recording import Floats, Recording, RecordingError
+
+TIME = "timestamp"
+"""Name of the column of times, as in RTDE [s]."""
+WIDTHS = {"actual_TCP_pose": 6, "target_TCP_pose": 6, "actual_TCP_speed": 6, "actual_tool_accelerometer": 3}
+"""Number of entries that a vector needs to be of use; joint angles have as many as the arm has joints."""
+OURS = ("tick", "reference_q", "unshaped_q", "target_q", "actual_TCP_pose")
+"""Columns that only recordings of this controller have, all together."""
+LONG_GAP = 0.02
+"""Shortest time without rows that a note reports [s]."""
+
+_INDEXED = re.compile(r"(?P<name>.*\D)_(?P<index>\d+)")
+
+
+class LogError(RecordingError):
+    """A file is no log that can be measured; the message names the file and, where there is one, the line."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Numbers of a log as they stand in its file."""
+
+    path: Path
+    names: Sequence[str]
+    """Names of the columns; those of a vector end in `_0`, `_1`, …"""
+    values: Floats
+    """Shape (T, columns); NaN for an empty cell."""
+    lines: Floats
+    """Where each row stands, shape (T,): the number of its line or packet."""
+    unit: str = "line"
+    """What `lines` counts, for messages."""
+    notes: tuple[str, ...] = ()
+    """What the reader of the file left out."""
+
+
+def recording_of(rows: Rows) -> Recording:
+    """Join the columns of each vector, and check and number the rows.
+
+    Rows that repeat the time of the row before them, or have no time, are left out; a note counts them.
+
+    Raises:
+        LogError: There is no time or no joint angles, fewer than two rows, or time goes back.
+    """
+    columns, notes = _vectors(rows)
+    if TIME not in columns or columns[TIME].ndim != 1:
+        raise LogError(f"{rows.path} has no column {TIME}; {_found(rows)}")
+    if not any(name in columns and columns[name].ndim == 2 for name in ("target_q", "actual_q")):
+        raise LogError(f"{rows.path} has neither target_q_0 … nor actual_q_0 …; {_found(rows)}")
+    kept, more = _increasing(rows, columns[TIME])
+    notes += more
+    columns = {name: column[kept] for name, column in columns.items()}
+    ours = all(name in columns for name in OURS)
+    if not ours:
+        columns["tick"], gaps = _ticks(columns[TIME])
+        notes += gaps
+        columns = _shaped(columns)
+    return Recording(columns, notes=(*rows.notes, *notes), foreign=not ours)
+
+
+def _found(rows: Rows) -> str:
+    shown = ", ".join(list(rows.names)[:12])
+    return f"its columns are {shown}{', …' if len(rows.names) > 12 else ''}"
+
+
+def _vectors(rows: Rows) -> tuple[dict[str, Floats], list[str]]:
+    """Columns by name, vectors joined; a vector with missing entries is left out, joint angles keep what is there."""
+    places: dict[str, dict[int, int]] = {}
+    columns: dict[str, Floats] = {}
+    for place, name in enumerate(rows.names):
+        found = _INDEXED.fullmatch(name)
+        if found is None:
+            columns[name] = rows.values[:, place]
+        else:
+            places.setdefault(found["name"], {})[int(found["index"])] = place
+    notes = []
+    for name, entries in places.items():
+        order = sorted(entries)
+        expected = range(max(max(order) + 1, WIDTHS.get(name, 0)))
+        if missing := [f"{name}_{index}" for index in expected if index not in entries]:
+            joints = name.endswith(("_q", "_qd", "_qdd", "_moment", "_current"))
+            what = "the other joints count" if joints else f"{name} is left out"
+            notes.append(f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing: {what}")
+            if not joints:
+                continue
+        columns[name] = rows.values[:, [entries[index] for index in order]]
+    return columns, notes
+
+
+def _increasing(rows: Rows, time: Floats) -> tuple[NDArray[np.intp], list[str]]:
+    """Indices of the rows that count, and notes about the others."""
+    notes = []
+    timed = np.flatnonzero(np.isfinite(time))
+    if len(timed) < len(time):
+        first = int(rows.lines[np.flatnonzero(~np.isfinite(time))[0]])
+        notes.append(_left_out(rows, len(time) - len(timed), f"without {TIME}", first))
+    step = np.diff(time[timed])
+    if (back := np.flatnonzero(step < 0.0)).size:
+        row = timed[back[0] + 1]
+        raise LogError(
+            f"{rows.path}, {rows.unit} {int(rows.lines[row])}: {TIME} goes back from {time[timed[back[0]]]:.6g} to "
+            f"{time[row]:.6g} s; split the file there, since it contains two logs"
+        )
+    if (again := np.flatnonzero(step == 0.0)).size:
+        first = int(rows.lines[timed[again[0] + 1]])
+        notes.append(_left_out(rows, again.size, f"with the {TIME} of the row before", first))
+    kept = np.delete(timed, again + 1)
+    if kept.size < 2:
+        raise LogError(
+            f"{rows.path} has {kept.size} row{'' if kept.size == 1 else 's'} with a {TIME} of its own; two are needed"
+        )
+    return kept, notes
+
+
+def _left_out(rows: Rows, count: int, what: str, first: int) -> str:
+    return f"{count} row{'' if count == 1 else 's'} {what} left out, the first in {rows.unit} {first}"
+
+
+def _ticks(time: Floats) -> tuple[Floats, list[str]]:
+    """Number the rows by their time, so that missing rows are missing numbers, and describe long gaps."""
+    step = np.diff(time)
+    period = float(np.median(step))
+    ticks = np.concatenate([[0.0], np.cumsum(np.maximum(np.round(step / period), 1.0))])
+    long = np.flatnonzero(step > max(LONG_GAP, 2.5 * period))
+    if not long.size:
+        return ticks, []
+    worst = long[np.argmax(step[long])]
+    note = (
+        f"rows are missing in {long.size} place{'' if long.size == 1 else 's'}, most of them for {step[worst]:.3f} s "
+        f"after {time[worst]:.6g} s"
+    )
+    return ticks, [note]
+
+
+def _shaped(columns: Mapping[str, Floats]) -> dict[str, Floats]:
+    """In RTDE of this controller, `shaped_q` is the target that the arm gets and `target_q` the one before shaping."""
+    renamed = dict(columns)
+    if "shaped_q" in renamed and "target_q" in renamed:
+        renamed["reference_q"] = renamed["target_q"]
+        for name in ("q", "qd", "qdd"):
+            if f"shaped_{name}" in renamed:
+                renamed[f"target_{name}"] = renamed.pop(f"shaped_{name}")
+    return renamed

@@ -1,0 +1,71 @@
+"""Read a file of any known format; its content decides which."""
+
+import os
+from pathlib import Path
+
+from tvist_lab.recordings.mcap_records import MAGIC as MCAP
+from tvist_lab.recordings.recording import Recording, RecordingError
+
+SHOWN = 4096
+"""Number of first bytes by which text is told from packets."""
+
+
+def read(path: str | os.PathLike[str]) -> Recording:
+    """Read a recording of this controller, or a log of another one.
+
+    Recordings: MCAP, and what `tvist export` writes (CSV, Parquet, npz, mat). Logs: CSV with RTDE's names, dumps of
+    UR's port 30003, rosbag2 in MCAP (a file, or its folder).
+
+    Returns:
+        Named columns in SI units; `notes` say what was left out.
+
+    Raises:
+        RecordingError: The file cannot be opened or is none of these; the message names the file, and where possible
+            the line.
+    """
+    path = Path(path)
+    try:
+        return _read(path)
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read: {error.strerror or error}") from error
+
+
+def _read(path: Path) -> Recording:
+    if path.is_dir():
+        return _read(_bag(path))
+    with path.open("rb") as stream:
+        head = stream.read(SHOWN)
+    if not head:
+        raise RecordingError(f"{path} is empty")
+    if head.startswith(MCAP):
+        return _read_mcap(path)
+    if b"\0" in head:
+        from tvist_lab.recordings.realtime_dump import read_dump
+
+        return read_dump(path)
+    from tvist_lab.recordings.csv_log import read_csv
+
+    return read_csv(path)
+
+
+def _bag(folder: Path) -> Path:
+    """Return the one MCAP file of a rosbag2 folder."""
+    files = sorted(folder.glob("*.mcap"))
+    if len(files) != 1:
+        raise RecordingError(f"{folder} holds {len(files)} files *.mcap: give one of them")
+    return files[0]
+
+
+def _read_mcap(path: Path) -> Recording:
+    from tvist_lab.recordings import mcap_file
+
+    try:
+        content = mcap_file.read(path)
+    except mcap_file.RecordingFileError as error:
+        from tvist_lab.recordings.rosbag import has_ros, read_rosbag
+
+        if not has_ros(path):
+            raise error from None
+        return read_rosbag(path)
+    recording = content.recording
+    return recording if content.note is None else recording.noted(content.note)
