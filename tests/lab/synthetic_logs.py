@@ -114,3 +114,35 @@ class SyntheticLog:
         data = b"".join(packets)
         path.write_bytes(data[skip : len(data) - lost])
         return path
+
+    def rosbag(self, folder: Path, every: int = 1, order=(2, 1, 0, 3, 4, 5)) -> Path:
+        """Write a rosbag2 folder: JointState in any order and at a lower rate, Imu at every row, and both targets."""
+        from rosbags.rosbag2 import StoragePlugin, Writer
+        from rosbags.typesys import Stores, get_typestore
+
+        store = get_typestore(Stores.ROS2_HUMBLE)
+        types = store.types
+        names = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+        writer = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
+        with writer:
+            joints = writer.add_connection("/joint_states", "sensor_msgs/msg/JointState", typestore=store)
+            imu = writer.add_connection("/imu", "sensor_msgs/msg/Imu", typestore=store)
+            for row, time in enumerate(self.columns["timestamp"]):
+                nanoseconds = round(time * 1e9)
+                stamp = types["builtin_interfaces/msg/Time"](*divmod(nanoseconds, 10**9))
+                header = types["std_msgs/msg/Header"](stamp, "base")
+                if row % every == 0:
+                    message = types["sensor_msgs/msg/JointState"](
+                        header,
+                        [f"{names[joint]}_joint" for joint in order],
+                        self.columns["actual_q"][row][list(order)],
+                        np.zeros(0),
+                        np.zeros(0),
+                    )
+                    writer.write(joints, nanoseconds + 10**6, store.serialize_cdr(message, joints.msgtype))
+                zero, nothing = types["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0), np.zeros(9)
+                force = types["geometry_msgs/msg/Vector3"](*self.columns["actual_tool_accelerometer"][row])
+                turn = types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
+                message = types["sensor_msgs/msg/Imu"](header, turn, nothing, zero, nothing, force, nothing)
+                writer.write(imu, nanoseconds + 2 * 10**6, store.serialize_cdr(message, imu.msgtype))
+        return folder

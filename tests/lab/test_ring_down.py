@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tvist_lab.metrics import SLOW_POLE, fit_ring_down
+from tvist_lab.metrics.ring_down import SIGNIFICANT
 
 PERIOD = 0.002
 TICKS = 600
@@ -125,3 +126,60 @@ def test_what_comes_before_the_skipped_time_does_not_count(ring):
     alpha = ring(TICKS, 0, 9.0, 0.1, 1.0)
     alpha[:3] += 5.0
     assert fit_ring_down(alpha, PERIOD).f_d == pytest.approx(9.0, rel=1e-3)
+
+
+def draws(count, **options):
+    """Fits of damped sines of random frequency, damping, direction and phase in noise, and the truth."""
+    found = []
+    for seed in range(count):
+        random = np.random.default_rng([seed, count])
+        f_d, zeta = random.uniform(6.0, 25.0), random.uniform(0.05, 0.35)
+        time = PERIOD * np.arange(500)
+        axis = random.normal(size=3)
+        decay = np.exp(-2.0 * np.pi * f_d * zeta / np.sqrt(1.0 - zeta**2) * time)
+        wave = decay * np.cos(2.0 * np.pi * f_d * time + random.uniform(0.0, 6.28))
+        alpha = np.outer(wave, axis / np.linalg.norm(axis)) + 0.03 * random.standard_normal((500, 3))
+        found.append((fit_ring_down(alpha, PERIOD, **options), f_d, zeta))
+    return found
+
+
+ANALYSED = {"modes": 2, "offset": True, "evidence": SIGNIFICANT}
+
+
+@pytest.mark.parametrize(
+    ("count", "least", "most"), [(60, 0.85, 1.0), pytest.param(500, 0.90, 0.99, marks=pytest.mark.nightly)]
+)
+def test_the_intervals_contain_the_truth_as_often_as_they_say(count, least, most, measured):
+    fits = draws(count, **ANALYSED)
+    assert all(fit.ok for fit, _, _ in fits)
+    f_errors = [abs(fit.f_d / f_d - 1.0) for fit, f_d, _ in fits]
+    zeta_errors = [abs(fit.zeta / zeta - 1.0) for fit, _, zeta in fits]
+    f_covered = np.mean([fit.f_d_interval[0] <= f_d <= fit.f_d_interval[1] for fit, f_d, _ in fits])
+    zeta_covered = np.mean([fit.zeta_interval[0] <= zeta <= fit.zeta_interval[1] for fit, _, zeta in fits])
+    measured("median errors of f_d, zeta", f"{np.median(f_errors):.4f}, {np.median(zeta_errors):.4f}")
+    measured("coverage of f_d, zeta", f"{f_covered:.3f}, {zeta_covered:.3f}")
+    assert np.median(f_errors) < 0.02
+    assert np.median(zeta_errors) < 0.10
+    assert least <= f_covered <= most
+    assert least <= zeta_covered <= most
+
+
+def test_missing_samples_do_not_spoil_a_fit(ring):
+    kept = np.random.default_rng(0).random(TICKS) > 0.3
+    kept[60:70] = False
+    alpha = (ring(TICKS, 0, 10.0, 0.1, 1.0) + noise(3))[kept]
+    fit = fit_ring_down(alpha, PERIOD, time=PERIOD * np.flatnonzero(kept))
+    assert fit.f_d == pytest.approx(10.0, rel=0.02)
+    assert fit.zeta == pytest.approx(0.1, rel=0.1)
+    wrong = fit_ring_down(alpha, PERIOD)
+    assert abs(wrong.f_d - 10.0) > 1.0
+
+
+def test_a_constant_does_not_pull_the_mode_when_it_is_allowed_for(ring):
+    alpha = ring(TICKS, 0, 10.0, 0.1, 1.0) + 0.3
+    assert fit_ring_down(alpha, PERIOD, offset=True).zeta == pytest.approx(0.1, rel=1e-3)
+
+
+def test_slow_samples_are_searched_below_half_their_rate(ring):
+    alpha = (ring(TICKS, 0, 10.0, 0.1, 1.0) + noise(4))[::10]
+    assert fit_ring_down(alpha, 10 * PERIOD).f_d == pytest.approx(10.0, rel=0.02)

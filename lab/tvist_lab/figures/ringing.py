@@ -61,22 +61,15 @@ def _even(time: Floats, alpha: Floats, period: float) -> tuple[Floats, Floats]:
 
 def _draw_course(panel: Axes, time: Floats, alpha: Floats, target_stop: float | None) -> None:
     panel.plot(time, amplitude(alpha), color=SHAPED, linewidth=1.1)
-    panel.axvline(0.0, color=INK, linewidth=0.9, linestyle=":")
-    _name_stop(panel, "the arm stops", 0.0, 3)
+    panel.axvline(0.0, color=INK, linewidth=1.0, linestyle=":", label="The arm stops")
     if target_stop is not None:
-        panel.axvline(target_stop, color=MUTED, linewidth=0.9, linestyle="--")
-        _name_stop(panel, "its target stops", target_stop, -3)
+        panel.axvline(target_stop, color=MUTED, linewidth=1.0, linestyle="--", label="Its target stops")
+    panel.legend(loc="upper right", fontsize=8, frameon=False, labelcolor=INK)
     after = amplitude(alpha)[time > 0.0]
     panel.set(
         xlim=(-BEFORE, time[-1]), ylim=(0.0, 1.5 * float(np.max(after, initial=0.1))), xlabel="Time after the stop (s)",
         ylabel=r"$|\alpha|$ (m/s$^2$)",
     )  # fmt: skip
-
-
-def _name_stop(panel: Axes, words: str, at: float, aside: int) -> None:
-    side = "left" if aside > 0 else "right"
-    place = {"xycoords": ("data", "axes fraction"), "xytext": (aside, -2), "textcoords": "offset points"}
-    note(panel, words, (at, 1.0), **place, va="top", ha=side, color=MUTED)
 
 
 def _draw_spectrum(panel: Axes, alpha: Floats, period: float, result: MotionResult) -> None:

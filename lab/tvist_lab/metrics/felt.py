@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.motion import MotionRows
-from tvist_lab.metrics.vibration import SENSOR, best_tool_acceleration, low_pass, tool_acceleration
+from tvist_lab.metrics.vibration import SENSOR, best_tool_acceleration, low_pass_at, tool_acceleration
 from tvist_lab.recordings import Floats, Recording
 
 REST = (0.2, 1.0)
@@ -43,7 +43,7 @@ def felt(
         kept = shown[rows]
         return recording.time[rows][kept], (recording[SENSOR][rows] - gravity)[kept]
     whole = np.flatnonzero(shown[motion.start : motion.end]) + motion.start
-    alpha = _smooth(recording.time[whole], recording[SENSOR][whole] - gravity, recording.period)
+    alpha = low_pass_at(recording.time[whole], recording[SENSOR][whole] - gravity, recording.period)
     chosen = (whole >= rows.start) & (whole < rows.stop)
     return recording.time[whole[chosen]], alpha[chosen]
 
@@ -62,13 +62,3 @@ def _gravity(recording: Recording, motion: MotionRows, shown: NDArray[np.bool_])
     if not len(at_rest):
         raise NotMeasurableError(f"{SENSOR} is empty in the rest after the stop")
     return np.asarray(at_rest.mean(axis=0))
-
-
-def _smooth(time: Floats, alpha: Floats, period: float) -> Floats:
-    """Low-pass filter samples of which some are missing: these are interpolated before and left out after."""
-    if len(time) < 2:
-        return alpha
-    grid = np.arange(time[0], time[-1] + 0.5 * period, period)
-    even = np.column_stack([np.interp(grid, time, axis) for axis in alpha.T])
-    below = low_pass(even, period)
-    return np.column_stack([np.interp(time, grid, axis) for axis in below.T])

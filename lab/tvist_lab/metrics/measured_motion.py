@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from tvist_lab.metrics.vibration import low_pass
+from tvist_lab.metrics.vibration import low_pass_at
 from tvist_lab.recordings import Floats, Recording
 
 SMOOTHED = 20.0
@@ -15,6 +15,8 @@ PAUSE = 0.1
 """Rests shorter than this belong to a motion, as at a reversal or while the arm vibrates [s]."""
 SMALLEST = 0.005
 """Smallest displacement of a motion [rad]; less is vibration."""
+FEWEST = 16
+"""Smallest number of rows in which motions are looked for."""
 TAPER = 0.03
 """Longest time for which a joint may have moved below `SLOW` before and after [s]."""
 
@@ -25,13 +27,14 @@ def measured_spans(recording: Recording) -> list[tuple[int, int]]:
     A joint moves while its speed exceeds 0.01 rad/s, or six times what the encoders' noise adds. Start and stop are
     then shifted outwards by the time in which a speed that changes steadily reaches this threshold, at most 30 ms.
     """
-    time = recording.time
-    if len(time) < 16:
+    seen = np.flatnonzero(np.isfinite(recording["actual_q"]).all(axis=1))
+    if len(seen) < FEWEST:
         return []
-    q = low_pass(recording["actual_q"], recording.period, min(SMOOTHED, 0.4 / recording.period))
+    time, measured = recording.time[seen], recording["actual_q"][seen]
+    q = low_pass_at(time, measured, recording.period, SMOOTHED)
     velocity = np.asarray(np.gradient(q, time, axis=0))
     speed = np.max(np.abs(velocity), axis=1)
-    threshold = max(SLOW, 6.0 * _noise_of_speed(recording))
+    threshold = max(SLOW, 6.0 * _noise_of_speed(measured, recording.period))
     rows = np.flatnonzero(speed > threshold)
     if not rows.size:
         return []
@@ -44,16 +47,16 @@ def measured_spans(recording: Recording) -> list[tuple[int, int]]:
             continue
         first_row = np.searchsorted(time, time[first] - _taper(time, speed, int(first), 1))
         last_row = np.searchsorted(time, time[last] + _taper(time, speed, int(last), -1))
-        spans.append((int(max(first_row, 1)), int(min(last_row, len(time) - 1))))
+        spans.append((int(seen[max(first_row, 1)]), int(seen[min(last_row, len(time) - 1)])))
     return spans
 
 
-def _noise_of_speed(recording: Recording) -> float:
+def _noise_of_speed(q: Floats, period: float) -> float:
     """Standard deviation of the speed that is differentiated from resting, smoothed encoders [rad/s]."""
-    second = np.diff(recording["actual_q"], n=2, axis=0)
+    second = np.diff(q, n=2, axis=0)
     noise = float(np.max(np.median(np.abs(second), axis=0))) / (0.6745 * math.sqrt(6.0))
-    cut_off = min(SMOOTHED, 0.4 / recording.period)
-    return noise * 2.0 * math.pi * cut_off * math.sqrt(2.0 * cut_off * recording.period / 3.0)
+    cut_off = min(SMOOTHED, 0.45 / period)
+    return noise * 2.0 * math.pi * cut_off * math.sqrt(2.0 * cut_off * period / 3.0)
 
 
 def _taper(time: Floats, speed: Floats, row: int, inwards: int) -> float:

@@ -101,7 +101,7 @@ def motions(recording: Recording) -> list[MotionRows]:
         end = min([end, *jumps[jumps > motion.start]])
         rows = motion.start + 1 + np.flatnonzero(target_moving[motion.start + 1 : end])
         shaped_stop = int(rows[-1]) if rows.size else motion.reference_stop
-        lag = servo_lag(recording, motion.start, shaped_stop) if recording.foreign else 0.0
+        lag = servo_lag(recording, motion.start, shaped_stop) or 0.0 if recording.foreign else 0.0
         found[index] = replace(motion, shaped_stop=shaped_stop, end=int(end), lag=lag)
     return found
 
@@ -112,7 +112,7 @@ def _measured_motions(recording: Recording) -> list[MotionRows]:
     starts = [int(np.searchsorted(recording.time, recording.time[first] - EARLY)) for first, _ in spans]
     return [
         MotionRows(first, last, last, max(end, last + 1))
-        for (first, last), end in zip(spans, [*starts[1:], len(recording)], strict=True)
+        for (first, last), end in zip(spans, [*starts[1:], len(recording)], strict=bool(spans))
     ]
 
 

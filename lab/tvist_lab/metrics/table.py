@@ -11,7 +11,8 @@ from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.felt import felt
 from tvist_lab.metrics.motion import MotionRows, motions
 from tvist_lab.metrics.residual import Residual, residual
-from tvist_lab.metrics.ring_down import SKIP, SLOW_POLE, RingDown, fit_ring_down
+from tvist_lab.metrics.ring_down import SIGNIFICANT, SKIP, SLOW_POLE, RingDown, fit_ring_down
+from tvist_lab.metrics.servo_lag import servo_lag
 from tvist_lab.metrics.settling import Settling, settling
 from tvist_lab.recordings import MissingColumnError, Recording
 
@@ -71,7 +72,7 @@ class MotionResult:
     zeta_interval: tuple[float, float] | None = None
     """Interval that contains the true damping ratio with a probability of 95 % [-]."""
     servo_lag_ms: float | None = None
-    """Time by which the arm follows its target, in a log of another controller [ms]."""
+    """Time by which the measured angles follow the target [ms]."""
     notes: Mapping[str, str] = field(default_factory=dict)
     """Field to a note about its value."""
 
@@ -125,6 +126,9 @@ def measure(recording: Recording, motion: MotionRows) -> MotionResult:
     after = attempt(vibration_after_stop, "peak_m_s2", "envelope_m_s2")
     strongest = attempt(peak_acceleration, "peak_acceleration_rad_s2")
     ringing = attempt(_ring_down, "f_d_hz", "f_d_interval_hz", "zeta", "zeta_interval")
+    lag = servo_lag(recording, motion.start, motion.shaped_stop)
+    if lag is None:
+        notes["servo_lag_ms"] = "no measured angles follow a target"
     if vibration is not None and not vibration.fitted:
         notes["residual_vibration_m_s2"] = "fewer than two peaks: the largest |α| after the stop"
     return MotionResult(
@@ -143,7 +147,7 @@ def measure(recording: Recording, motion: MotionRows) -> MotionResult:
         f_d_interval_hz=None if ringing is None else ringing.f_d_interval,
         zeta=None if ringing is None else ringing.zeta,
         zeta_interval=None if ringing is None else ringing.zeta_interval,
-        servo_lag_ms=1e3 * motion.lag if recording.foreign and "target_q" in recording else None,
+        servo_lag_ms=None if lag is None else 1e3 * lag,
         notes=notes,
     )
 
@@ -155,7 +159,9 @@ def _ring_down(recording: Recording, motion: MotionRows) -> RingDown:
     if recording.foreign:
         late = time - recording.time[first]
         skip = SKIP if "target_q" in recording else SKIP_OF_MEASURED
-        fit = fit_ring_down(alpha, recording.period, modes=2, time=late, offset=True, skip=skip)
+        fit = fit_ring_down(
+            alpha, recording.period, modes=2, time=late, offset=True, skip=skip, evidence=SIGNIFICANT
+        )
     else:
         fit = fit_ring_down(alpha, recording.period, modes=2, slow_poles=(SLOW_POLE,))
     if not fit.ok:

@@ -64,6 +64,23 @@ def low_pass(signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
     return _both_ways(butter(4, cut_off, "lowpass", fs=1.0 / period, output="sos"), signal)
 
 
+def low_pass_at(time: Floats, signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
+    """Low-pass filter samples of which some are missing: these are interpolated before, and left out after.
+
+    Args:
+        time: Times of the samples, increasing, shape (T,) [s].
+        signal: The samples, shape (T, k).
+        period: Time between samples where none is missing [s].
+        cut_off: Cut-off frequency [Hz].
+    """
+    if len(time) < 2:
+        return signal
+    grid = np.arange(time[0], time[-1] + 0.5 * period, period)
+    even = np.column_stack([np.interp(grid, time, axis) for axis in signal.T])
+    below = low_pass(even, period, cut_off)
+    return np.column_stack([np.interp(time, grid, axis) for axis in below.T])
+
+
 def band_pass(signal: Floats, period: float, band: tuple[float, float] = BAND) -> Floats:
     """Band-pass filter a signal with zero phase (Butterworth, forwards and backwards)."""
     band = (band[0], min(band[1], 0.45 / period))

@@ -1,0 +1,239 @@
+"""Logs of other robots are measured whatever their format, and refused with the cause and the line."""
+
+import numpy as np
+import pytest
+from tests.lab.synthetic_logs import SyntheticLog
+
+from tvist_lab.metrics import analyze, compare, motions
+from tvist_lab.recordings import RecordingError, read
+
+MODE = (9.0, 0.12, 1.0)
+
+
+def within(result, f_d=MODE[0], zeta=MODE[1]):
+    """Whether frequency and damping are close to the truth; intervals are tested on many draws elsewhere."""
+    assert result.f_d_hz == pytest.approx(f_d, rel=0.03), result.notes
+    assert result.zeta == pytest.approx(zeta, rel=0.15), result.notes
+    assert result.f_d_interval_hz[0] < result.f_d_hz < result.f_d_interval_hz[1]
+    assert result.zeta_interval[0] < result.zeta < result.zeta_interval[1]
+    return True
+
+
+FORMATS = {
+    "commas": lambda log, path: log.csv(path / "log.csv"),
+    "spaces": lambda log, path: log.csv(path / "log.txt", " "),
+    "semicolons": lambda log, path: log.csv(path / "log.csv", ";"),
+    "six digits": lambda log, path: log.csv(path / "log.csv", ",", "{:.6f}".format),
+    "packets of 1116 bytes": lambda log, path: log.dump(path / "dump"),
+    "packets of 1220 bytes begun midway": lambda log, path: log.dump(path / "dump", 1220, skip=777, lost=99),
+}
+
+
+@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("lag", [0.0, 0.025])
+def test_motions_and_modes_are_found_in_every_format_by_the_logs_own_clock(tmp_path, form, lag):
+    log = SyntheticLog(lag=lag)
+    results = analyze(read(FORMATS[form](log, tmp_path)))
+    assert [result.start_s for result in results] == pytest.approx(log.starts, abs=0.012)
+    assert [result.stop_s for result in results] == pytest.approx(log.stops, abs=0.012)
+    assert all(within(result) for result in results)
+    assert [result.servo_lag_ms for result in results] == pytest.approx([1e3 * lag] * 2, abs=2.0)
+    assert [result.residual_vibration_m_s2 for result in results] == pytest.approx([1.0, 1.0], rel=0.15)
+
+
+@pytest.mark.parametrize("rate", [100.0, 125.0, 250.0, 500.0])
+def test_slow_logs_are_measured_too(tmp_path, rate):
+    log = SyntheticLog(rate=rate, lag=0.025)
+    assert [within(result) for result in analyze(read(log.csv(tmp_path / "log.csv")))] == [True, True]
+
+
+@pytest.mark.parametrize(("every", "order"), [(1, (2, 1, 0, 3, 4, 5)), (4, (5, 0, 3, 1, 4, 2))])
+def test_a_rosbag_is_read_in_any_order_of_joints_and_with_slower_joint_states(tmp_path, every, order):
+    log = SyntheticLog(lag=0.025)
+    recording = read(log.rosbag(tmp_path / "bag", every, order))
+    seen = np.isfinite(recording["actual_q"]).all(axis=1)
+    assert recording["actual_q"][seen] == pytest.approx(log.columns["actual_q"][seen], abs=2e-3)
+    results = analyze(recording)
+    assert all(within(result) for result in results)
+    assert [r.stop_s for r in results] == pytest.approx(np.array(log.stops) + 0.025, abs=0.02)
+
+
+def test_without_a_target_motions_come_from_the_measured_angles_and_the_notes_say_so(tmp_path):
+    log = SyntheticLog().without("target_q")
+    results = analyze(read(log.csv(tmp_path / "log.csv")))
+    assert [result.stop_s for result in results] == pytest.approx(log.stops, abs=0.03)
+    assert all(within(result) for result in results)
+    assert "actual_q" in results[0].notes["stop_s"]
+    assert results[0].servo_lag_ms is None
+    assert "servo_lag_ms" in results[0].notes
+
+
+def test_what_a_log_lacks_is_null_with_a_reason_and_the_rest_is_measured(tmp_path):
+    log = SyntheticLog(joints=7).without("actual_TCP_pose")
+    results = analyze(read(log.csv(tmp_path / "log.csv")))
+    assert all(within(result) for result in results)
+    for field in ("overshoot_m", "stabilisation_ms", "cycle_ms"):
+        assert getattr(results[0], field) is None
+        assert "actual_TCP_pose" in results[0].notes[field]
+    blind = analyze(read(SyntheticLog().without("actual_tool_accelerometer").csv(tmp_path / "blind.csv")))[0]
+    for field in ("f_d_hz", "zeta", "residual_vibration_m_s2", "still_after_ms", "peak_m_s2"):
+        assert getattr(blind, field) is None
+        assert "actual_tool_accelerometer" in blind.notes[field]
+    assert blind.cycle_ms is not None
+
+
+def test_of_two_modes_the_strongest_at_the_stop_counts(tmp_path):
+    log = SyntheticLog(modes=((7.0, 0.06, 0.5), (16.0, 0.05, 1.5)))
+    assert all(within(result, 16.0, 0.05) for result in analyze(read(log.csv(tmp_path / "log.csv"))))
+
+
+def test_a_rotated_tool_changes_no_figure_since_gravity_is_what_the_sensor_shows_at_rest(tmp_path):
+    log = SyntheticLog()
+    before = analyze(read(log.csv(tmp_path / "log.csv")))
+    log.columns["actual_TCP_pose"][:, 3:] = [0.3, -1.0, 2.0]
+    after = analyze(read(log.csv(tmp_path / "other.csv")))
+    assert [result.as_dict() for result in before] == [result.as_dict() for result in after]
+
+
+def test_missing_rows_do_not_spoil_a_fit(tmp_path):
+    log = SyntheticLog(lag=0.025)
+    random = np.random.default_rng(0)
+    kept = random.random(len(log.columns["timestamp"])) > 0.2
+    kept[1100:1110] = False
+    log.columns = {name: column[kept] for name, column in log.columns.items()}
+    recording = read(log.csv(tmp_path / "log.csv"))
+    assert recording.missing_ticks > 300
+    assert any("rows are missing" in note for note in recording.notes)
+    assert all(within(result) for result in analyze(recording))
+
+
+def lines_of(tmp_path, log=None):
+    path = (log or SyntheticLog()).csv(tmp_path / "log.csv")
+    return path, path.read_text().splitlines()
+
+
+def test_repeated_and_torn_lines_are_left_out_and_said(tmp_path):
+    path, lines = lines_of(tmp_path)
+    lines[500:500] = [lines[499]] * 3
+    lines[800] = lines[800][:40]
+    lines[-1] = lines[-1][:60]
+    path.write_text("\n".join(lines))
+    recording = read(path)
+    assert any("3 rows" in note and "line 501" in note for note in recording.notes)
+    assert any("torn" in note and "line 801" in note for note in recording.notes)
+    assert all(within(result) for result in analyze(recording))
+
+
+def test_the_last_number_of_a_file_that_was_cut_off_does_not_count(tmp_path):
+    path, lines = lines_of(tmp_path)
+    path.write_text("\n".join(lines)[:-5])
+    assert f"line {len(lines)} has no end and was left out" in read(path).notes
+
+
+def test_an_empty_cell_is_missing_and_not_zero(tmp_path):
+    path, lines = lines_of(tmp_path)
+    names = lines[0].split(",")
+    cells = lines[700].split(",")
+    cells[names.index("actual_tool_accelerometer_1")] = ""
+    lines[700] = ",".join(cells)
+    path.write_text("\n".join(lines) + "\n")
+    recording = read(path)
+    assert np.isnan(recording["actual_tool_accelerometer"][699, 1])
+    assert all(within(result) for result in analyze(recording))
+
+
+def broken(change):
+    """Return a test's input: a good log changed as text."""
+
+    def write(tmp_path):
+        path, lines = lines_of(tmp_path)
+        path.write_text("\n".join(change(lines)) + "\n")
+        return path
+
+    return write
+
+
+def with_cell(lines, text, row=300, column=4):
+    cells = lines[row].split(",")
+    cells[column] = text
+    return [*lines[:row], ",".join(cells), *lines[row + 1 :]]
+
+
+REFUSED = {
+    "time goes back": (
+        broken(lambda lines: lines + lines[1:300]),
+        r"line 2702.*goes back from 105.398 to 100 s",
+    ),
+    "a word for a number": (
+        broken(lambda lines: with_cell(lines, "north")),
+        r"line 301, column target_q_3: 'north'",
+    ),
+    "no time": (
+        broken(lambda lines: [",".join(line.split(",")[1:]) for line in lines]),
+        "no column timestamp",
+    ),
+    "no joints": (broken(lambda lines: [",".join(line.split(",")[:1] * 2) for line in lines]), "twice"),
+    "only time": (
+        broken(lambda lines: [line.split(",")[0] + ",1" for line in lines]),
+        "no column|neither target_q_0",
+    ),
+    "no header": (broken(lambda lines: lines[1:]), "line 1.*header"),
+    "only a header": (broken(lambda lines: lines[:1]), "no rows"),
+    "one row": (broken(lambda lines: lines[:2]), "1 row"),
+    "decimal commas": (broken(lambda lines: [line.replace(".", ",") for line in lines]), "decimal comma"),
+    "decimal commas and semicolons": (
+        broken(lambda lines: [line.replace(",", ";").replace(".", ",") for line in lines]),
+        "line 2, column timestamp: 100,0 has a decimal comma",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_what_cannot_be_measured_is_refused_with_file_cause_and_line(tmp_path, kind):
+    write, words = REFUSED[kind]
+    with pytest.raises(RecordingError, match=words) as refused:
+        read(write(tmp_path))
+    assert "log.csv" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "is empty"),
+        (bytes(range(256)) * 40, "neither a recording nor a log"),
+        (b"\x89PNG\r\n\x1a\n" + bytes(500), "neither a recording nor a log"),
+        (b"\xff\xfe\xfa\xfb hello", "no text"),
+        (b"Dear diary, nothing moved today.\n", "no rows|no column"),
+    ],
+)
+def test_other_files_are_refused_by_name(tmp_path, content, words):
+    path = tmp_path / "other"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=words):
+        read(path)
+
+
+def test_missing_files_and_folders_without_a_bag_are_refused(tmp_path):
+    with pytest.raises(RecordingError, match="No such file"):
+        read(tmp_path / "none.csv")
+    with pytest.raises(RecordingError, match=r"0 files \*.mcap"):
+        read(tmp_path)
+
+
+def test_motions_that_correspond_are_compared_and_others_are_said(tmp_path):
+    loud, quiet = SyntheticLog(), SyntheticLog(modes=((9.0, 0.12, 0.25),), seed=2)
+    both = compare(read(loud.csv(tmp_path / "a.csv")), read(quiet.csv(tmp_path / "b.csv", " ")))
+    assert [(motion.a, motion.b) for motion in both.motions] == [(1, 1), (2, 2)]
+    for motion in both.motions:
+        assert motion.impact_percent["residual_vibration"] == pytest.approx(-75.0, abs=8.0)
+    one = SyntheticLog(motions=1)
+    short = compare(read(loud.csv(tmp_path / "a.csv")), read(one.csv(tmp_path / "c.csv")))
+    assert [(motion.a, motion.b) for motion in short.motions] == [(1, 1)]
+    assert (short.only_in_a, short.only_in_b) == ((2,), ())
+    seven = compare(read(tmp_path / "a.csv"), read(SyntheticLog(joints=7).csv(tmp_path / "d.csv")))
+    assert (seven.motions, seven.only_in_a, seven.only_in_b) == ((), (1, 2), (1, 2))
+
+
+def test_a_log_at_rest_has_no_motion(tmp_path):
+    assert motions(read(SyntheticLog(motions=0, rest=2.0).csv(tmp_path / "log.csv"))) == []
+    assert motions(read(SyntheticLog(motions=0).without("target_q").csv(tmp_path / "log.csv"))) == []
