@@ -24,6 +24,8 @@ COMMANDS = {
     "record": "Record a served robot as MCAP.",
     "analyze": "Measure the motions of a recording, or of another robot's log.",
     "compare": "Compare two recordings of the same motions, motion by motion.",
+    "info": "Print what a recording holds.",
+    "export": "Write a recording as CSV, Parquet, npz or mat.",
     "replay": "Run a recording's commands again and compare bit by bit.",
     "paper": "Run the paper's experiment and print its tables beside ours.",
     "lesson": "Show on an arm with one flexible joint why a fixed shaper is not enough.",

@@ -39,13 +39,18 @@ def _read(path: Path) -> Recording:
         raise RecordingError(f"{path} is empty")
     if head.startswith(MCAP):
         return _read_mcap(path)
+    if path.suffix.lower() in (".parquet", ".npz", ".mat"):
+        from tvist_lab.recordings import exported
+
+        return exported.READERS[path.suffix.lower()](path)
     if b"\0" in head:
         from tvist_lab.recordings.realtime_dump import read_dump
 
         return read_dump(path)
     from tvist_lab.recordings.csv_log import read_csv
+    from tvist_lab.recordings.exported import with_sidecar
 
-    return read_csv(path)
+    return with_sidecar(read_csv(path), path)
 
 
 def _bag(folder: Path) -> Path:

@@ -1,0 +1,167 @@
+"""Recordings as CSV, Parquet, npz and mat, in full precision."""
+
+import io
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Any
+
+import msgspec
+import numpy as np
+import polars as pl
+
+from tvist_lab.recordings.description import KEY, describe, ordered, sidecar
+from tvist_lab.recordings.recording import Floats, Recording, RecordingError
+from tvist_lab.recordings.units import meaning_of
+from tvist_lab.recordings.whole_file import whole_file
+
+EXACT = 2.0**53
+"""Whole numbers up to this one are the same as an integer and as a float."""
+
+_SYSTEM = re.compile(r"IO error: (.*) \(os error")
+_MATLAB_NAME = re.compile(r"[A-Za-z]\w{0,62}", re.ASCII)
+
+
+class ExportError(RecordingError):
+    """A recording cannot be exported; the message names the file."""
+
+
+def written_by(path: Path, kind: str) -> list[Path]:
+    """Return the files that an export to `path` writes."""
+    return [path, sidecar(path)] if kind == "csv" else [path]
+
+
+def export(recording: Recording, path: Path, kind: str) -> None:
+    """Write a recording to a file, replacing it.
+
+    Scalars are columns of their own names. Vectors are columns NAME_0, NAME_1, … in CSV and Parquet, as UR's record.py
+    names them, and arrays of shape (T, k) in npz and mat. `timestamp` comes first. Units, events and info stand in the
+    metadata of Parquet, in the variable `tvist` of npz and mat, and in a file beside a CSV, as JSON.
+
+    Args:
+        recording: The recording.
+        path: File to write.
+        kind: One of `FORMATS`.
+
+    Raises:
+        ExportError: A file cannot be written, for example because the disk is full, or a column's name is not possible
+            in this format. No file has changed then, except that the description of a CSV may be new.
+    """
+    try:
+        if kind == "csv":
+            with whole_file(sidecar(path)) as stream:
+                stream.write(_csv_on_the_web(recording, path))
+        with whole_file(path) as stream:
+            FORMATS[kind](recording, stream)
+    except (OSError, pl.exceptions.PolarsError) as error:
+        raise ExportError(f"{path} cannot be written: {_reason(error)}") from error
+    except ExportError as error:
+        raise ExportError(f"{path} cannot be written: {error}") from error
+
+
+def flat(recording: Recording) -> pl.DataFrame:
+    """Return one column for each entry of a vector, named NAME_i; whole numbers are integers, null instead of NaN."""
+    columns: list[pl.Series] = []
+    for name, values in ordered(recording).items():
+        whole = meaning_of(name).whole and _exact(values)
+        for flat_name, entries in [(name, values)] if values.ndim == 1 else _entries(name, values):
+            column = pl.Series(flat_name, np.ascontiguousarray(entries))
+            columns.append(column.fill_nan(None).cast(pl.Int64) if whole else column)
+    return pl.DataFrame(columns)
+
+
+def _entries(name: str, values: Floats) -> list[tuple[str, Floats]]:
+    return [(f"{name}_{index}", values[:, index]) for index in range(values.shape[1])]
+
+
+def _exact(values: Floats) -> bool:
+    """Whether all values are the same as integers; -0.0 is not."""
+    known = values[~np.isnan(values)]
+    return bool(
+        np.all((known == np.trunc(known)) & (np.abs(known) < EXACT) & ~((known == 0.0) & np.signbit(known)))
+    )
+
+
+def _write_csv(recording: Recording, stream: IO[bytes]) -> None:
+    flat(recording).with_columns(pl.col(pl.Float64).fill_nan(None)).write_csv(stream)
+
+
+def _write_parquet(recording: Recording, stream: IO[bytes]) -> None:
+    table = io.BytesIO()  # from a stream that fails, polars makes an error that does not say why
+    flat(recording).write_parquet(table, metadata={KEY: describe(recording).decode()})
+    stream.write(table.getbuffer())
+
+
+def _write_npz(recording: Recording, stream: IO[bytes]) -> None:
+    arrays: dict[str, Any] = {**ordered(recording), KEY: np.array(describe(recording).decode())}
+    np.savez_compressed(stream, **arrays)
+
+
+def _write_mat(recording: Recording, stream: IO[bytes]) -> None:
+    from scipy.io import savemat
+
+    columns = ordered(recording)
+    for name in columns:
+        if not _MATLAB_NAME.fullmatch(name):
+            raise ExportError(f"column {name} cannot be a variable of MATLAB: up to 63 letters, digits and _")
+    units = {name: meaning_of(name).unit() for name in columns}
+    content: dict[str, Any] = dict(columns)
+    content |= {"units": units, "events": _events(recording), KEY: describe(recording).decode()}
+    savemat(stream, content, format="5", long_field_names=True, oned_as="column", do_compression=True)
+
+
+def _events(recording: Recording) -> np.ndarray[Any, Any]:
+    """Events as a MATLAB structure array; -1 where an event has no id."""
+    names = ("tick", "kind", "id", "code", "why")
+    rows = [
+        (
+            float(event.tick),
+            event.kind,
+            -1.0 if event.id is None else float(event.id),
+            event.code or "",
+            event.why or "",
+        )
+        for event in recording.events
+    ]
+    return np.array(rows, dtype=[(name, object) for name in names])
+
+
+def _csv_on_the_web(recording: Recording, path: Path) -> bytes:
+    """Describe a CSV as the W3C's "CSV on the Web" does; the rest is a note."""
+    columns = []
+    for name, values in ordered(recording).items():
+        found = meaning_of(name)
+        width = 1 if values.ndim == 1 else values.shape[1]
+        columns += [
+            {
+                "name": name if values.ndim == 1 else f"{name}_{index}",
+                "datatype": "integer" if found.whole and _exact(values) else "double",
+                "schema:unitText": found.unit_of_entry(index, width),
+                "dc:description": found.meaning,
+            }
+            for index in range(width)
+        ]
+    content = {
+        "@context": "http://www.w3.org/ns/csvw",
+        "url": path.name,
+        "tableSchema": {"columns": columns},
+        "notes": [{KEY: msgspec.json.decode(describe(recording))}],
+    }
+    return json.dumps(content, indent=1, ensure_ascii=False).encode()
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    found = _SYSTEM.search(str(error))
+    return found[1] if found else str(error)
+
+
+FORMATS: dict[str, Callable[[Recording, IO[bytes]], None]] = {
+    "csv": _write_csv,
+    "parquet": _write_parquet,
+    "npz": _write_npz,
+    "mat": _write_mat,
+}
+"""Formats, each with the function that writes it; a file's ending is the format's name."""

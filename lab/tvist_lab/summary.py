@@ -1,0 +1,65 @@
+"""Summary of a recording or log: what a file holds, without its values."""
+
+import os
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from tvist_lab.metrics import motions
+from tvist_lab.recordings import Recording, RecordingError, mcap_file, read
+from tvist_lab.recordings.description import ordered
+from tvist_lab.recordings.units import meaning_of
+
+
+def summary(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Describe a file that `tvist_lab.recordings.read` reads.
+
+    Returns:
+        Times in s on the recording's own clock; `complete`, `dropped`, `replayable` and `journal` are null for other
+        files than recordings of a served robot, `motions` if the columns do not show them.
+
+    Raises:
+        RecordingError: The file cannot be read; the message names it.
+    """
+    path = Path(path)
+    content: mcap_file.RecordingFile | None = None
+    try:
+        content = mcap_file.read(path)
+        recording = content.recording
+    except mcap_file.RecordingFileError:
+        recording = read(path)
+    info = recording.info
+    return {
+        "file": str(path),
+        "bytes": path.stat().st_size if path.is_file() else None,
+        "robot": content.robot if content else info and info.name,
+        "model": info and info.model,
+        "version": info and info.version,
+        "start_s": float(recording.time[0]),
+        "duration_s": float(recording.time[-1] - recording.time[0]),
+        "rows": len(recording),
+        "missing_ticks": recording.missing_ticks,
+        "complete": content and content.complete,
+        "dropped": content.dropped and dict(content.dropped) if content else None,
+        "replayable": content and bool(content.start),
+        "journal": content and len(content.journal),
+        "events": dict(Counter(str(event.kind) for event in recording.events)),
+        "motions": _motions(recording),
+        "columns": [
+            {
+                "name": name,
+                "shape": list(values.shape),
+                "unit": meaning_of(name).unit(),
+                "meaning": meaning_of(name).meaning,
+            }
+            for name, values in ordered(recording).items()
+        ],
+        "notes": list(recording.notes) + ([content.note] if content and content.note else []),
+    }
+
+
+def _motions(recording: Recording) -> int | None:
+    try:
+        return len(motions(recording))
+    except RecordingError:
+        return None

@@ -1,0 +1,246 @@
+"""Recordings leave as CSV, Parquet, npz and mat, and come back with equal arrays."""
+
+import csv
+import json
+import resource
+
+import msgspec
+import numpy as np
+import polars as pl
+import pytest
+from tests.lab.synthetic_logs import SyntheticLog
+
+from tvist_cli.commands.export import export as export_command
+from tvist_cli.commands.info import info as info_command
+from tvist_cli.failure import Failure
+from tvist_lab.recordings import Recording, RecordingError, read
+from tvist_lab.recordings.description import KEY, sidecar
+from tvist_lab.recordings.export import FORMATS, ExportError, export
+from tvist_lab.recordings.units import meaning_of
+from tvist_protocol import Event, Info, Io, State, Truth
+from tvist_protocol.generate import FOLDER
+from tvist_protocol.recorded import topics
+from tvist_server.recording.writer import RecordingWriter, heading
+
+HARD_FLOATS = [5e-324, -0.0, 0.1 + 0.2, 1e300, np.nan, 2.0**53 + 2]
+
+
+def golden(name, kind):
+    return msgspec.json.decode((FOLDER / "fixtures" / "v1" / f"{name}.json").read_bytes(), type=kind)
+
+
+INFO, STATE, TRUTH = golden("info", Info), golden("state", State), golden("truth", Truth)
+
+
+def recording(rows=40):
+    """Random states and truth, with every kind of float that is easily spoilt."""
+    random = np.random.default_rng(rows)
+    states = [
+        msgspec.structs.replace(
+            STATE,
+            tick=tick,
+            timestamp=tick * 0.002,
+            setpoint_sequence=None if tick % 3 else tick,
+            actual_q=random.standard_normal(6).tolist(),
+            target_moment=HARD_FLOATS,
+            estimated_f_d=[random.random()],
+        )
+        for tick in range(7, 7 + 2 * rows, 2)
+    ]
+    truths = [msgspec.structs.replace(TRUTH, tick=state.tick) for state in states[3:]]
+    events = [Event(tick=9, kind="motion_started", id=1), Event(tick=11, kind="warning", why="“N m²”, \n2")]
+    return Recording.from_states(states, events, truths, INFO)
+
+
+def assert_equal(found, expected):
+    assert set(found.columns) == set(expected.columns)
+    for name, values in expected.columns.items():
+        assert found[name].shape == values.shape, name
+        assert found[name].tobytes() == values.tobytes(), name
+    assert found.events == expected.events
+    assert found.info == expected.info
+    assert (found.notes, found.foreign) == (expected.notes, expected.foreign)
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+class TestRoundTrip:
+    def test_every_bit_comes_back(self, kind, tmp_path):
+        path = tmp_path / f"run.{kind}"
+        export(recording(), path, kind)
+        assert_equal(read(path), recording())
+
+    def test_two_rows_come_back_in_their_shapes(self, kind, tmp_path):
+        path = tmp_path / f"run.{kind}"
+        export(recording(2), path, kind)
+        assert_equal(read(path), recording(2))
+
+    def test_a_log_of_another_controller_comes_back(self, kind, tmp_path):
+        log = SyntheticLog().csv(tmp_path / "log.csv")
+        path = tmp_path / f"run.{kind}"
+        expected = read(log)
+        assert expected.foreign
+        export(expected, path, kind)
+        found = read(path)
+        assert all(np.array_equal(found[name], expected[name], equal_nan=True) for name in expected.columns)
+
+    def test_on_a_full_disk_it_says_so_and_the_old_file_stays(self, kind, tmp_path):
+        path = tmp_path / f"run.{kind}"
+        path.write_bytes(b"old")
+        before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (5000, before[1]))
+        try:
+            with pytest.raises(ExportError, match=f"{path} cannot be written: File too large"):
+                export(recording(), path, kind)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        assert path.read_bytes() == b"old"
+        assert [place.name for place in tmp_path.iterdir()] == [path.name]
+
+    def test_a_file_cut_short_is_refused_by_its_name(self, kind, tmp_path):
+        path = tmp_path / f"run.{kind}"
+        export(recording(), path, kind)
+        whole = path.read_bytes()
+        if kind == "csv":
+            pytest.skip("a CSV cut short is a shorter CSV")
+        for length in (10, len(whole) // 3, len(whole) - 3):
+            path.write_bytes(whole[:length])
+            with pytest.raises(RecordingError, match=str(path)):
+                read(path)
+
+
+class TestLayout:
+    def test_a_csv_has_one_column_for_each_entry_and_empty_cells(self, tmp_path):
+        export(recording(), tmp_path / "run.csv", "csv")
+        with (tmp_path / "run.csv").open(newline="") as file:
+            header, first, *_ = csv.reader(file)
+        row = dict(zip(header, first, strict=True))
+        assert header[:2] == ["timestamp", "tick"]
+        assert row["tick"] == "7"
+        assert row["setpoint_sequence"] == row["target_moment_4"] == row["truth_motor_q_0"] == ""
+        assert float(row["target_moment_2"]) == 0.1 + 0.2
+
+    def test_the_file_beside_a_csv_has_units_for_each_column(self, tmp_path):
+        export(recording(), tmp_path / "run.csv", "csv")
+        table = json.loads(sidecar(tmp_path / "run.csv").read_text())
+        columns = {column["name"]: column for column in table["tableSchema"]["columns"]}
+        header = (tmp_path / "run.csv").read_text().splitlines()[0].split(",")
+        assert list(columns) == header
+        assert columns["actual_TCP_pose_2"]["schema:unitText"] == "m"
+        assert columns["actual_TCP_pose_3"]["schema:unitText"] == "rad"
+        assert columns["tick"]["datatype"] == "integer"
+
+    def test_a_description_of_other_columns_is_not_believed(self, tmp_path):
+        export(recording(), tmp_path / "run.csv", "csv")
+        lines = (tmp_path / "run.csv").read_text().splitlines()
+        fewer = [line.rsplit(",", 1)[0] for line in lines]
+        (tmp_path / "run.csv").write_text("\n".join(fewer) + "\n")
+        assert read(tmp_path / "run.csv").events == ()
+
+    def test_npz_and_mat_have_arrays_and_units_that_need_nothing_of_ours(self, tmp_path):
+        from scipy.io import loadmat
+
+        made = recording()
+        export(made, tmp_path / "run.npz", "npz")
+        export(made, tmp_path / "run.mat", "mat")
+        with np.load(tmp_path / "run.npz", allow_pickle=False) as file:
+            assert np.array_equal(file["actual_q"], made["actual_q"])
+            description = json.loads(str(file[KEY]))
+        assert description["columns"]["actual_qd"] == {
+            "width": 6, "unit": "rad/s", "meaning": "Measured velocity"
+        }  # fmt: skip
+        found = loadmat(tmp_path / "run.mat", simplify_cells=True)
+        assert np.array_equal(found["actual_q"], made["actual_q"])
+        assert found["units"]["actual_tool_accelerometer"] == "m/s²"
+        assert [event["kind"] for event in found["events"]] == ["motion_started", "warning"]
+
+    def test_parquet_has_the_description_in_its_metadata(self, tmp_path):
+        export(recording(), tmp_path / "run.parquet", "parquet")
+        assert (
+            json.loads(pl.read_parquet_metadata(tmp_path / "run.parquet")[KEY])["info"]["name"] == INFO.name
+        )
+        table = pl.read_parquet(tmp_path / "run.parquet")
+        assert table.columns[0] == "timestamp"
+        assert table["tick"].dtype == pl.Int64
+        assert table["actual_q_5"].dtype == pl.Float64
+
+    def test_tables_without_our_description_are_read_as_logs(self, tmp_path):
+        count = 500
+        q = np.cumsum(np.random.default_rng(0).standard_normal((count, 6)), axis=0)
+        time = np.arange(count) * 0.002
+        np.savez(tmp_path / "own.npz", timestamp=time, actual_q=q)
+        flat = {"timestamp": time} | {f"actual_q_{i}": q[:, i] for i in range(6)}
+        pl.DataFrame(flat).write_parquet(tmp_path / "own.parquet")
+        for name in ("own.npz", "own.parquet"):
+            found = read(tmp_path / name)
+            assert found.foreign
+            assert np.array_equal(found["actual_q"], q)
+
+    def test_a_name_that_matlab_does_not_allow_is_refused(self, tmp_path):
+        columns = {"tick": np.arange(3.0), "timestamp": np.arange(3.0), "a.b": np.arange(3.0)}
+        with pytest.raises(ExportError, match=r"column a\.b cannot be a variable of MATLAB"):
+            export(Recording(columns), tmp_path / "run.mat", "mat")
+        assert not list(tmp_path.iterdir())
+
+
+class TestUnits:
+    @pytest.mark.parametrize(("kind", "prefix"), [(State, ""), (Truth, "truth_"), (Io, "")])
+    def test_every_number_of_a_message_has_a_meaning_and_every_float_a_unit(self, kind, prefix):
+        for field in msgspec.structs.fields(kind):
+            found = meaning_of(prefix + field.name)
+            assert found.meaning
+            if field.type in (float, list[float], list[float] | None) and "register" not in field.name:
+                assert found.units, field.name
+
+    def test_the_units_of_rtde_and_of_unknown_columns(self):
+        assert meaning_of("actual_current").unit() == "A"
+        assert meaning_of("actual_TCP_force").unit() == "N, N m"
+        assert meaning_of("gripper_width").unit() == ""
+
+
+class TestCommands:
+    @pytest.fixture
+    def path(self, tmp_path):
+        path = tmp_path / "run.mcap"
+        with path.open("wb") as stream:
+            writer = RecordingWriter(stream, topics(INFO.name), heading(INFO, {"seed": 0}))
+            for tick in (4, 5, 8):
+                writer.write(msgspec.structs.replace(STATE, tick=tick, timestamp=tick * 0.002))
+            writer.write(Event(tick=5, kind="warning"))
+            writer.finish({})
+        return path
+
+    def test_export_names_the_file_after_the_recording_and_replaces_none(self, path, capsys):
+        export_command(path, to="CSV", json=True)
+        written = json.loads(capsys.readouterr().out)["written"]
+        assert written == [str(path.with_name(name)) for name in ("run.csv", "run.csv-metadata.json")]
+        with pytest.raises(Failure, match=r"run\.csv exists already: give --force"):
+            export_command(path, to="csv")
+        export_command(path, to="csv", force=True)
+        with pytest.raises(Failure, match="is the file to be exported"):
+            export_command(path.with_name("run.csv"), to="csv", force=True)
+        with pytest.raises(Failure, match="to is 'xls': must be one of csv"):
+            export_command(path, to="xls")
+
+    @pytest.mark.parametrize("kind", [None, *FORMATS])
+    def test_info_tells_what_every_kind_of_file_holds(self, kind, path, capsys):
+        if kind is not None:
+            export(read(path), path.with_suffix(f".{kind}"), kind)
+            path = path.with_suffix(f".{kind}")
+        info_command(path, json=True)
+        found = json.loads(capsys.readouterr().out)
+        assert (found["robot"], found["model"], found["version"]) == (INFO.name, INFO.model, INFO.version)
+        assert (found["start_s"], found["duration_s"]) == (0.008, 0.008)
+        assert (found["rows"], found["missing_ticks"]) == (3, 2)
+        assert found["events"] == {"warning": 1}
+        assert found["complete"] is (True if kind is None else None)
+        (q,) = (column for column in found["columns"] if column["name"] == "actual_q")
+        assert (q["shape"], q["unit"]) == ([3, 6], "rad")
+        info_command(path)
+        assert "actual_TCP_pose" in capsys.readouterr().out
+
+    def test_info_says_that_a_file_was_cut_off(self, path, capsys):
+        path.write_bytes(path.read_bytes()[:-20])
+        info_command(path)
+        said = capsys.readouterr().out
+        assert "no: cut off or damaged" in said
+        assert "was not closed" in said
