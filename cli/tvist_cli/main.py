@@ -25,6 +25,7 @@ COMMANDS = {
     "analyze": "Measure the motions of a recording, or of another robot's log.",
     "compare": "Compare two recordings of the same motions, motion by motion.",
     "info": "Print what a recording holds.",
+    "report": "Write a web page about recordings: a verdict, tables and figures in one file.",
     "export": "Write a recording as CSV, Parquet, npz or mat.",
     "replay": "Run a recording's commands again and compare bit by bit.",
     "paper": "Run the paper's experiment and print its tables beside ours.",

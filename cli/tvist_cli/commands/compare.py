@@ -76,4 +76,4 @@ def _row(motion: "ComparedMotion") -> tuple[str, ...]:
 
 
 def _percent(value: float | None) -> str:
-    return "–" if value is None else f"{value:+.0f} %"
+    return "–" if value is None else f"{round(value):+d} %"

@@ -156,14 +156,16 @@ def _ring_down(recording: Recording, motion: MotionRows) -> RingDown:
     """Fit the mode that vibrates after the stop."""
     first = motion.arm_stop(recording)
     time, alpha = felt(recording, motion, slice(first, motion.end))
+    late = time - recording.time[first]
     if recording.foreign:
-        late = time - recording.time[first]
         skip = SKIP if "target_q" in recording else SKIP_OF_MEASURED
         fit = fit_ring_down(
             alpha, recording.period, modes=2, time=late, offset=True, skip=skip, evidence=SIGNIFICANT
         )
     else:
-        fit = fit_ring_down(alpha, recording.period, modes=2, slow_poles=(SLOW_POLE,))
+        fit = fit_ring_down(
+            alpha, recording.period, modes=2, time=late, slow_poles=(SLOW_POLE,), evidence=SIGNIFICANT
+        )
     if not fit.ok:
         raise NotMeasurableError(fit.reason)
     return fit

@@ -1,0 +1,41 @@
+"""`tvist report`: a web page about recordings, in one file."""
+
+import shlex
+from pathlib import Path
+
+from tvist_cli.failure import Failure, told
+from tvist_cli.output import print_json, say
+
+
+def report(*files: Path, output: Path = Path("report.html"), force: bool = False, json: bool = False) -> None:
+    """Write a report of recordings or logs as one web page that needs no network.
+
+    It says in a sentence how much the tool vibrates; of several files, whether the others vibrate less than the first.
+
+    Args:
+        files: Recordings or logs in any format that tvist analyze reads. The first one is what others are compared
+            with.
+        output: File to write.
+        force: Replace an existing file.
+        json: Print the verdict as one JSON object.
+    """
+    if not files:
+        raise Failure("report needs at least one recording or log: tvist report run.mcap", code=2)
+    if output.exists() and not force:
+        raise Failure(f"{output} exists already: give --force to replace it, or --output")
+    from tvist_lab.recordings import RecordingError
+    from tvist_lab.recordings.whole_file import whole_file
+    from tvist_lab.report import recordings_page, render
+
+    with told(RecordingError):
+        page = recordings_page(files, shlex.join(["tvist", "report", *map(str, files)]))
+    with whole_file(output) as stream:
+        stream.write(render(page).encode())
+    if json:
+        print_json(
+            {"files": [str(file) for file in files], "report": str(output), "verdict": list(page.verdict)}
+        )
+        return
+    for sentence in page.verdict:
+        say(sentence)
+    say(f"the report is in {output}")

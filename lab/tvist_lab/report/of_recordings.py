@@ -1,0 +1,242 @@
+"""The report of one recording, or of several with the same motions."""
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from tvist_lab.figures.compared import compared_figure
+from tvist_lab.figures.ringing import ringing_figure
+from tvist_lab.metrics import (
+    Comparison,
+    MotionResult,
+    MotionRows,
+    NotMeasurableError,
+    compare,
+    measure,
+    motions,
+)
+from tvist_lab.recordings import Recording, read
+from tvist_lab.report.page import Page, PageTable, Picture, Section, picture
+from tvist_lab.report.verdict import verdict_on_one, verdict_on_two
+
+COLUMNS = {
+    "motion": "Number of the motion.",
+    "start s": "Time of the log at which the motion starts.",
+    "stop s": "Time of the log at which its target, the shaped reference, stops.",
+    "Δ ms": "Time by which shaping lengthens the reference.",
+    "t_stb ms": "Time from first entering a band of 0.03 mm around the attained position until staying inside.",
+    "t_cycle ms": "Time from the start until the tool stays inside that band.",
+    "e_os mm": "Overshoot: largest distance from the attained position after first entering the band.",
+    "RV m/s²": "Residual vibration: an exponential fitted to the peaks of 0.3 s after the stop, at the stop.",
+    "still after ms": "Last time the tool's acceleration exceeds 0.1 m/s², from the start of the motion.",
+    "peak m/s²": "Largest acceleration of the tool after the stop and the declared delay.",
+    "f_d Hz": "Damped frequency of the strongest mode after the stop, with its 95 % interval.",
+    "ζ": "Damping ratio of that mode, with its 95 % interval.",
+}
+"""Columns of the table of motions, and what they mean."""
+PICTURES = 6
+"""Largest number of motions that are drawn."""
+
+
+@dataclass(frozen=True)
+class _File:
+    path: Path
+    name: str
+    recording: Recording
+    motions: Sequence[MotionRows]
+    results: Sequence[MotionResult]
+
+
+def recordings_page(paths: Sequence[Path], command: str) -> Page:
+    """Build the report of recordings or logs; the first one is what the others are compared with.
+
+    Args:
+        paths: Files of any format that `tvist_lab.recordings.read` reads, at least one.
+        command: The command that makes the report, for its provenance.
+
+    Raises:
+        RecordingError: A file cannot be read, or has no joint angles; the message names it.
+    """
+    files = _files(paths)
+    base, *others = files
+    compared = [(other, compare(base.recording, other.recording)) for other in others]
+    sections = [Section("Motions", tables=[_table(file) for file in files])]
+    if compared:
+        sections.append(Section("Comparison", tables=[_changes(base, *pair) for pair in compared]))
+    sections.append(
+        Section("Vibration after the stop", pictures=list(_pictures(files, [c for _, c in compared])))
+    )
+    if missing := _missing(files):
+        sections.append(Section("What could not be measured, and why", points=missing))
+    sections.append(Section("What the columns mean", facts=COLUMNS))
+    sections += [Section(f"Provenance of {file.name}", facts=_provenance(file)) for file in files]
+    sections.append(Section("This report", facts={"Command": command}))
+    title = f"Vibration of {' and '.join(file.name for file in files)}"
+    return Page(title, _verdict(base, compared), sections)
+
+
+def recordings_verdict(paths: Sequence[Path]) -> list[str]:
+    """Return the sentences of the report's verdict, without its tables and figures.
+
+    Raises:
+        RecordingError: A file cannot be read, or has no joint angles; the message names it.
+    """
+    base, *others = _files(paths)
+    return _verdict(base, [(other, compare(base.recording, other.recording)) for other in others])
+
+
+def _verdict(base: _File, compared: Sequence[tuple[_File, Comparison]]) -> list[str]:
+    if not compared:
+        return verdict_on_one(base.results, base.name)
+    sentences = [
+        sentence
+        for other, comparison in compared
+        for sentence in verdict_on_two(comparison, base.results, other.results, (base.name, other.name))
+    ]
+    return list(dict.fromkeys(sentences))
+
+
+def _files(paths: Sequence[Path]) -> list[_File]:
+    return [_file(path, name) for path, name in zip(paths, _names(paths), strict=True)]
+
+
+def _file(path: Path, name: str) -> _File:
+    recording = read(path)
+    found = motions(recording)
+    return _File(path, name, recording, found, [measure(recording, motion) for motion in found])
+
+
+def _names(paths: Sequence[Path]) -> list[str]:
+    """Names of the files; with their folders where two are equal."""
+    names = [path.name or str(path) for path in paths]
+    return [str(path) if names.count(name) > 1 else name for path, name in zip(paths, names, strict=True)]
+
+
+def _table(file: _File) -> PageTable:
+    rows = [
+        (
+            str(index),
+            f"{result.start_s:.3f}",
+            f"{result.stop_s:.3f}",
+            _text(result.delay_ms, 0),
+            _text(result.stabilisation_ms, 0),
+            _text(result.cycle_ms, 0),
+            _text(None if result.overshoot_m is None else 1e3 * result.overshoot_m, 3),
+            _text(result.residual_vibration_m_s2, 2),
+            _text(result.still_after_ms, 0),
+            _text(result.peak_m_s2, 2),
+            _text(result.f_d_hz, 2, result.f_d_interval_hz),
+            _text(result.zeta, 3, result.zeta_interval),
+        )
+        for index, result in enumerate(file.results, 1)
+    ]
+    return PageTable(tuple(COLUMNS), rows, file.name)
+
+
+def _text(value: float | None, digits: int, interval: tuple[float, float] | None = None) -> str:
+    if value is None:
+        return "–"
+    text = f"{value:.{digits}f}"
+    return text if interval is None else f"{text} ({interval[0]:.{digits}f}–{interval[1]:.{digits}f})"
+
+
+def _changes(base: _File, other: _File, comparison: Comparison) -> PageTable:
+    rows = [
+        (
+            f"{one.a} and {one.b}",
+            *(
+                "–" if change is None else f"{round(change):+d} %"
+                for change in (
+                    one.impact_percent[name]
+                    for name in (
+                        "residual_vibration",
+                        "peak",
+                        "still_after",
+                        "stabilisation",
+                        "cycle",
+                        "overshoot",
+                    )
+                )
+            ),
+        )
+        for one in comparison.motions
+    ]
+    for numbers, name in ((comparison.only_in_a, base.name), (comparison.only_in_b, other.name)):
+        rows += [(f"{number}, only in {name}", *["–"] * 6) for number in numbers]
+    columns = ("motions", "RV", "peak", "still after", "t_stb", "t_cycle", "e_os")
+    return PageTable(columns, rows, f"From {base.name} to {other.name}")
+
+
+def _pictures(files: Sequence[_File], comparisons: Sequence[Comparison]) -> Iterator[Picture]:
+    """The strongest vibrations first in time: one picture for each motion, then one of how the loudest one rings."""
+    base = files[0]
+    for index, motion in list(enumerate(base.motions, 1))[:PICTURES]:
+        curves = [(base.name, (base.recording, motion))]
+        for file, comparison in zip(files[1:], comparisons, strict=True):
+            partner = next((one.b for one in comparison.motions if one.a == index), None)
+            if partner is not None:
+                curves.append((file.name, (file.recording, file.motions[partner - 1])))
+        try:
+            figure = compared_figure(f"Motion {index}", curves[:4])
+        except NotMeasurableError:
+            continue
+        yield picture(figure, f"Acceleration of the tool around the stop of motion {index}, without gravity.")
+    for file in files:
+        loudest = max(enumerate(file.results), key=lambda one: one[1].peak_m_s2 or 0.0, default=None)
+        if loudest is None or loudest[1].peak_m_s2 is None:
+            continue
+        index = loudest[0]
+        figure = ringing_figure(f"{file.name}, motion {index + 1}", (file.recording, file.motions[index]))
+        caption = (
+            f"How the tool rings after motion {index + 1} of {file.name}: course, spectrum and spectrogram."
+        )
+        yield picture(figure, caption)
+
+
+def _missing(files: Sequence[_File]) -> list[str]:
+    """One item for each reason, with the figures and motions that it concerns."""
+    items = []
+    for file in files:
+        places: dict[str, dict[str, list[int]]] = {}
+        for index, result in enumerate(file.results, 1):
+            for name, why in result.notes.items():
+                places.setdefault(why, {}).setdefault(name, []).append(index)
+        for why, names in places.items():
+            numbers = sorted({index for indices in names.values() for index in indices})
+            which = (
+                "all motions"
+                if len(numbers) == len(file.results)
+                else f"motion {', '.join(map(str, numbers))}"
+            )
+            items.append(f"{file.name}, {which}: {', '.join(names)}: {why}")
+        if len(file.motions) > PICTURES:
+            items.append(f"{file.name}: only the first {PICTURES} of {len(file.motions)} motions are drawn")
+    return items
+
+
+def _provenance(file: _File) -> Mapping[str, str]:
+    recording = file.recording
+    facts = {"File": str(file.path)}
+    if file.path.is_file():
+        with file.path.open("rb") as stream:
+            facts["SHA-256"] = hashlib.file_digest(stream, "sha256").hexdigest()
+        facts["Size"] = f"{file.path.stat().st_size} bytes"
+    facts["Rows"] = (
+        f"{len(recording)}, one every {1e3 * recording.period:g} ms, from {recording.time[0]:.3f} to "
+        f"{recording.time[-1]:.3f} s; {recording.missing_ticks} are missing"
+    )
+    info = recording.info
+    if info is not None:
+        payload = info.payload
+        facts |= {
+            "Robot": f"{info.name}, model {info.model}, tvist {info.version}",
+            "Shaper when the recording began": f"{info.shaper}, {info.modes} mode{'' if info.modes == 1 else 's'}",
+            "Declared payload": f"{payload.mass:g} kg",
+        }
+    if recording.foreign:
+        facts["Recorded by"] = "another controller; gravity is what the sensor shows at rest"
+    facts["Columns"] = ", ".join(sorted(recording.columns))
+    if recording.notes:
+        facts["Left out when reading"] = "; ".join(recording.notes)
+    return facts

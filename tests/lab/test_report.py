@@ -1,0 +1,114 @@
+"""A report answers its question in a sentence, from what the files show and not from what they are called."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import html5lib
+import pytest
+from tests.lab.synthetic_logs import SyntheticLog
+
+from tvist_lab.metrics import MotionResult
+from tvist_lab.recordings import RecordingError
+from tvist_lab.report import recordings_page, recordings_verdict, render
+from tvist_lab.report.verdict import shaping_of, verdict_on_one
+
+LOUD, QUIET = ((9.0, 0.12, 1.0),), ((9.0, 0.12, 0.2),)
+JOURNAL = Path(__file__).parents[1] / "journals/moves_with_every_shaper.mcap"
+
+
+def log(tmp_path, name, modes, *, shaped_by=None, seed=1):
+    """A log of this controller's RTDE: `target_q` before shaping and `shaped_q` after it."""
+    made = SyntheticLog(modes=modes, seed=seed)
+    if shaped_by is not None:
+        ticks = round(shaped_by / 0.002)
+        made.columns["shaped_q"] = made.columns["target_q"].copy()
+        early = made.columns["target_q"]
+        early[: -ticks or None] = early[ticks:].copy()
+        if ticks:
+            early[-ticks:] = early[-ticks - 1]
+    return made.csv(tmp_path / name)
+
+
+def test_less_vibration_is_said_with_its_figures_and_that_it_was_shaped(tmp_path):
+    verdict = recordings_verdict(
+        [
+            log(tmp_path, "before.csv", LOUD, shaped_by=0.0),
+            log(tmp_path, "after.csv", QUIET, shaped_by=0.05, seed=2),
+        ]
+    )
+    assert re.match(r"after.csv vibrates (7\d|8\d) % less after its stops than before.csv", verdict[0])
+    assert "before.csv was not shaped: its target ends together with its reference." in verdict
+    assert re.fullmatch(
+        r"after.csv was shaped: its target ends (4[6-9]|50) ms after its reference.", verdict[2]
+    )
+
+
+def test_an_unshaped_run_that_is_called_shaped_is_found_out(tmp_path):
+    files = [
+        log(tmp_path, "unshaped.csv", LOUD, shaped_by=0.0),
+        log(tmp_path, "shaped.csv", LOUD, shaped_by=0.0, seed=2),
+    ]
+    verdict = recordings_verdict(files)
+    assert verdict[0].startswith("shaped.csv vibrates as much as unshaped.csv after its stops")
+    assert "shaped.csv was not shaped: its target ends together with its reference." in verdict
+    alone = recordings_verdict(files[1:])
+    assert "vibrates noticeably after 2 of 2 stops" in alone[0]
+    assert "shaped.csv was not shaped: its target ends together with its reference." in alone
+
+
+def test_shaping_is_not_given_the_credit_where_there_was_none(tmp_path):
+    files = [
+        log(tmp_path, "a.csv", LOUD, shaped_by=0.0),
+        log(tmp_path, "b.csv", QUIET, shaped_by=0.0, seed=2),
+    ]
+    assert "So shaping is not the reason why b.csv vibrates less." in recordings_verdict(files)
+
+
+def test_more_vibration_and_none_at_all_are_said(tmp_path):
+    quiet, loud = log(tmp_path, "quiet.csv", QUIET), log(tmp_path, "loud.csv", LOUD, seed=2)
+    assert re.match(r"loud.csv vibrates \d+ % more", recordings_verdict([quiet, loud])[0])
+    still = [log(tmp_path, f"{n}.csv", ((9.0, 0.1, 0.02),), seed=n) for n in (3, 4)]
+    assert recordings_verdict(still)[0].startswith("Neither 3.csv nor 4.csv vibrates noticeably")
+
+
+def test_files_without_a_common_motion_are_not_compared(tmp_path):
+    other = SyntheticLog(joints=7).csv(tmp_path / "other.csv")
+    verdict = recordings_verdict([log(tmp_path, "a.csv", LOUD), other])
+    assert verdict[0] == "a.csv and other.csv have no motion in common, so nothing is compared."
+
+
+def test_what_was_not_measured_decides_nothing():
+    unknown = MotionResult(start_s=0.0, stop_s=1.0)
+    assert shaping_of([unknown], "x").shaped is None
+    assert "no vibration could be measured" in verdict_on_one([unknown], "x")[0]
+    assert verdict_on_one([], "x") == ["x contains no motion."]
+    assert shaping_of([replace(unknown, delay_ms=38.0)], "x").shaped is True
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    hostile = SyntheticLog().csv(folder / "<script>alert(1)</script>&.csv".replace("/", "_"))
+    return render(recordings_page([hostile, JOURNAL], "tvist report"))
+
+
+def test_the_page_is_valid_and_small_and_loads_nothing(page):
+    html5lib.HTMLParser(strict=True).parse(page)
+    assert len(page.encode()) < 5e6
+    for address in re.findall(r'(?:src|href)="([^"]*)"', page):
+        assert address.startswith("data:")
+    assert not re.search(r"https?://|@import|url\(|<script", page)
+    assert page.count("<img") == page.count('alt="') > 1
+
+
+def test_the_same_files_give_the_same_page(page, tmp_path):
+    again = SyntheticLog().csv(tmp_path / "<script>alert(1)</script>&.csv".replace("/", "_"))
+    other = render(recordings_page([again, JOURNAL], "tvist report"))
+    assert re.sub(r"<dt>File</dt>\n<dd>.*", "", other) == re.sub(r"<dt>File</dt>\n<dd>.*", "", page)
+
+
+def test_a_file_that_is_no_recording_is_refused(tmp_path):
+    (tmp_path / "notes.txt").write_text("nothing\n")
+    with pytest.raises(RecordingError, match=r"notes.txt"):
+        recordings_page([tmp_path / "notes.txt"], "")
