@@ -1,9 +1,11 @@
 """`tvist analyze`: measure the motions of a recording."""
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tvist_cli.failure import told
+from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import number, out, print_json, say, table
 
 if TYPE_CHECKING:
@@ -15,15 +17,23 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def analyze(file: Path, *, figures: Path | None = None, json: bool = False) -> None:
+def analyze(
+    file: Path,
+    *,
+    figures: Path | None = None,
+    look: FigureOptions = AS_USUAL,
+    json: bool = False,
+) -> None:
     """Measure each motion of a recording and print the columns of the paper's Table 2.
 
     Args:
         file: MCAP file that `tvist serve --record` or `tvist record` wrote.
-        figures: Folder for a figure of each motion.
+        figures: Folder for two figures of each motion: what was recorded, and the ring-down after it.
+        look: How to write the figures.
         json: Print one JSON object.
     """
-    from tvist_lab.metrics import measure, motions
+    look.check(figures)
+    from tvist_lab.metrics import NotMeasurableError, measure, motions
     from tvist_lab.recordings import RecordingError
     from tvist_lab.recordings.mcap_file import read
 
@@ -35,12 +45,14 @@ def analyze(file: Path, *, figures: Path | None = None, json: bool = False) -> N
     if content.note:
         say(f"{file}: {content.note}")
     if figures is not None:
-        from tvist_lab.figures import observed_figure, save
+        from tvist_lab.figures import observed_figure, ring_down_figure
 
-        figures.mkdir(parents=True, exist_ok=True)
+        files = look.into(figures)
         for index, motion in enumerate(found, 1):
-            drawn = observed_figure(f"motion {index}", (recording, motion))
-            say(str(save(drawn, figures / f"motion_{index}.png")))
+            name, recorded = f"motion {index}", (recording, motion)
+            write(files, {f"motion_{index}": observed_figure(name, recorded)})
+            with suppress(NotMeasurableError):
+                write(files, {f"ring_down_{index}": ring_down_figure(name, recorded)})
     if json:
         print_json(
             {"file": str(file), "motions": [result.as_dict() for result in results], "note": content.note}
