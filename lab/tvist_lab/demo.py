@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from tvist_lab.figures import FigureFiles
 from tvist_lab.metrics import NotMeasurableError
-from tvist_lab.paper.drawing import draw, draw_overview
+from tvist_lab.paper.drawing import draw, overview
 from tvist_lab.paper.experiment import Experiment, judge, run, table_1
 from tvist_lab.paper.methods import TimeVarying, Unshaped
 from tvist_lab.paper.published import MOTIONS
@@ -47,22 +48,23 @@ class Demo:
         return self.difference is None and bool(self.report["recording_gives_same_figures"])
 
 
-def run_demo(folder: Path, seed: int, progress: Callable[[str], None]) -> Demo:
+def run_demo(files: FigureFiles, seed: int, progress: Callable[[str], None]) -> Demo:
     """Run the demonstration.
 
     The figures come from the server's own recording, which is complete however busy the machine is. The figures from
     the messages that this client received are compared with them.
 
     Args:
-        folder: Folder for recording and figures; the recording of an earlier demonstration in it is replaced.
+        files: Folder for recording and figures, and how the latter are written; the recording of an earlier
+            demonstration in it is replaced.
         seed: Seed of noise and gear errors.
         progress: Called after each motion.
 
     Raises:
         DemoError: The robot did not start or disconnected, or its recording cannot be measured.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / "demo.mcap"
+    files.folder.mkdir(parents=True, exist_ok=True)
+    path = files.folder / "demo.mcap"
     path.unlink(missing_ok=True)
     try:
         done, live = asyncio.run(_run(path, seed, progress))
@@ -81,8 +83,8 @@ def run_demo(folder: Path, seed: int, progress: Callable[[str], None]) -> Demo:
     return Demo(
         report=report,
         recording=path,
-        overview=draw_overview(done, ANSWERED, folder),
-        figures=draw(done, folder, all_figures=False),
+        overview=files.write(overview(done, ANSWERED), "vibration-with-and-without-shaping"),
+        figures=[files.write(figure, name) for name, figure in draw(done, all_figures=False).items()],
         difference=again.first_difference,
     )
 

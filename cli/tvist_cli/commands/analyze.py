@@ -4,9 +4,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tvist_cli.failure import told
+from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import number, out, print_json, say, table
 
 if TYPE_CHECKING:
+    from tvist_lab.figures import FigureFiles
     from tvist_lab.metrics import MotionResult, MotionRows
     from tvist_lab.recordings import Recording
 
@@ -16,7 +18,13 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def analyze(file: Path, *, figures: Path | None = None, json: bool = False) -> None:
+def analyze(
+    file: Path,
+    *,
+    figures: Path | None = None,
+    look: FigureOptions = AS_USUAL,
+    json: bool = False,
+) -> None:
     """Measure each motion of a recording or a robot's log, and print the columns of the paper's Table 2.
 
     Frequency and damping have 95 % intervals. A dash has its reason in a line below the table.
@@ -24,9 +32,11 @@ def analyze(file: Path, *, figures: Path | None = None, json: bool = False) -> N
     Args:
         file: Recording of `tvist serve --record`, `tvist record` or `tvist export`; or a log of another robot: CSV
             with RTDE's names, a dump of UR's port 30003, a rosbag2 in MCAP.
-        figures: Folder for a figure of each motion.
+        figures: Folder for the figures of each motion: what was recorded, and the ring-down after it.
+        look: How to write the figures.
         json: Print one JSON object.
     """
+    look.check(figures)
     from tvist_lab.metrics import measure, motions
     from tvist_lab.recordings import RecordingError, read
 
@@ -37,7 +47,7 @@ def analyze(file: Path, *, figures: Path | None = None, json: bool = False) -> N
     for note in recording.notes:
         say(f"{file}: {note}")
     if figures is not None:
-        _draw(recording, found, figures)
+        _draw(recording, found, look.into(figures))
     if json:
         print_json(
             {
@@ -52,25 +62,20 @@ def analyze(file: Path, *, figures: Path | None = None, json: bool = False) -> N
         out.print(note)
 
 
-def _draw(recording: "Recording", found: "list[MotionRows]", folder: Path) -> None:
-    """Write a figure of each motion, as far as it was recorded, and one of its vibration after the stop."""
-    from tvist_lab.figures import observed_figure, ringing_figure, save
+def _draw(recording: "Recording", found: "list[MotionRows]", files: "FigureFiles") -> None:
+    """Write the figures of each motion; what a log does not contain has none."""
+    from tvist_lab.figures import observed_figure, ring_down_figure
     from tvist_lab.metrics import NotMeasurableError
 
-    folder.mkdir(parents=True, exist_ok=True)
-    kinds = (
-        {"ringing": ringing_figure}
-        if recording.foreign
-        else {"motion": observed_figure, "ringing": ringing_figure}
-    )
+    kinds = {"ring_down": ring_down_figure}
+    if not recording.foreign:
+        kinds = {"motion": observed_figure, **kinds}
     for index, motion in enumerate(found, 1):
         for kind, figure_of in kinds.items():
             try:
-                drawn = figure_of(f"motion {index}", (recording, motion))
+                write(files, {f"{kind}_{index}": figure_of(f"motion {index}", (recording, motion))})
             except NotMeasurableError as error:
-                say(f"motion {index}: no figure of its {kind}: {error}")
-            else:
-                say(str(save(drawn, folder / f"{kind}_{index}.png")))
+                say(f"motion {index}: no figure {kind}: {error}")
 
 
 def _row(index: int, result: "MotionResult") -> tuple[str, ...]:

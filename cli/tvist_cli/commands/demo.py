@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from tvist_cli.failure import Failure, told
+from tvist_cli.figure_files import AS_USUAL, FigureOptions
 from tvist_cli.output import out, print_json, program, progress, words
 from tvist_cli.tables import print_paper
 from tvist_cli.tracks import recorded, show_tracks
@@ -17,6 +18,7 @@ def demo(
     seed: int = 0,
     tables: bool = False,
     view: bool = False,
+    look: FigureOptions = AS_USUAL,
     json: bool = False,
 ) -> None:
     """Serve a robot, run the paper's motions on it over Zenoh in real time, unshaped and shaped, and say what happened.
@@ -26,8 +28,10 @@ def demo(
         seed: Seed of sensor noise and gear errors.
         tables: Print the paper's tables beside those of this run as well.
         view: Show the motions afterwards on a web page, with the arm's bending drawn 100 times larger.
+        look: How to write the figures.
         json: Print one JSON object with all results.
     """
+    files = look.into(output)
     from tvist_lab.demo import ANSWERED, DemoError, run_demo
     from tvist_lab.paper.answer import answer, checks, terms
     from tvist_lab.paper.experiment import count
@@ -40,7 +44,7 @@ def demo(
         def advance(what: str) -> None:
             bar(1, what)
 
-        result = run_demo(output, seed, advance)
+        result = run_demo(files, seed, advance)
     if json:
         print_json(result.report)
     else:

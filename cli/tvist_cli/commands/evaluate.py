@@ -7,7 +7,8 @@ from cyclopts import Parameter
 
 from tvist_cli.evaluated import print_evaluation
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import err, print_json, progress
+from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
+from tvist_cli.output import print_json, progress
 from tvist_cli.shapers_of import loaded
 from tvist_cli.simulated_arm import disturbed, masses_of, named
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from tvist_lab.evaluation.conditions import Conditions
     from tvist_lab.evaluation.evaluate import JudgedMove, MoveJob
     from tvist_lab.evaluation.moves import Move
+    from tvist_lab.figures import FigureFiles
     from tvist_plant.description import RobotDescription
     from tvist_protocol.calibration import Calibration
 
@@ -42,6 +44,7 @@ def evaluate(
     baselines: Annotated[bool, Parameter(negative="--no-baselines")] = True,
     save_moves: Path | None = None,
     figures: Path | None = None,
+    look: FigureOptions = AS_USUAL,
     json: bool = False,
 ) -> None:
     """Simulate moves unshaped and shaped, as fast as possible, and report the vibration after each.
@@ -78,6 +81,7 @@ def evaluate(
         baselines: Run the baselines as well; this takes three and a half times as long.
         save_moves: File to write the moves and their payloads to.
         figures: Folder to write figures to.
+        look: How to write the figures.
         json: Print one JSON object.
     """
     from tvist_lab.evaluation.evaluate import MoveJob, report
@@ -85,6 +89,7 @@ def evaluate(
     from tvist_lab.evaluation.running import ShaperFaultError
     from tvist_plant.description import DescriptionError, load
 
+    look.check(figures)
     _check(moves, random, seed, modes, frequency_error, wrists=wrists)
     conditions = _conditions(limits, payload_error, stiffness_error)
     length = _stroke(stroke, moves)
@@ -96,7 +101,7 @@ def evaluate(
     shaper, own = loaded(shaper)
     known = _calibration(calibration, shaper, own, modes, description)
     chosen, share = _moves(moves, random, seed, masses, description, length, wrists=wrists)
-    drawn, chosen = len(chosen), chosen if streams else _feasible(chosen, description, conditions)
+    wanted, chosen = len(chosen), chosen if streams else _feasible(chosen, description, conditions)
     plant, kept = disturbed(description, disturbances, clean=clean)
     recipe, others = _recipe(shaper, own, modes, known, plant, frequency_error, masses, baselines=baselines)
     if streams:  # the end of a stream is not known
@@ -121,7 +126,7 @@ def evaluate(
             except ShaperFaultError as fault:
                 raise Failure(f"shaper {shaper} {fault}") from fault
         if figures is not None:
-            _draw(jobs, judged, figures)
+            _draw(jobs, judged, look.into(figures))
     from tvist_lab.evaluation.moves import collisions
 
     met = collisions(description, chosen) if moves is not None and not streams else []
@@ -139,9 +144,9 @@ def evaluate(
         **report(jobs, judged),
     }
     result["notes"] = _notes(result, met, known, chosen, share)
-    if len(chosen) < drawn:
+    if len(chosen) < wanted:
         result["notes"].append(
-            f"{drawn - len(chosen)} of {drawn} moves were left out: the drives are too weak"
+            f"{wanted - len(chosen)} of {wanted} moves were left out: the drives are too weak"
         )
     if baselines and not others:
         result["notes"].append("there are no baselines: they need a calibration of this arm")
@@ -289,15 +294,19 @@ def _arm_seed(seed: int, place: int) -> int:
     return (1_000_003 * seed + place) % 2**63
 
 
-def _draw(jobs: list["MoveJob"], judged: list["JudgedMove"], folder: Path) -> None:
+def _draw(jobs: list["MoveJob"], judged: list["JudgedMove"], files: "FigureFiles") -> None:
     from tvist_lab.evaluation.evaluate import record
-    from tvist_lab.figures import residual_by_move_figure, save, vibration_figure
+    from tvist_lab.figures import residual_by_move_figure, vibration_figure
 
-    err.print(str(save(residual_by_move_figure(judged), folder / "moves.png")))
-    middle = sorted(range(len(judged)), key=lambda place: judged[place].unshaped.peak)[
-        -(len(judged) // 2 + 1)
-    ]
-    err.print(str(save(vibration_figure(*record(jobs[middle]), middle + 1), folder / "one_move.png")))
+    counted = [place for place, one in enumerate(judged) if one.counts] or list(range(len(judged)))
+    middle = sorted(counted, key=lambda place: judged[place].unshaped.peak)[len(counted) // 2]
+    write(
+        files,
+        {
+            "moves": residual_by_move_figure(judged),
+            "one_move": vibration_figure(*record(jobs[middle]), middle + 1),
+        },
+    )
 
 
 def _notes(

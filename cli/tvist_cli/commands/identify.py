@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
+from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.identified import report_modal, report_payload, report_polynomial
-from tvist_cli.output import err, progress
+from tvist_cli.output import progress
 from tvist_cli.poses import pose
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ def identify(
     seed: int = 0,
     at: list[str] | None = None,
     figures: Path | None = None,
+    look: FigureOptions = AS_USUAL,
     json: bool = False,
 ) -> None:
     """Excite the arm, fit its vibration and write a calibration; or identify the payload.
@@ -78,6 +80,7 @@ def identify(
         at: Poses to measure with more weight (polynomial): names from the robot file, or angles separated by commas
             [all poses of the robot file].
         figures: Folder to write a figure of the fit to (polynomial).
+        look: How to write the figures.
         json: Print one JSON object.
     """
     if min(configurations, repeats, ring_downs, poses) < 1:
@@ -89,6 +92,7 @@ def identify(
         raise Failure(
             f"{which} is for the polynomial model: leave it out, or give --model polynomial", code=2
         )
+    look.check(figures)
     if not output.absolute().parent.is_dir():  # said before half an hour of jogs
         raise Failure(f"output is {output}: its folder does not exist", code=2)
     endpoint, mass = _endpoint_and_mass(endpoint, payload)
@@ -106,7 +110,7 @@ def identify(
         _modal(place, arm, ring_downs, masses, output, called, json=json)
     else:
         anchors = place.anchors(at)
-        _polynomial(place, arm, anchors, configurations, repeats, output, called, figures, json=json)
+        _polynomial(place, arm, anchors, configurations, repeats, output, called, figures, look, json=json)
 
 
 class _Place:
@@ -182,6 +186,7 @@ def _polynomial(
     output: Path,
     name: str,
     figures: Path | None,
+    look: FigureOptions,
     *,
     json: bool,
 ) -> None:
@@ -204,13 +209,12 @@ def _polynomial(
             )
         output.write_bytes(calibration_to_json(done.calibration))
     if figures is not None:
-        from tvist_lab.figures import identified_figure, save
+        from tvist_lab.figures import identified_figure
 
-        figures.mkdir(parents=True, exist_ok=True)
-        drawn = identified_figure(
+        identification = identified_figure(
             done.calibration, done.q, done.f_d, done.zeta, done.true_f_d, done.true_zeta
         )
-        err.print(str(save(drawn, figures / "identification.png")))
+        write(look.into(figures), {"identification": identification})
     found, own = done.calibration.payload.mass, arm.payload.mass
     options = place.options if found == own else f"{place.options} --payload {found:g}"
     report_polynomial(done, output, options, json=json)

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tvist_cli.failure import told
-from tvist_cli.output import err, out, print_json, progress, table
+from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
+from tvist_cli.output import out, print_json, progress, table
 from tvist_cli.pages import serve_page
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ def lesson(
     *,
     numbers: bool = False,
     figures: Path | None = None,
+    look: FigureOptions = AS_USUAL,
     markdown: Path | None = None,
     address: str = "127.0.0.1",
     port: int = 8080,
@@ -36,12 +38,14 @@ def lesson(
     Args:
         numbers: Print the tables of the arm with one flexible joint.
         figures: Folder to write figure 2 to.
+        look: How to write the figures.
         markdown: File to write a page with the formulas and the tables to.
         address: Address on which the page is served.
         port: Port on which the page is served; 0 takes a free one.
         insecure: Serve the page to other machines.
         json: Print one JSON object.
     """
+    look.check(figures)
     if not (numbers or json or figures is not None or markdown is not None):
         serve_page(_show, (address, port), "tvist lesson", insecure=insecure)
         return
@@ -52,9 +56,9 @@ def lesson(
         done = run.lesson(lambda: bar(1, None))
     with told(OSError):
         if figures is not None:
-            from tvist_lab.figures import figure_2, save
+            from tvist_lab.figures import figure_2
 
-            err.print(str(save(figure_2(done), figures / "figure_02.png")))
+            write(look.into(figures), {"figure_02": figure_2(done)})
         if markdown is not None:
             markdown.write_text(page(done, f"tvist lesson --markdown {markdown}"), encoding="utf-8")
     if json:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import err, print_json, progress
+from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
+from tvist_cli.output import print_json, progress
 from tvist_cli.tables import print_paper
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ def paper(
     runs: int = 10,
     seed: int = 0,
     figures: Path | None = None,
+    look: FigureOptions = AS_USUAL,
     calibration: str = "ur5e_5kg",
     baselines: Annotated[bool, Parameter(negative="--no-baselines")] = True,
     markdown: Path | None = None,
@@ -30,11 +32,13 @@ def paper(
         runs: Number of repetitions, each with different noise and gear errors.
         seed: Seed of the first repetition.
         figures: Folder to write figures 2, 4, 7, 12, 13, 14 and 16 to.
+        look: How to write the figures.
         calibration: Name of a calibration that comes with the package, or path of a calibration file.
         baselines: Run the baselines for comparison as well.
         markdown: File to write a page to, with all tables and the source of each figure.
         json: Print one JSON object.
     """
+    look.check(figures)
     if runs < 1:
         raise Failure(f"runs is {runs}: must be at least 1", code=2)
     from tvist_lab.in_process import free_setup, robot_in_process
@@ -58,8 +62,7 @@ def paper(
     if figures is not None:
         from tvist_lab.paper.drawing import draw
 
-        for path in draw(done, figures, all_figures=True):
-            err.print(str(path))
+        write(look.into(figures), draw(done, all_figures=True))
     result = as_dict(done)
     if markdown is not None:
         from tvist_lab.paper.markdown import page

@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import err, out, print_json, progress, say, table, words
+from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
+from tvist_cli.output import out, print_json, progress, say, table, words
 from tvist_cli.simulated_arm import UNIFORM, disturbed, masses_of, named
 
 if TYPE_CHECKING:
     from tvist_lab.evaluation.paths import JudgedPath, PathJob
+    from tvist_lab.figures import FigureFiles
     from tvist_plant.description import RobotDescription
     from tvist_protocol.calibration import Calibration
 
@@ -32,6 +34,7 @@ def paths(
     disturbances: str | None = None,
     markdown: Path | None = None,
     figures: Path | None = None,
+    look: FigureOptions = AS_USUAL,
     json: bool = False,
 ) -> None:
     """Simulate random paths of a UR5e's tool, each shaped along the path and joint by joint, and compare.
@@ -53,6 +56,7 @@ def paths(
         disturbances: Disturbances to simulate, separated by commas: friction, gear, noise, or none [all].
         markdown: File to write the tables to.
         figures: Folder to write figures to.
+        look: How to write the figures.
         json: Print one JSON object.
     """
     from tvist_lab.evaluation.path_examples import circle
@@ -61,6 +65,7 @@ def paths(
     from tvist_lab.evaluation.random_paths import KINDS
     from tvist_plant.description import load
 
+    look.check(figures)
     _check(random, seed)
     description, known = load(ROBOT), _calibration(calibration)
     masses = masses_of(payload, description)
@@ -84,7 +89,7 @@ def paths(
         if markdown is not None:
             markdown.write_text(page(result), encoding="utf-8")
         if figures is not None:
-            _draw(result["paths"], plant, known, figures)
+            _draw(result["paths"], plant, known, look.into(figures))
     if json:
         print_json(result)
     else:
@@ -153,13 +158,16 @@ def _command(
 
 
 def _draw(
-    paths: list[dict[str, Any]], description: "RobotDescription", known: "Calibration", folder: Path
+    paths: list[dict[str, Any]], description: "RobotDescription", known: "Calibration", files: "FigureFiles"
 ) -> None:
     from tvist_lab.evaluation.path_examples import corner
-    from tvist_lab.figures import corner_figure, path_shaping_figure, save
+    from tvist_lab.figures import corner_figure, path_shaping_figure
 
-    err.print(str(save(path_shaping_figure(paths), folder / "path_shaping.png")))
-    err.print(str(save(corner_figure(corner(description, known)), folder / "path_corner.png")))
+    figures = {
+        "path_shaping": path_shaping_figure(paths),
+        "path_corner": corner_figure(corner(description, known)),
+    }
+    write(files, figures)
 
 
 def _print(result: dict[str, Any]) -> None:

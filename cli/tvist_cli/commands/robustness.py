@@ -7,7 +7,8 @@ from cyclopts import Parameter
 
 from tvist_cli.commands.shaperbench import candidates_of, modal_calibration
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import err, number, print_json, progress, table, write_json
+from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
+from tvist_cli.output import number, print_json, progress, table, write_json
 
 
 def robustness(
@@ -18,6 +19,7 @@ def robustness(
     calibration: str | None = None,
     output: Path | None = None,
     figures: Path | None = None,
+    look: FigureOptions = AS_USUAL,
     markdown: Path | None = None,
     json: bool = False,
 ) -> None:
@@ -34,6 +36,7 @@ def robustness(
             model [ur5e_modal].
         output: JSON file to write the result to.
         figures: Folder to write a figure of reduction against delay to.
+        look: How to write the figures.
         markdown: File to write a page with the tables to.
         json: Print one JSON object.
     """
@@ -42,6 +45,7 @@ def robustness(
     from tvist_lab.evaluation.shaperbench import draw
     from tvist_plant.description import load
 
+    look.check(figures)
     if not 1 <= moves <= 10_000:
         raise Failure(f"moves is {moves}: must be 1 to 10000", code=2)
     if not 0 <= seed < 2**62:
@@ -67,7 +71,7 @@ def robustness(
         "calibration": known.name,
         "shapers": robust.robustness_report(standing, jobs, done),
     }
-    _write(result, output, figures, markdown)
+    _write(result, output, markdown, figures, look)
     if json:
         print_json(result)
         return
@@ -88,7 +92,13 @@ def _row(row: dict[str, Any], kind: str, names: list[str]) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def _write(result: dict[str, Any], output: Path | None, figures: Path | None, markdown: Path | None) -> None:
+def _write(
+    result: dict[str, Any],
+    output: Path | None,
+    markdown: Path | None,
+    figures: Path | None,
+    look: FigureOptions,
+) -> None:
     with told(OSError):
         if output is not None:
             write_json(output, result)
@@ -97,6 +107,6 @@ def _write(result: dict[str, Any], output: Path | None, figures: Path | None, ma
 
             markdown.write_text(robustness_page(result), encoding="utf-8")
         if figures is not None:
-            from tvist_lab.figures import robustness_figure, save
+            from tvist_lab.figures import robustness_figure
 
-            err.print(str(save(robustness_figure(result["shapers"]), figures / "robustness.png")))
+            write(look.into(figures), {"robustness": robustness_figure(result["shapers"])})

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import err, number, out, print_json, progress, say, table, write_json
+from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
+from tvist_cli.output import number, out, print_json, progress, say, table, write_json
 from tvist_cli.shapers_of import load_given
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ def shaperbench(
     calibration: str | None = None,
     output: Path | None = None,
     figures: Path | None = None,
+    look: FigureOptions = AS_USUAL,
     markdown: Path | None = None,
     json: bool = False,
 ) -> None:
@@ -50,7 +52,8 @@ def shaperbench(
         calibration: Name of a calibration that comes with the package, or path of a calibration file; it needs a modal
             model [ur5e_modal].
         output: JSON file to write the leaderboard to.
-        figures: Folder to write a figure of settling time against residual vibration to.
+        figures: Folder to write figures of settling time against residual vibration and against delay to.
+        look: How to write the figures.
         markdown: File to write a page with the tables to.
         json: Print one JSON object.
     """
@@ -59,6 +62,7 @@ def shaperbench(
     from tvist_lab.evaluation.arms import ARMS
     from tvist_plant.description import load
 
+    look.check(figures)
     count = moves if moves is not None else QUICK if quick else MOVES
     if not 1 <= count <= 10_000:
         raise Failure(f"moves is {count}: must be 1 to 10000", code=2)
@@ -93,7 +97,7 @@ def shaperbench(
         "calibration": known.name,
         **leaderboard.leaderboard(standing, faults, jobs, done, bent),
     }
-    _write(result, output, figures, markdown)
+    _write(result, output, markdown, figures, look)
     if json:
         print_json(result)
     else:
@@ -170,7 +174,13 @@ def _command(
     return " ".join([*words, f"--moves {count} --seed {seed}"])
 
 
-def _write(result: dict[str, Any], output: Path | None, figures: Path | None, markdown: Path | None) -> None:
+def _write(
+    result: dict[str, Any],
+    output: Path | None,
+    markdown: Path | None,
+    figures: Path | None,
+    look: FigureOptions,
+) -> None:
     with told(OSError):
         if output is not None:
             write_json(output, result)
@@ -179,9 +189,10 @@ def _write(result: dict[str, Any], output: Path | None, figures: Path | None, ma
 
             markdown.write_text(page(result), encoding="utf-8")
         if figures is not None:
-            from tvist_lab.figures import pareto_figure, save
+            from tvist_lab.figures import pareto_figure, settling_figure
 
-            err.print(str(save(pareto_figure(result["shapers"]), figures / "pareto.png")))
+            rows = result["shapers"]
+            write(look.into(figures), {"pareto": pareto_figure(rows), "settling": settling_figure(rows)})
 
 
 def _print(result: dict[str, Any]) -> None:

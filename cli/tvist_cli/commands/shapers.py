@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import told
-from tvist_cli.output import err, out, print_json, table
+from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
+from tvist_cli.output import out, print_json, table
 from tvist_cli.shapers_of import load_given
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ def shapers(
     zeta: float = 0.0,
     shaper: list[str] | None = None,
     figures: Path | None = None,
+    look: FigureOptions = AS_USUAL,
     json: bool = False,
 ) -> None:
     """List the input shapers that a robot can use, with their properties for one mode.
@@ -34,8 +36,10 @@ def shapers(
         shaper: FILE.py:NAME, repeatable: run that file and list the shaper in it, too.
         figures: Folder to write figures to: residual vibration for a wrong frequency, and the effects of a varying
             mean delay and of elastic feed-forward.
+        look: How to write the figures.
         json: Print one JSON object.
     """
+    look.check(figures)
     from tvist_shaping import BUILT_IN, SHAPERS, Registry, Shaper, ShapingError
     from tvist_shaping.named import OF_SEVERAL_MODES
 
@@ -46,13 +50,18 @@ def shapers(
     listed: list[AnyShaper] = [*SHAPERS.values(), *own.values()]
     found = [_about(one, f_d, zeta) for one in listed]
     if figures is not None:
-        from tvist_lab.figures import catalogue_figure, elastic_figure, mean_delay_figure, save
+        from tvist_lab.figures import catalogue_figure, elastic_figure, mean_delay_figure
 
         with told(OSError):
             of_impulses = [one for one in listed if isinstance(one, Shaper)]
-            err.print(str(save(catalogue_figure(of_impulses, zeta), figures / "shapers.png")))
-            err.print(str(save(mean_delay_figure(), figures / "mean_delay.png")))
-            err.print(str(save(elastic_figure(), figures / "elastic.png")))
+            write(
+                look.into(figures),
+                {
+                    "shapers": catalogue_figure(of_impulses, zeta),
+                    "mean_delay": mean_delay_figure(),
+                    "elastic": elastic_figure(),
+                },
+            )
     if json:
         others = [
             {

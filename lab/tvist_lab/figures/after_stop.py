@@ -8,7 +8,21 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from tvist_lab.figures.recorded import Recorded
-from tvist_lab.figures.style import FAINT, INK, MUTED, SHAPED, UNSHAPED, note, panels, title
+from tvist_lab.figures.style import (
+    FAINT,
+    INK,
+    LIMIT,
+    MUTED,
+    OF_SHAPED,
+    OF_UNSHAPED,
+    SHAPED,
+    UNSHAPED,
+    Series,
+    note,
+    panels,
+    tint,
+    title,
+)
 from tvist_lab.metrics import (
     NotMeasurableError,
     amplitude,
@@ -64,8 +78,8 @@ def after_stop_figure(unshaped: Recorded, shaped: Recorded, what: str) -> Figure
     before, after = (_curve(recorded, length) for recorded in (unshaped, shaped))
     figure, (panel,) = panels(1, 3.9)
     title(panel, f"{what}: the tool's vibration after the same motion, without and with shaping")
-    for curve, color in ((before, UNSHAPED), (after, SHAPED)):
-        _draw(panel, curve, color)
+    for curve, style in ((before, OF_UNSHAPED), (after, OF_SHAPED)):
+        _draw(panel, curve, style)
     top = HEADROOM * max(before.peak, after.peak, STILL)
     panel.set(
         xlim=(1e3 * SHOWN[0], 1e3 * SHOWN[1]),
@@ -76,18 +90,18 @@ def after_stop_figure(unshaped: Recorded, shaped: Recorded, what: str) -> Figure
     _name(panel, before, f"without shaping: {before.peak:.2f} m/s²", 0.90 * top, UNSHAPED)
     words = f"with shaping: {after.peak:.2f} m/s², {_change(before.peak, after.peak)}"
     _name(panel, after, words, 0.76 * top, SHAPED)
-    panel.axhline(STILL, color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)))
+    panel.axhline(STILL, color=FAINT, linewidth=0.9, linestyle=LIMIT)
     _compare_rest(panel, before.still, after.still)
     note(panel, "braking", (1e3 * SHOWN[0] + 5.0, 0.90 * top), color=MUTED)
     return figure
 
 
-def _draw(panel: Axes, curve: _Curve, color: str) -> None:
+def _draw(panel: Axes, curve: _Curve, style: Series) -> None:
     """A curve, with what counts as shaking filled."""
-    panel.plot(1e3 * curve.time, curve.alpha, color=color, linewidth=1.8)
+    panel.plot(1e3 * curve.time, curve.alpha, **style.line(1.8))
     shakes = curve.time[curve.counts], curve.alpha[curve.counts]
-    panel.fill_between(1e3 * shakes[0], shakes[1], color=color, alpha=0.2, linewidth=0.0)
-    panel.plot([1e3 * curve.at], [curve.peak], "o", color=color, markersize=6, zorder=5)
+    panel.fill_between(1e3 * shakes[0], shakes[1], color=tint(style.color), linewidth=0.0)
+    panel.plot([1e3 * curve.at], [curve.peak], "o", color=style.color, markersize=6, zorder=5)
 
 
 def _name(panel: Axes, curve: _Curve, words: str, height: float, color: str) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tvist_lab.figures.style import FAINT, INK, SHAPED, THIRD, UNSHAPED, note, panels, title
+from tvist_lab.figures.style import INK, LIMIT, OF_SHAPED, OF_UNSHAPED, SERIES, legend, note, panels, title
 from tvist_shaping import Shaper, residual
 
 FAMILIES = {
@@ -15,7 +15,6 @@ FAMILIES = {
     "Negative impulses: short, but beyond the reference's limits": ("um_zv", "um_zvd"),
 }
 """Panels and their shapers; those in none of them share a panel at the end."""
-COLORS = (UNSHAPED, SHAPED, THIRD, "#CC79A7", INK, "#E69F00", "#56B4E9", FAINT)
 SHOWN = (0.4, 1.7)
 """Range of the axis: true divided by assumed frequency [-]."""
 HIGHEST = 25.0
@@ -45,23 +44,28 @@ def catalogue_figure(shapers: Iterable[Shaper], zeta: float = 0.0) -> Figure:
     for panel, (words, group) in zip(axes, groups.items(), strict=False):
         title(panel, words)
         _curves(panel, group, zeta)
-    axes[len(groups) - 1].set_xlabel("True over assumed frequency")
+    axes[len(groups) - 1].set_xlabel("True over assumed frequency (–)")
     title(axes[-1], "What insensitivity costs")
     _price(axes[-1], list(shown.values()), zeta)
+    legend(figure, axes[-1])
     return figure
 
 
 def _curves(panel: Axes, shapers: Sequence[Shaper], zeta: float) -> None:
     f = np.linspace(*SHOWN, 1301)
-    colors: dict[str, str] = {}
-    for shaper in shapers:
+    for place, shaper in enumerate(shapers):
         left = 100.0 * residual(f, zeta, shaper.function(1.0, zeta))
-        dashes = "--" if shaper.name.endswith("_exact") else "-"
-        color = colors.setdefault(shaper.name.removesuffix("_exact"), COLORS[len(colors) % len(COLORS)])
-        panel.plot(f, left, color=color, linestyle=dashes, linewidth=1.5, label=shaper.name)
-    panel.axhline(100.0 * ALLOWED, color=INK, linewidth=0.8, linestyle=(0, (4, 3)))
-    panel.set(xlim=SHOWN, ylim=(0.0, HIGHEST), ylabel="Residual (%)")
-    panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False, labelcolor=INK)
+        panel.plot(f, left, **SERIES[place % len(SERIES)].line(label=shaper.name))
+    panel.axhline(100.0 * ALLOWED, color=INK, linewidth=0.8, linestyle=LIMIT)
+    panel.set(xlim=SHOWN, ylim=(0.0, HIGHEST), ylabel="Residual vibration (%)")
+    panel.legend(
+        loc="center left",
+        bbox_to_anchor=(1.0, 0.5),
+        fontsize=8,
+        frameon=False,
+        labelcolor=INK,
+        handlelength=3.0,
+    )
 
 
 def _price(panel: Axes, shapers: Sequence[Shaper], zeta: float) -> None:
@@ -72,8 +76,8 @@ def _price(panel: Axes, shapers: Sequence[Shaper], zeta: float) -> None:
         duration = shaper.function(1.0, zeta).duration
         points.setdefault((round(duration, 2), round(width, 2)), []).append(shaper)
     for place, group in sorted(points.items()):
-        color = SHAPED if group[0].peak == 1.0 else UNSHAPED
-        panel.plot(*place, "o", color=color, markersize=4.5)
+        style = OF_SHAPED if group[0].peak == 1.0 else OF_UNSHAPED
+        panel.plot(*place, **style.points(4.5))
         words = ", ".join(shaper.name for shaper in group)
         ends = place[0] > 1.7 or group[0].peak > 1.0
         above = 4 if words.endswith("_exact") and len(group) == 1 else 0
@@ -86,5 +90,7 @@ def _price(panel: Axes, shapers: Sequence[Shaper], zeta: float) -> None:
             ha="right" if ends else "left",
             va="center",
         )
-    panel.set(xlim=(0.0, 2.1), xlabel="Duration (damped periods)", ylabel="5 % band, width")
+    panel.set(xlim=(0.0, 2.1), xlabel="Duration (damped periods)", ylabel="Width of the 5 % band (–)")
     panel.margins(y=0.12)
+    panel.plot([], [], **OF_SHAPED.points(4.5, label="Keeps the reference's limits"))
+    panel.plot([], [], **OF_UNSHAPED.points(4.5, label="Exceeds them"))

@@ -6,19 +6,17 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tvist_lab.figures.recorded import Recorded
-from tvist_lab.figures.style import FAINT, SHAPED, THIRD, UNSHAPED, note, panels, title
+from tvist_lab.figures.style import FAINT, SERIES, note, panels, title
 from tvist_lab.metrics.common_clock import STILL
 from tvist_lab.metrics.felt import felt
 from tvist_lab.metrics.vibration import amplitude
 
 BEFORE, AFTER = 0.1, 0.6
 """Time shown before and after the stop in the first recording [s]."""
-LOOKS = ((UNSHAPED, "-"), (SHAPED, "--"), (THIRD, ":"), (FAINT, "-."))
-"""Colour and dashes of each recording; they can be told apart in grey, too."""
 
 
 def compared_figure(name: str, recorded: Sequence[tuple[str, Recorded]]) -> Figure:
-    """|α| of one motion in up to four recordings, on one clock that begins with the motion.
+    """|α| of one motion in up to eight recordings, on one clock that begins with the motion.
 
     Args:
         name: Name of the motion, used as the heading.
@@ -32,17 +30,17 @@ def compared_figure(name: str, recorded: Sequence[tuple[str, Recorded]]) -> Figu
     first, motion = recorded[0][1]
     stop = float(first.time[motion.arm_stop(first)] - first.time[motion.start])
     highest = STILL
-    for (label, (recording, its)), (color, dashes) in zip(recorded, LOOKS, strict=False):
+    for (label, (recording, its)), look in zip(recorded, SERIES, strict=False):
         time, alpha = felt(recording, its, slice(its.start, its.end), smooth=True)
         time = time - recording.time[its.start] - stop
         size = amplitude(alpha)
-        panel.plot(time, size, color=color, linestyle=dashes, linewidth=1.4, label=label)
+        panel.plot(time, size, **look.line(label=label))
         highest = max(highest, float(np.max(size[(time > 0.0) & (time < AFTER)], initial=0.0)))
     panel.axhline(STILL, color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)))
     note(panel, f"{STILL:g} m/s²", (AFTER, STILL), xytext=(-2, 2), textcoords="offset points", ha="right")
     panel.set(
         xlim=(-BEFORE, AFTER), ylim=(0.0, 1.25 * highest), xlabel=f"Time after the stop in {recorded[0][0]} (s)",
-        ylabel=r"$|\alpha|$ (m/s$^2$)",
+        ylabel=r"$|\alpha|$ (m/s²)",
     )  # fmt: skip
     panel.legend(loc="upper right", fontsize=8, frameon=False)
     return figure

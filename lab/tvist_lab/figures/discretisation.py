@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import tvist_shaping
-from tvist_lab.figures.style import INK, SHAPED, UNSHAPED, legend, note, panels
+from tvist_lab.figures.style import INK, LIMIT, OF_SHAPED, OF_UNSHAPED, explain, legend, note, panels
 from tvist_lab.recordings import Floats
 
 PERIOD = 0.002
@@ -36,18 +36,16 @@ def figure_7() -> Figure:
     shown = slice(2, -2)
     tau = np.array([tvist_shaping.zv(f, ZETA).tau[1] for f in f_d]) / PERIOD
     when = 1e3 * time[shown]
-    delays.step(
-        when, np.round(tau[shown]), where="mid", color=UNSHAPED, linewidth=1.4, label="Rounded to ticks"
-    )
-    delays.plot(when, tau[shown], color=SHAPED, linewidth=1.8, label="Fractional delay")
-    delays.set(ylabel="Second impulse\n(ticks)")
-    errors.plot(when, 1e3 * (rounded - exact)[shown], ".-", color=UNSHAPED, linewidth=1.0, markersize=4)
-    errors.plot(when, 1e3 * (fractional - exact)[shown], ".-", color=SHAPED, linewidth=1.0, markersize=4)
-    errors.set(ylabel=r"Error of $q^*$" + "\n(mrad)")
-    for q, color in ((rounded, UNSHAPED), (fractional, SHAPED)):
+    delays.step(when, np.round(tau[shown]), where="mid", **OF_UNSHAPED.line(label="Rounded to ticks"))
+    delays.plot(when, tau[shown], **OF_SHAPED.line(1.8, label="Fractional delay"))
+    delays.set(ylabel=r"Delay $\tau_2$ (ticks)")
+    for q, style in ((rounded, OF_UNSHAPED), (fractional, OF_SHAPED)):
+        dots = style.line(1.0, marker=style.marker, markersize=2.5)
+        errors.plot(when, 1e3 * (q - exact)[shown], **dots)
         qdd = (q[2:] - 2.0 * q[1:-1] + q[:-2]) / PERIOD**2
-        accelerations.plot(when, qdd[1:-1], ".-", color=color, linewidth=1.0, markersize=4)
-    accelerations.axhline(ACCELERATION, color=INK, linewidth=0.8, linestyle=(0, (4, 3)))
+        accelerations.plot(when, qdd[1:-1], **dots)
+    errors.set(ylabel=r"Error of $q^*$ (mrad)")
+    accelerations.axhline(ACCELERATION, color=INK, linewidth=0.8, linestyle=LIMIT)
     note(
         accelerations,
         f"asked: {ACCELERATION:g} rad/s²",
@@ -58,12 +56,19 @@ def figure_7() -> Figure:
     )
     accelerations.set(
         xlabel="Time (ms)",
-        ylabel=r"$\ddot q^*$ (rad/s$^2$)",
+        ylabel=r"$\ddot q^*$ (rad/s²)",
         xlim=(0.0, 1e3 * DURATION),
         ylim=(-400.0, 400.0),
     )
     accelerations.set_yscale("symlog", linthresh=10.0)
     legend(figure, delays)
+    explain(
+        figure,
+        {
+            r"$\tau_2$": "delay of the second impulse",
+            r"$q^*$, $\ddot q^*$": "shaped reference and its acceleration",
+        },
+    )
     return figure
 
 

@@ -16,7 +16,7 @@ from tvist_controller.api import (
     quickest_motion,
     truth_of,
 )
-from tvist_lab.figures.style import SHAPED, THIRD, UNSHAPED, legend, panels
+from tvist_lab.figures.style import OF_SHAPED, OF_THIRD, OF_UNSHAPED, explain, legend, panels
 from tvist_lab.recordings import Floats
 from tvist_plant.description import load
 from tvist_plant.plant import PERIOD
@@ -33,20 +33,21 @@ def elastic_figure() -> Figure:
     Top: the tool's acceleration. Bottom: reference before and after the filter, which all have the same end.
     """
     figure, (forces, references) = panels(2, 4.2)
-    for name, label, color in (
-        ("none", "Unshaped", UNSHAPED),
-        ("auto", "auto", THIRD),
-        ("elastic", "elastic", SHAPED),
+    for name, label, style in (
+        ("none", "Unshaped", OF_UNSHAPED),
+        ("auto", "auto", OF_THIRD),
+        ("elastic", "elastic", OF_SHAPED),
     ):
         time, force, left = _stop(name)
-        forces.plot(time, force, color=color, linewidth=1.1, label=label)
-        references.plot(time, left, color=color, linewidth=1.1)
-    forces.set_ylabel(r"$|\alpha|$ (m/s$^2$)")
+        forces.plot(time, force, **style.line(1.2, label=label))
+        references.plot(time, left, **style.line(1.2))
+    forces.set_ylabel(r"$|\alpha|$ (m/s²)")
     forces.set_ylim(-0.1, 2.1)
     references.set_ylabel("Angle left to turn (mrad)")
     references.set_xlabel("Time after the unshaped reference's stop (ms)")
     references.set(xlim=tuple(1e3 * time for time in SHOWN), ylim=(-0.2, 4.0))
     legend(figure, forces)
+    explain(figure, {r"$|\alpha|$": "acceleration of the tool, without gravity"})
     return figure
 
 

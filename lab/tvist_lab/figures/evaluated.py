@@ -5,8 +5,20 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from tvist_lab.evaluation.evaluate import JudgedMove
-from tvist_lab.figures.style import FAINT, SHAPED, UNSHAPED, legend, panels, title
+from tvist_lab.evaluation.evaluate import WORTH, JudgedMove
+from tvist_lab.figures.style import (
+    FAINT,
+    MUTED,
+    OF_SHAPED,
+    OF_UNSHAPED,
+    SHAPED,
+    decades,
+    explain,
+    legend,
+    note,
+    panels,
+    title,
+)
 from tvist_lab.metrics import amplitude, best_tool_acceleration, motions
 from tvist_lab.recordings import Recording
 
@@ -16,28 +28,34 @@ FLOOR = 1e-4
 
 def residual_by_move_figure(judged: Sequence[JudgedMove]) -> Figure:
     """Peak |α| after the stop, shaped against unshaped, one point per move; and the distribution of the reductions."""
-    figure, (above, below) = panels(2, 6.0, share_x=False, ratios=(3, 2))
-    for counts, color, label in (
-        (True, SHAPED, "Move"),
-        (False, FAINT, "Below 0.2 m/s² unshaped, not counted"),
+    reductions = np.sort([one.reduction(one.shaped) for one in judged if one.counts])
+    several = reductions.size > 1
+    figure, (above, *rest) = panels(
+        2 if several else 1,
+        6.0 if several else 3.6,
+        share_x=False,
+        ratios=(3, 2) if several else None,
+    )
+    for counts, color, marker, label in (
+        (True, SHAPED, "o", "Move"),
+        (False, FAINT, "x", f"Below {WORTH:g} m/s² unshaped, not counted"),
     ):
         chosen = [one for one in judged if one.counts is counts]
         before, after = ([max(peak, FLOOR) for peak in peaks] for peaks in (
             [one.unshaped.peak for one in chosen], [one.shaped.peak for one in chosen]
         ))  # fmt: skip
-        above.loglog(before, after, "o", color=color, markersize=2.5, alpha=0.7, label=label)
+        if chosen:
+            above.loglog(before, after, marker, color=color, markersize=3.0, label=label)
+    decades(above, "x", "y")
     low, high = above.get_xlim()
     for share in (1.0, 0.1, 0.01):
         above.loglog([low, high], [share * low, share * high], color=FAINT, linewidth=0.8)
-        above.annotate(
-            f"−{100 * (1 - share):.0f} %", (high, share * high), color=FAINT, fontsize=7, ha="right"
-        )
+        note(above, f"−{100 * (1 - share):.0f} %", (high, share * high), color=MUTED, ha="right", va="center")
     above.set(xlabel="Peak unshaped (m/s²)", ylabel="Peak shaped (m/s²)", xlim=(low, high))
     title(above, "Peak acceleration of the tool after the stop")
-    reductions = np.sort([one.reduction(one.shaped) for one in judged if one.counts])
-    if reductions.size:
+    for below in rest:
         below.plot(reductions, 100.0 * (np.arange(reductions.size) + 0.5) / reductions.size, color=SHAPED)
-    below.set(xlabel="Reduction (%)", ylabel="Moves with less (%)", ylim=(0, 100))
+        below.set(xlabel="Reduction (%)", ylabel="Moves with less (%)", ylim=(0, 100))
     legend(figure, above)
     return figure
 
@@ -45,18 +63,18 @@ def residual_by_move_figure(judged: Sequence[JudgedMove]) -> Figure:
 def vibration_figure(unshaped: Recording, shaped: Recording, number: int) -> Figure:
     """|α| of one move around its stop, unshaped and shaped; time is zero when the unshaped reference stops."""
     figure, (panel,) = panels(1, 2.8)
-    for recording, color, label in ((unshaped, UNSHAPED, "Unshaped"), (shaped, SHAPED, "Shaped")):
+    for recording, style, label in ((unshaped, OF_UNSHAPED, "Unshaped"), (shaped, OF_SHAPED, "Shaped")):
         motion = motions(recording)[0]
         time = 1e3 * (recording.time - recording.time[motion.reference_stop])
-        panel.plot(
-            time, amplitude(best_tool_acceleration(recording)), color=color, linewidth=1.1, label=label
-        )
-        panel.axvline(time[motion.shaped_stop], color=color, linewidth=0.9, linestyle=":")
+        panel.plot(time, amplitude(best_tool_acceleration(recording)), **style.line(1.2, label=label))
+        panel.axvline(time[motion.shaped_stop], color=style.color, linewidth=0.9, linestyle=":")
+    panel.plot([], [], color=FAINT, linewidth=0.9, linestyle=":", label="Stop of the reference")
     panel.set(
         xlim=(-150, 450),
         xlabel="Time after the unshaped reference's stop (ms)",
-        ylabel=r"$|\alpha|$ (m/s$^2$)",
+        ylabel=r"$|\alpha|$ (m/s²)",
     )
     title(panel, f"Move {number}")
     legend(figure, panel)
+    explain(figure, {r"$|\alpha|$": "acceleration of the tool, without gravity"})
     return figure

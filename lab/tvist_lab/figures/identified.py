@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tvist_controller.api import estimator_of
-from tvist_lab.figures.style import SHAPED, THIRD, UNSHAPED, legend, panels, title
+from tvist_lab.figures.style import FAINT, OF_SHAPED, OF_UNSHAPED, explain, legend, panels, title
 from tvist_lab.recordings import Floats
 from tvist_protocol.calibration import Calibration
 
@@ -35,21 +35,12 @@ def identified_figure(
         (axes[1], estimated[1], zeta, true_zeta, r"$\zeta$ (–)"),
     ):
         ends = [float(np.min(measured)), float(np.max(measured))]
-        panel.plot(ends, ends, color=THIRD, linewidth=1.0, label="equal")
+        panel.plot(ends, ends, color=FAINT, linewidth=1.0, label="Equal")
         if true is not None:
-            panel.plot(
-                true,
-                estimate,
-                ".",
-                color=UNSHAPED,
-                markersize=5,
-                alpha=0.7,
-                label="against the true lowest mode",
-            )
-        panel.plot(
-            measured, estimate, ".", color=SHAPED, markersize=5, alpha=0.8, label="against the ring-down"
-        )
+            panel.plot(true, estimate, **OF_UNSHAPED.points(2.5, label="Against the true lowest mode"))
+        panel.plot(measured, estimate, **OF_SHAPED.points(2.5, label="Against the ring-down"))
         panel.set(xlabel=f"Measured or true {name}", ylabel=f"Calibration's {name}")
     title(axes[0], f"{calibration.name}: {len(q)} configurations")
     legend(figure, axes[0])
+    explain(figure, {"$f_d$": "damped frequency", r"$\zeta$": "damping ratio"})
     return figure

@@ -11,7 +11,7 @@ from tvist_controller.api import (
     paper_payload,
     quickest_motion,
 )
-from tvist_lab.figures.style import INK, SHAPED, UNSHAPED, legend, panels
+from tvist_lab.figures.style import INK, LIMIT, OF_SHAPED, OF_UNSHAPED, legend, panels
 from tvist_lab.recordings import Floats
 from tvist_plant.description import load
 from tvist_plant.plant import PERIOD
@@ -44,21 +44,21 @@ def mean_delay_figure() -> Figure:
     ]
     start, end = (np.array(description.poses[name]) for name in ("Q3", "Q1"))
     figure, (delays, velocities, accelerations) = panels(3, 5.6)
-    for tvist, color, name in zip(filters, (UNSHAPED, SHAPED), NAMES, strict=True):
+    for tvist, style, name in zip(filters, (OF_UNSHAPED, OF_SHAPED), NAMES, strict=True):
         delay, q = _shape(tvist, start, end)
         time = PERIOD * np.arange(len(q))
         joint = int(np.argmax(np.abs(end - start)))
         along = (q[:, joint] - start[joint]) / (end - start)[joint] * abs(end - start).max()
-        delays.plot(time, 1e3 * delay, color=color, label=name)
-        velocities.plot(time[1:], np.diff(along) / PERIOD, color=color)
-        accelerations.plot(time[1:-1], np.diff(along, 2) / PERIOD**2, color=color)
-    velocities.axhline(LIMITS.velocity, color=INK, linewidth=0.6, linestyle=":")
+        delays.plot(time, 1e3 * delay, **style.line(label=name))
+        velocities.plot(time[1:], np.diff(along) / PERIOD, **style.line())
+        accelerations.plot(time[1:-1], np.diff(along, 2) / PERIOD**2, **style.line())
+    velocities.axhline(LIMITS.velocity, color=INK, linewidth=0.8, linestyle=LIMIT)
     for side in (-1.0, 1.0):
-        accelerations.axhline(side * LIMITS.acceleration, color=INK, linewidth=0.6, linestyle=":")
-    delays.set_ylabel("Mean delay in ms")
-    velocities.set_ylabel("Velocity in rad/s")
-    accelerations.set_ylabel("Acceleration in rad/s²")
-    accelerations.set_xlabel("Time in s")
+        accelerations.axhline(side * LIMITS.acceleration, color=INK, linewidth=0.8, linestyle=LIMIT)
+    delays.set_ylabel("Mean delay (ms)")
+    velocities.set_ylabel("Velocity (rad/s)")
+    accelerations.set_ylabel("Acceleration (rad/s²)")
+    accelerations.set_xlabel("Time (s)")
     legend(figure, delays)
     return figure
 

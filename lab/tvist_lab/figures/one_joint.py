@@ -5,7 +5,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
 
-from tvist_lab.figures.style import FAINT, INK, MUTED, SHAPED, UNSHAPED, legend, note, panels, title
+from tvist_lab.figures.style import (
+    FAINT,
+    INK,
+    LIMIT,
+    MUTED,
+    SERIES,
+    UNSHAPED,
+    explain,
+    legend,
+    note,
+    panels,
+    title,
+)
 from tvist_lab.one_joint.lesson import Lesson, PoseResult
 from tvist_lab.recordings import Floats
 
@@ -13,8 +25,6 @@ APART = 0.62
 """Distance between the shoulders of two poses that are drawn side by side [m]."""
 WORDS = ("increased inertia", "", "decreased inertia")
 """The paper's words for the first and the last pose."""
-COLORS = (SHAPED, UNSHAPED)
-"""One a payload."""
 SPRING_TURNS = 2.5
 
 
@@ -30,26 +40,27 @@ def figure_2(lesson: Lesson) -> Figure:
     figure, (arms, frequencies, dampings) = panels(3, 7.2, share_x=False, ratios=(1.35, 1.25, 0.8))
     _draw_arms(arms, lesson)
     masses = sorted({one.mass for one in lesson.curve})
-    for mass, color in zip(masses, COLORS, strict=True):
+    for mass, style in zip(masses, SERIES, strict=False):
         here = [one for one in lesson.curve if one.mass == mass]
         elbow = np.degrees([one.elbow for one in here])
         for panel, formula, simulated in (
             (frequencies, [one.f_d for one in here], [one.simulated_f_d for one in here]),
             (dampings, [one.zeta for one in here], [one.simulated_zeta for one in here]),
         ):
-            panel.plot(elbow, formula, color=color, linewidth=1.6, label=f"{mass:g} kg, formula")
+            panel.plot(elbow, formula, **style.line(1.6, label=f"{mass:g} kg, formula"))
             panel.plot(
-                elbow, simulated, "o", color=color, markersize=4.5, markerfacecolor="white",
-                label=f"{mass:g} kg, simulated",
-            )  # fmt: skip
+                elbow,
+                simulated,
+                **style.points(4.5, markerfacecolor="white", label=f"{mass:g} kg, simulated", zorder=3),
+            )
     for panel in (frequencies, dampings):
         panel.set(xlim=(-4.0, 154.0), xticks=np.arange(0.0, 151.0, 30.0))
         panel.set_ylim(bottom=0.0)
         for result in lesson.poses.values():
-            panel.axvline(np.degrees(result.mode.elbow), color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)))
-    frequencies.set_ylabel("Damped frequency\n$f_d$ (Hz)")
+            panel.axvline(np.degrees(result.mode.elbow), color=FAINT, linewidth=0.9, linestyle=LIMIT)
+    frequencies.set_ylabel("Damped frequency $f_d$ (Hz)")
     frequencies.tick_params(labelbottom=False)
-    dampings.set(ylabel="Damping ratio\nζ (–)", xlabel="Elbow $q$ (°), 0: stretched")
+    dampings.set(ylabel="Damping ratio ζ (–)", xlabel="Elbow $q$, 0 stretched out (°)")
     note(
         frequencies,
         r"$f_d = \frac{1}{2\pi}\sqrt{\frac{K}{I(q)}\,}\sqrt{1 - \zeta^2}$"
@@ -64,6 +75,10 @@ def figure_2(lesson: Lesson) -> Figure:
         xycoords="axes fraction",
     )
     legend(figure, frequencies)
+    explain(
+        figure,
+        {"$I$": "inertia about the shoulder", "$K$, $D$": "stiffness and damping of its flexible drive"},
+    )
     figure.align_ylabels([frequencies, dampings])
     return figure
 
@@ -88,7 +103,7 @@ def _draw_arm(
     joint = shoulder + np.array([0.0, upper])
     tip = joint + forearm * np.array([np.sin(elbow), np.cos(elbow)])
     ahead = joint + np.array([0.0, 0.62 * forearm])
-    panel.plot(*np.transpose([joint, ahead]), color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)))
+    panel.plot(*np.transpose([joint, ahead]), color=FAINT, linewidth=0.9, linestyle=LIMIT)
     panel.plot(*np.transpose([shoulder, joint]), color=INK, linewidth=9.0, solid_capstyle="round", zorder=2)
     panel.plot(*np.transpose([joint, tip]), color=MUTED, linewidth=7.0, solid_capstyle="round", zorder=3)
     panel.add_patch(

@@ -6,22 +6,38 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from tvist_lab.figures.style import FAINT, SHAPED, THIRD, note, panels, title
+from tvist_lab.figures.style import FAINT, INK, OF_SHAPED, OF_UNSHAPED, decades, legend, note, panels, title
+
+NOTICEABLE = 1.01
+"""Largest peak over its limit that is drawn as one that keeps it [-]; a filter's own ripple stays below."""
 
 
 def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
     """Draw each ranked shaper as a point, with medians over arms, moves and payload errors, and the front as a line.
 
+    A triangle exceeds a limit of the motion by more than 1 %; beside it is the largest peak over its limit.
+
     Args:
         rows: Rows of the leaderboard.
     """
     figure, (panel,) = panels(1, 4.6)
+    panel.set_yscale("log")
     ranked = [row for row in rows if row["ranked"]]
     placed: list[tuple[float, float, bool]] = []
     for place, row in enumerate(sorted(ranked, key=_point)):
         y, x = _point(row)
-        marker, color = "o" if row["keeps_limits"] else "^", SHAPED if row["pareto"] else FAINT
-        panel.semilogy(x, y, marker, color=color, markersize=5)
+        excess = _excess(row)
+        exceeds = excess > NOTICEABLE
+        best = row["pareto"]
+        color, filled = (OF_UNSHAPED.color, "white") if exceeds else (OF_SHAPED.color, OF_SHAPED.color)
+        panel.plot(
+            x,
+            y,
+            "^" if exceeds else "o",
+            color=color,
+            markersize=5.5,
+            markerfacecolor=filled if best or exceeds else "white",
+        )
         right = _beside(place, (x, y), [_point(other)[::-1] for other in ranked])
         raised = any(
             abs(x - near) < 2.0 and abs(math.log(y / level)) < 0.1 and side == right
@@ -32,17 +48,67 @@ def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
             "xytext": (6 if right else -6, 9 if raised else 0),
             "ha": "left" if right else "right",
         }
-        note(panel, row["name"], (x, y), textcoords="offset points", va="center", **where)
-    front = sorted(
-        (row["time_until_still_ms"]["median"], row["residual_m_s2"]["median"])
-        for row in ranked
-        if row["pareto"]
-    )
-    panel.semilogy(*zip(*front, strict=True), color=THIRD, linewidth=1.0, zorder=0)
+        words = f"{row['name']} ({excess:.1f}×)" if exceeds else row["name"]
+        note(panel, words, (x, y), textcoords="offset points", va="center", **where)
+    front = sorted(_point(row)[::-1] for row in ranked if row["pareto"])
+    if front:
+        panel.plot(*zip(*front, strict=True), color=FAINT, linewidth=1.0, zorder=0)
+    panel.plot([], [], "o", color=OF_SHAPED.color, label="Keeps the limits within 1 %, and is on the front")
+    panel.plot([], [], "o", color=OF_SHAPED.color, markerfacecolor="white", label="Keeps them")
+    panel.plot([], [], "^", color=OF_UNSHAPED.color, markerfacecolor="white", label="Exceeds one (times)")
+    decades(panel, "y")
     panel.set(xlabel="Still after the unshaped reference's stop (ms)", ylabel="Residual, 3 to 60 Hz (m/s²)")
     panel.margins(x=0.3)
-    title(panel, "Settling against residual; ▲ exceeds a limit of the motion")
+    title(panel, "Settling against residual vibration")
+    legend(figure, panel)
     return figure
+
+
+def settling_figure(rows: Sequence[dict[str, Any]]) -> Figure:
+    """Draw the time until the arm is still against the shaper's delay, median and 90th percentile of each shaper.
+
+    On the line, an arm is still as soon as its shaped reference stops.
+
+    Args:
+        rows: Rows of the leaderboard.
+    """
+    figure, (panel,) = panels(1, 4.2)
+    known = [row for row in rows if row["ranked"] and row["time_until_still_ms"]["median"] is not None]
+    for place, row in enumerate(sorted(known, key=lambda row: float(row["delay_ms"]["median"]))):
+        x, still = row["delay_ms"]["median"], row["time_until_still_ms"]
+        high = still["p90"] if still["p90"] is not None else still["median"]
+        panel.plot([x, x], [still["median"], high], color=FAINT, linewidth=1.0, zorder=1)
+        panel.plot([x], [still["median"]], **OF_SHAPED.points(4.5, label="Median" if place == 0 else None))
+        panel.plot([x], [high], **OF_UNSHAPED.points(3.0, label="90th percentile" if place == 0 else None))
+        note(
+            panel,
+            row["name"],
+            (x, still["median"] if place % 2 else high),
+            xytext=(0, -5 if place % 2 else 5),
+            textcoords="offset points",
+            ha="center",
+            va="top" if place % 2 else "bottom",
+            rotation=90,
+            fontsize=7,
+        )
+    longest = max((float(row["delay_ms"]["median"]) for row in known), default=1.0)
+    panel.plot(
+        [0.0, longest],
+        [0.0, longest],
+        color=INK,
+        linewidth=0.9,
+        linestyle=":",
+        label="Still when the reference stops",
+    )
+    panel.set(xlabel="Delay of the shaper (ms)", ylabel="Still after the unshaped stop (ms)")
+    panel.margins(x=0.06, y=0.18)
+    legend(figure, panel)
+    return figure
+
+
+def _excess(row: dict[str, Any]) -> float:
+    """Largest peak of acceleration or velocity over its limit [-]."""
+    return max(float(row[f"peak_{kind}_ratio"]["max"]) for kind in ("acceleration", "velocity"))
 
 
 def _point(row: dict[str, Any]) -> tuple[float, float]:

@@ -1,14 +1,25 @@
 """Figures 12 to 14: everything recorded of a motion, unshaped and shaped on one clock."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
-from tvist_lab.figures.style import FAINT, MUTED, SHAPED, UNSHAPED, legend, note, panels, title
+from tvist_lab.figures.style import (
+    FAINT,
+    LIMIT,
+    MUTED,
+    OF_SHAPED,
+    OF_UNSHAPED,
+    Series,
+    explain,
+    legend,
+    note,
+    panels,
+    title,
+)
 from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.metrics.settling import REPEATABILITY, distance
 from tvist_lab.metrics.vibration import amplitude, tool_acceleration
@@ -20,6 +31,14 @@ REST = 1.0
 """Time shown after the shaped reference has stopped [s]."""
 NEAR = 0.15
 """Largest distance to the attained position on the axis [mm]; five times the repeatability."""
+SYMBOLS = {
+    r"$\ddot q^*$": "acceleration of the shaped reference",
+    "$E$": "distance of the tool from where it comes to rest",
+    r"$|\alpha|$": "acceleration of the tool, without gravity",
+    "$f_d$": "damped frequency",
+    r"$\zeta$": "damping ratio",
+}
+"""What the symbols on the axes mean."""
 
 Recorded = tuple[Recording, MotionRows]
 """A recording and one of its motions."""
@@ -38,7 +57,7 @@ def motion_figure(name: str, unshaped: Recorded, shaped: Recorded) -> Figure:
     Raises:
         NotMeasurableError: The attained position cannot be determined, because too little rest was recorded.
     """
-    return _figure(name, ((unshaped, UNSHAPED, "Unshaped"), (shaped, SHAPED, "Shaped")))
+    return _figure(name, ((unshaped, OF_UNSHAPED, "Unshaped"), (shaped, OF_SHAPED, "Shaped")))
 
 
 def observed_figure(name: str, recorded: Recorded) -> Figure:
@@ -51,21 +70,21 @@ def observed_figure(name: str, recorded: Recorded) -> Figure:
     Raises:
         NotMeasurableError: The attained position cannot be determined, because too little rest was recorded.
     """
-    return _figure(name, ((recorded, SHAPED, "Recorded"),))
+    return _figure(name, ((recorded, OF_SHAPED, "Recorded"),))
 
 
-def _figure(name: str, drawn: Sequence[tuple[Recorded, str, str]]) -> Figure:
-    """Draw the five panels from recordings with their colours and names."""
+def _figure(name: str, drawn: Sequence[tuple[Recorded, Series, str]]) -> Figure:
+    """Draw the five panels from recordings with their styles and names."""
     figure, axes = panels(5, 8.6, ratios=(1.25, 1, 1.25, 0.85, 0.85))
-    for recorded, color, label in drawn:
-        _draw(axes, recorded, color, label)
+    for recorded, style, label in drawn:
+        _draw(axes, recorded, style, label)
     accelerations, errors, alphas, frequencies, dampings = axes
     _name_joints(accelerations, drawn[0][0])
     title(accelerations, name)
-    errors.axhline(1e3 * REPEATABILITY, color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)))
+    errors.axhline(1e3 * REPEATABILITY, color=FAINT, linewidth=0.9, linestyle=LIMIT)
     note(
         errors,
-        "repeatability",
+        f"repeatability, {1e3 * REPEATABILITY:g} mm",
         (1.0, 1e3 * REPEATABILITY),
         xycoords=("axes fraction", "data"),
         xytext=(-2, 2),
@@ -73,9 +92,9 @@ def _figure(name: str, drawn: Sequence[tuple[Recorded, str, str]]) -> Figure:
         ha="right",
         color=MUTED,
     )
-    accelerations.set_ylabel(r"$\ddot q^*$ (rad/s$^2$)")
+    accelerations.set_ylabel(r"$\ddot q^*$ (rad/s²)")
     errors.set(ylabel=r"$E$ (mm)", ylim=(0.0, NEAR), yticks=np.linspace(0.0, NEAR, 4))
-    alphas.set_ylabel(r"$|\alpha|$ (m/s$^2$)")
+    alphas.set_ylabel(r"$|\alpha|$ (m/s²)")
     alphas.set_ylim(bottom=0.0)
     frequencies.set_ylabel(r"Estimated $f_d$ (Hz)")
     _grow(frequencies, 5.0, 16.0)
@@ -86,10 +105,11 @@ def _figure(name: str, drawn: Sequence[tuple[Recorded, str, str]]) -> Figure:
     ends = [recording.time[m.shaped_stop] - recording.time[m.start] for (recording, m), _, _ in drawn]
     dampings.set_xlim(-LEAD, max(ends) + REST)
     legend(figure, accelerations)
+    explain(figure, SYMBOLS)
     return figure
 
 
-def _draw(axes: list[Axes], recorded: Recorded, color: str, label: str) -> None:
+def _draw(axes: list[Axes], recorded: Recorded, style: Series, label: str) -> None:
     """Draw one recording into the five panels."""
     recording, motion = recorded
     start = recording.time[motion.start]
@@ -100,7 +120,7 @@ def _draw(axes: list[Axes], recorded: Recorded, color: str, label: str) -> None:
     rows = slice(first, past)
     time = recording.time[rows] - start
     accelerations, errors, alphas, frequencies, dampings = axes
-    how: dict[str, Any] = {"color": color, "linewidth": 1.1, "alpha": 0.9}
+    how = style.line(1.1)
     for joint, qdd in enumerate(recording["target_qdd"][rows].T):
         accelerations.plot(time, qdd, label=label if joint == 0 else None, **how)
     E = distance(recording, motion)

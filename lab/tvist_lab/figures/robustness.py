@@ -6,14 +6,11 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from tvist_lab.evaluation.robustness import ERRORS
-from tvist_lab.figures.style import SHAPED, THIRD, UNSHAPED, panels, title
-
-COLORS = (SHAPED, THIRD, "#E69F00", UNSHAPED, "#CC79A7")
-"""Colours of the errors, the smallest first."""
+from tvist_lab.figures.style import SERIES, panels, title
 
 
 def robustness_figure(rows: Sequence[dict[str, Any]]) -> Figure:
-    """Draw the median (full line) and the 5th percentile (broken) of the reduction, each the worse of ± an error.
+    """Draw the median (thick) and the 5th percentile (thin) of the reduction, each the worse of ± an error.
 
     Args:
         rows: Rows of `robustness_report`, ordered by delay.
@@ -21,21 +18,26 @@ def robustness_figure(rows: Sequence[dict[str, Any]]) -> Figure:
     figure, axes = panels(2, 7.2)
     places = range(len(rows))
     for panel, (kind, errors) in zip(axes, ERRORS.items(), strict=True):
-        for size, color in zip(sorted({abs(error) for error in errors}), COLORS, strict=False):
+        for size, style in zip(sorted({abs(error) for error in errors}), SERIES, strict=False):
             names = [f"{100.0 * error:+.0f} %" for error in errors if abs(error) == size]
-            for name, style, label in (("median", "o-", f"±{100.0 * size:.0f} %"), ("p5", "s:", None)):
+            for name, width, label in (("median", 1.4, f"±{100.0 * size:.0f} %"), ("p5", 0.6, None)):
                 worse = [
                     min(_known(row[kind][error]["reduction_percent"][name]) for error in names)
                     for row in rows
                 ]
-                panel.plot(places, worse, style, color=color, label=label, markersize=3, linewidth=1.0)
+                panel.plot(
+                    places,
+                    worse,
+                    **style.line(width, marker=style.marker, markersize=2.0 + width),
+                    label=label,
+                )
         panel.set(ylabel="Reduction (%)")
-        panel.legend(fontsize=7, frameon=False, ncols=2, loc="lower right")
-        title(panel, f"Wrong {kind}: median (full) and 5th percentile (broken), the worse of ±")
+        panel.legend(fontsize=8, frameon=False, ncols=2, loc="lower left", handlelength=3.0)
+        title(panel, f"Wrong {kind}: median (thick) and 5th percentile (thin), the worse of ±")
     axes[-1].set_xticks(
-        places, [f"{row['name']}, {row['delay_ms']:.0f} ms" for row in rows], rotation=90, fontsize=7
+        places, [f"{row['name']}, {row['delay_ms']:.0f} ms" for row in rows], rotation=90, fontsize=8
     )
-    axes[-1].set(xlabel="Shapers in the order of their delay")
+    axes[-1].set(xlabel="Shapers in the order of their delay (ms)")
     return figure
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import tvist_shaping
-from tvist_lab.figures.style import FAINT, INK, MUTED, SHAPED, THIRD, UNSHAPED, legend, note, panels
+from tvist_lab.figures.style import FAINT, INK, LIMIT, SERIES, legend, note, panels, tint, title
 
 DESIGN = 10.5
 """Middle of the frequency range over the workspace [Hz]."""
@@ -36,32 +36,16 @@ def figure_4(
         }
     figure, (panel,) = panels(1, 3.4)
     f = np.linspace(*SHOWN, 1051)
-    styles = [(UNSHAPED, "-"), (THIRD, "--"), (SHAPED, "-"), (FAINT, "-."), (INK, ":")]
     worst = np.inf
-    panel.axvspan(*span, color=FAINT, alpha=0.12, linewidth=0.0)
+    panel.axvspan(*span, color=tint(FAINT, 0.15), linewidth=0.0, label="First mode over the workspace")
     for index, (name, impulses) in enumerate(shapers.items()):
-        color, dashes = styles[index % len(styles)]
         residual = 100.0 * tvist_shaping.residual(f, 0.0, impulses)
-        panel.plot(f, residual, color=color, linestyle=dashes, linewidth=1.8, label=name)
+        panel.plot(f, residual, **SERIES[index % len(SERIES)].line(1.6, label=name))
         worst = min(worst, 100.0 * float(np.max(tvist_shaping.residual(np.array(span), 0.0, impulses))))
-    panel.axhline(worst, color=INK, linewidth=0.8, linestyle=(0, (4, 3)))
-    note(
-        panel,
-        f"{worst:.1f} %: what the least sensitive leaves at the ends of the span",
-        (design, worst),
-        xytext=(0, 6),
-        textcoords="offset points",
-        ha="center",
-        va="bottom",
-    )
-    note(
-        panel,
-        f"first mode over the workspace, {span[0]:g} to {span[1]:g} Hz",
-        (design, 71.0),
-        ha="center",
-        va="top",
-        color=MUTED,
-    )
+    panel.axhline(worst, color=INK, linewidth=0.8, linestyle=LIMIT)
+    # Every curve is near zero in the middle, where the shapers are designed.
+    note(panel, f"{worst:.1f} %", (design, worst), xytext=(0, 4), textcoords="offset points", ha="center")
+    title(panel, f"At least {worst:.1f} % remains at the ends of {span[0]:g} to {span[1]:g} Hz")
     panel.set(xlim=SHOWN, ylim=(0.0, 72.0), xlabel="Frequency (Hz)", ylabel="Residual vibration (%)")
     legend(figure, panel)
     return figure

@@ -1,47 +1,128 @@
-"""Style of the figures: colours for colour-blind readers, few lines, units on every axis."""
+"""Style of the figures: series that differ in grey and to the colour-blind, few lines, units on every axis.
 
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
+Colours differ in lightness, not only in hue, and each has dashes and a marker of its own. Dashed lines are drawn over
+full ones, so that both are seen where they coincide, and nothing that stands for data is transparent.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
 
 UNSHAPED = "#D55E00"
-"""Vermilion (Okabe and Ito)."""
-SHAPED = "#0072B2"
-"""Blue."""
-THIRD = "#009E73"
-"""Bluish green."""
+"""Vermilion (Okabe and Ito), of medium lightness."""
+SHAPED = "#0B4A85"
+"""Dark blue."""
+THIRD = "#5FBF9A"
+"""Light bluish green."""
 INK = "#333333"
 """Colour of text and axes."""
 FAINT = "#8A8A8A"
 """Colour of limits and other auxiliary lines."""
 MUTED = "#5A5A5A"
 """Colour of less important text."""
+COLUMN_MM = {1: 89.0, 2: 183.0}
+"""Width of a figure over one or two columns of a journal [mm]."""
+WIDTH = COLUMN_MM[2] / 25.4
+"""Width of every figure as it is drawn [inch]."""
 DPI = 150
-"""Resolution of saved bitmaps [dpi]; 6.4 inches are 960 pixels."""
-WIDTH = 6.4
-"""Width of every figure [inch]."""
+"""Resolution of bitmaps unless another one is asked for [dots per inch]."""
+LIMIT = (0, (4, 3))
+"""Dashes of limits and other auxiliary lines."""
+
+
+class Series(NamedTuple):
+    """How one of several curves is drawn."""
+
+    color: str
+    dashes: Any
+    """Line style of matplotlib."""
+    marker: str
+
+    def line(self, width: float = 1.4, **more: Any) -> dict[str, Any]:
+        """Return the arguments of `plot` for a curve; dashed ones lie over full ones.
+
+        Args:
+            width: Width of the line [pt].
+            more: Further arguments of `plot`.
+        """
+        above = 2.0 if self.dashes == "-" else 2.5
+        return {"color": self.color, "linestyle": self.dashes, "linewidth": width, "zorder": above, **more}
+
+    def points(self, size: float = 4.0, **more: Any) -> dict[str, Any]:
+        """Return the arguments of `plot` for points without a line.
+
+        Args:
+            size: Size of the markers [pt].
+            more: Further arguments of `plot`.
+        """
+        return {"color": self.color, "linestyle": "none", "marker": self.marker, "markersize": size, **more}
+
+
+SERIES = (
+    Series(SHAPED, "-", "o"),
+    Series(UNSHAPED, (0, (5, 1.5)), "s"),
+    Series(THIRD, (0, (1, 1)), "^"),
+    Series(INK, (0, (6, 1.5, 1, 1.5)), "D"),
+    Series("#CC79A7", (0, (9, 2)), "v"),
+    Series("#E69F00", (0, (3, 1, 1, 1, 1, 1)), "P"),
+    Series("#56B4E9", (0, (2, 2)), "X"),
+    Series(FAINT, (0, (8, 2, 3, 2)), "*"),
+)
+"""Styles of curves, in the order in which they are used."""
+OF_SHAPED, OF_UNSHAPED, OF_THIRD = SERIES[:3]
+"""Styles of what is shaped, of what is not, and of a third one."""
+
+
+def tint(color: str, share: float = 0.2) -> str:
+    """Mix a colour with white, to fill areas without being transparent.
+
+    Args:
+        color: The colour, as #RRGGBB.
+        share: Share of the colour [-].
+    """
+    parts = (int(color[place : place + 2], 16) for place in (1, 3, 5))
+    return "#" + "".join(f"{round(share * part + (1.0 - share) * 255.0):02X}" for part in parts)
 
 
 def panels(
-    rows: int, height: float, *, share_x: bool = True, ratios: Sequence[float] | None = None
+    rows: int,
+    height: float,
+    *,
+    columns: int = 1,
+    share_x: bool = True,
+    share_y: bool = False,
+    ratios: Sequence[float] | None = None,
 ) -> tuple[Figure, list[Axes]]:
-    """Create a figure of stacked panels in this style.
+    """Create a figure of panels in this style.
 
     Args:
-        rows: Number of panels.
+        rows: Number of rows.
         height: Height of the figure [inch].
-        share_x: Whether all panels share the lowest one's axis.
-        ratios: Relative heights of the panels.
+        columns: Number of panels side by side.
+        share_x: Whether all panels of a column share the lowest one's axis.
+        share_y: Whether all panels of a row share the leftmost one's axis.
+        ratios: Relative heights of the rows.
+
+    Returns:
+        The figure, and its panels row by row.
     """
     figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
-    grid: np.ndarray[Any, Any] = figure.subplots(rows, 1, sharex=share_x, squeeze=False, height_ratios=ratios)
-    axes = [row[0] for row in grid]
+    grid: np.ndarray[Any, Any] = figure.subplots(
+        rows,
+        columns,
+        sharex="col" if share_x else False,
+        sharey="row" if share_y else False,
+        squeeze=False,
+        height_ratios=ratios,
+    )
+    axes = list(grid.ravel())
     for panel in axes:
         _plain(panel)
     figure.align_ylabels(axes)
@@ -49,16 +130,29 @@ def panels(
 
 
 def _plain(panel: Axes) -> None:
-    """Style a panel: open frame, faint grid."""
+    """Style a panel: open frame, faint grid, tick labels of one size on every scale."""
     for side in ("top", "right"):
         panel.spines[side].set_visible(False)
     for side in ("left", "bottom"):
         panel.spines[side].set_color(INK)
     panel.grid(visible=True, color="#E4E4E4", linewidth=0.6)
     panel.set_axisbelow(True)
-    panel.tick_params(colors=INK, labelsize=8, length=3)
+    panel.tick_params(which="both", colors=INK, labelsize=8, length=3)
     panel.xaxis.label.set(color=INK, fontsize=9)
     panel.yaxis.label.set(color=INK, fontsize=9)
+
+
+def decades(panel: Axes, *axes: str) -> None:
+    """Label an axis with a logarithmic scale in plain numbers: 1, 2 and 5 of each decade, all of one size.
+
+    Args:
+        panel: The panel, with its scale set.
+        axes: "x" and "y", which of its axes to label.
+    """
+    for name in axes:
+        axis = panel.xaxis if name == "x" else panel.yaxis
+        axis.set_major_formatter(lambda value, _: f"{value:g}")
+        axis.set_minor_formatter(lambda value, _: f"{value:g}" if f"{value:e}"[0] in "25" else "")
 
 
 def title(panel: Axes, words: str) -> None:
@@ -77,25 +171,32 @@ def legend(figure: Figure, panel: Axes) -> None:
         fontsize=8.5,
         frameon=False,
         labelcolor=INK,
-        handlelength=1.8,
+        handlelength=2.4,
     )
 
 
-def note(panel: Axes, words: str, at: tuple[float, float], *, color: str = INK, **how: Any) -> None:
+def explain(figure: Figure, symbols: Mapping[str, str]) -> None:
+    """Write what the symbols on the axes mean below the panels.
+
+    Args:
+        figure: The figure.
+        symbols: Symbol to its meaning.
+    """
+    figure.legend(
+        [Line2D([], [], linestyle="none") for _ in symbols],
+        [f"{symbol}: {meaning}" for symbol, meaning in symbols.items()],
+        loc="outside lower left",
+        ncols=len(symbols),
+        fontsize=8,
+        frameon=False,
+        labelcolor=MUTED,
+        handlelength=0.0,
+        handletextpad=0.0,
+        columnspacing=1.6,
+    )
+
+
+def note(panel: Axes, words: str, at: tuple[float, float], *, color: str = INK, **how: Any) -> Text:
     """Write small text within a panel, at a point in data coordinates."""
     backing = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8}
-    panel.annotate(words, at, color=color, fontsize=8, bbox=backing, **how)
-
-
-def save(figure: Figure, path: str | Path) -> Path:
-    """Write a figure; the suffix determines the format, and missing folders are created.
-
-    Returns:
-        Path of the file.
-    """
-    file = Path(path)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    # Without the date, equal figures give equal files.
-    metadata = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-    figure.savefig(file, dpi=DPI, metadata=metadata.get(file.suffix))
-    return file
+    return panel.annotate(words, at, **{"color": color, "fontsize": 8, "bbox": backing, "zorder": 6.0, **how})

@@ -153,22 +153,32 @@ def measure(recording: Recording, motion: MotionRows) -> MotionResult:
 
 
 def _ring_down(recording: Recording, motion: MotionRows) -> RingDown:
-    """Fit the mode that vibrates after the stop."""
+    fit = ring_down_of(recording, motion)
+    if not fit.ok:
+        raise NotMeasurableError(fit.reason)
+    return fit
+
+
+def ring_down_of(recording: Recording, motion: MotionRows) -> RingDown:
+    """Fit the modes that vibrate after the stop.
+
+    Returns:
+        The strongest one at the stop; if `ok` is false, it must not be used.
+
+    Raises:
+        NotMeasurableError: The accelerometer was not recorded, or too little rest.
+    """
     first = motion.arm_stop(recording)
     time, alpha = felt(recording, motion, slice(first, motion.end))
     late = time - recording.time[first]
     if recording.foreign:
         skip = SKIP if "target_q" in recording else SKIP_OF_MEASURED
-        fit = fit_ring_down(
+        return fit_ring_down(
             alpha, recording.period, modes=2, time=late, offset=True, skip=skip, evidence=SIGNIFICANT
         )
-    else:
-        fit = fit_ring_down(
-            alpha, recording.period, modes=2, time=late, slow_poles=(SLOW_POLE,), evidence=SIGNIFICANT
-        )
-    if not fit.ok:
-        raise NotMeasurableError(fit.reason)
-    return fit
+    return fit_ring_down(
+        alpha, recording.period, modes=2, time=late, slow_poles=(SLOW_POLE,), evidence=SIGNIFICANT
+    )
 
 
 def table_2(runs: Mapping[str, Runs]) -> Table:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tvist_lab.figures.compared import compared_figure
-from tvist_lab.figures.ringing import ringing_figure
+from tvist_lab.figures.ring_down import ring_down_figure
 from tvist_lab.metrics import (
     Comparison,
     MotionResult,
@@ -178,7 +178,7 @@ def _pictures(files: Sequence[_File], comparisons: Sequence[Comparison]) -> Iter
             if partner is not None:
                 curves.append((file.name, (file.recording, file.motions[partner - 1])))
         try:
-            figure = compared_figure(f"Motion {index}", curves[:4])
+            figure = compared_figure(f"Motion {index}", curves[:8])
         except NotMeasurableError:
             continue
         yield picture(figure, f"Acceleration of the tool around the stop of motion {index}, without gravity.")
@@ -187,7 +187,12 @@ def _pictures(files: Sequence[_File], comparisons: Sequence[Comparison]) -> Iter
         if loudest is None or loudest[1].peak_m_s2 is None:
             continue
         index = loudest[0]
-        figure = ringing_figure(f"{file.name}, motion {index + 1}", (file.recording, file.motions[index]))
+        try:
+            figure = ring_down_figure(
+                f"{file.name}, motion {index + 1}", (file.recording, file.motions[index])
+            )
+        except NotMeasurableError:
+            continue
         caption = (
             f"How the tool rings after motion {index + 1} of {file.name}: course, spectrum and spectrogram."
         )

@@ -1,0 +1,71 @@
+"""Options about the files of figures, the same on every command that writes some."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from cyclopts import Parameter
+
+from tvist_cli.failure import Failure
+from tvist_cli.output import say
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tvist_lab.figures import FigureFiles
+
+LEAST_DPI, MOST_DPI = 30, 2400
+"""Range of resolutions [dots per inch]."""
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class FigureOptions:
+    """How a command writes figures."""
+
+    format: Literal["png", "pdf", "svg"] | None = None
+    """Format of figures: png, pdf or svg [png]."""
+    dpi: int | None = None
+    """Resolution of figures in dots per inch; in pdf and svg, of the bitmaps within them [150]."""
+    columns: Literal[1, 2] | None = None
+    """Width of figures in columns of a journal: 1 for 89 mm, 2 for 183 mm [2]."""
+
+    def into(self, folder: Path) -> "FigureFiles":
+        """Return the folder together with what was asked for."""
+        from tvist_lab.figures import FigureFiles
+        from tvist_lab.figures.style import DPI
+
+        self.check(folder)
+        return FigureFiles(folder, self.format or "png", self.dpi or DPI, self.columns or 2)
+
+    def check(self, folder: Path | None) -> None:
+        """Refuse what cannot be done, before anything is computed.
+
+        Args:
+            folder: Value of --figures; None where it was not given.
+
+        Raises:
+            Failure: The resolution is out of range, or there are no figures to which an option could apply.
+        """
+        for name in ("format", "dpi", "columns"):
+            if folder is None and getattr(self, name) is not None:
+                raise Failure(f"--{name} is about figures: give --figures DIR too, or leave it out", code=2)
+        if self.dpi is not None and not LEAST_DPI <= self.dpi <= MOST_DPI:
+            raise Failure(f"dpi is {self.dpi}: must be {LEAST_DPI} to {MOST_DPI}", code=2)
+        if folder is not None and folder.exists() and not folder.is_dir():
+            raise Failure(f"{folder} exists already and is no folder: choose another name")
+
+
+AS_USUAL = FigureOptions()
+"""Nothing was asked for."""
+
+
+def write(files: "FigureFiles", figures: "dict[str, Figure]") -> None:
+    """Write figures and say the path of each.
+
+    Args:
+        files: Where to, and how.
+        figures: Name of the file, without its suffix, to the figure.
+    """
+    for name, figure in figures.items():
+        say(str(files.write(figure, name)))

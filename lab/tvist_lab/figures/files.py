@@ -1,0 +1,166 @@
+"""Files of figures: their format, their resolution, and their width in columns of a journal."""
+
+import textwrap
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
+
+from tvist_lab.figures.style import COLUMN_MM, DPI
+
+FORMATS = ("png", "pdf", "svg")
+"""Formats of figures: one bitmap, two of lines."""
+SMALLER = {1: 0.8, 2: 1.0}
+"""Size of text and lines over one and over two columns, as a share of that over two [-]."""
+LOWER = {1: 0.84, 2: 1.0}
+"""Height over one and over two columns, as a share of that over two [-]."""
+STABLE = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+"""Metadata without the date and the program's version, so that equal figures give equal files."""
+FONTS: Any = {"pdf.fonttype": 42, "svg.fonttype": "path", "svg.hashsalt": "tvist"}
+"""TrueType in PDF, which journals ask for; outlines in SVG, which look the same without the font."""
+
+
+@dataclass(frozen=True)
+class FigureFiles:
+    """A folder for figures, and how they are written."""
+
+    folder: Path
+    format: str = "png"
+    """One of `FORMATS`."""
+    dpi: int = DPI
+    """Resolution of PNG, and of bitmaps within PDF and SVG [dots per inch]."""
+    columns: int = 2
+    """Width in columns of a journal: 1 for 89 mm, 2 for 183 mm."""
+
+    def write(self, figure: Figure, name: str) -> Path:
+        """Write a figure; see `save`.
+
+        Args:
+            figure: The figure.
+            name: Name of the file without its suffix.
+        """
+        return save(figure, self.folder / f"{name}.{self.format}", dpi=self.dpi, columns=self.columns)
+
+
+def save(figure: Figure, path: str | Path, *, dpi: int = DPI, columns: int = 2) -> Path:
+    """Write a figure; the suffix determines the format, and missing folders are created.
+
+    Args:
+        figure: The figure. It is resized to the columns, and its text with it.
+        path: File to write.
+        dpi: Resolution of PNG, and of bitmaps within PDF and SVG [dots per inch].
+        columns: Width in columns of a journal: 1 for 89 mm, 2 for 183 mm.
+
+    Returns:
+        Path of the file.
+    """
+    file = Path(path)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    fit(figure, columns)
+    with mpl.rc_context(FONTS):
+        figure.savefig(file, dpi=dpi, metadata=STABLE.get(file.suffix))
+    return file
+
+
+def fit(figure: Figure, columns: int) -> None:
+    """Give a figure the width of one or two columns, with text that remains readable and within its panel.
+
+    A figure that has this width already keeps its size.
+    """
+    width, height = figure.get_size_inches()
+    now = min(COLUMN_MM, key=lambda count: abs(COLUMN_MM[count] / 25.4 - width))
+    if now != columns:
+        figure.set_size_inches(COLUMN_MM[columns] / 25.4, height * LOWER[columns] / LOWER[now])
+        _scale(figure, SMALLER[columns] / SMALLER[now])
+    figure.draw_without_rendering()
+    for box in list(figure.legends):
+        _narrow(figure, box)
+    figure.draw_without_rendering()
+    for panel in figure.axes:
+        _wrap_in(panel)
+
+
+def _scale(figure: Figure, factor: float) -> None:
+    """Change the size of text, lines and markers by a factor."""
+    for panel in figure.axes:
+        for axis in (panel.xaxis, panel.yaxis):
+            for which in ("major", "minor"):
+                size = axis.get_tick_params(which=which).get("labelsize", 8.0)
+                axis.set_tick_params(which=which, labelsize=factor * float(size))
+    ticks = {id(label) for panel in figure.axes for label in _tick_labels(panel)}
+    for text in figure.findobj(Text):
+        if isinstance(text, Text) and id(text) not in ticks:
+            text.set_fontsize(factor * float(text.get_fontsize()))
+    for panel in figure.axes:
+        for line in panel.findobj(Line2D):
+            if isinstance(line, Line2D):
+                line.set_linewidth(factor * line.get_linewidth())
+                line.set_markersize(factor * line.get_markersize())
+
+
+def _tick_labels(panel: Axes) -> Iterator[Text]:
+    for axis in (panel.xaxis, panel.yaxis):
+        for minor in (False, True):
+            yield from axis.get_ticklabels(minor=minor)
+
+
+def _narrow(figure: Figure, box: Legend) -> None:
+    """Put a figure's legend into as many columns as there is room for."""
+    texts = box.get_texts()
+    room = 0.98 * figure.bbox.width
+    entries = len(texts)
+    for count in range(entries, 0, -1):
+        if box.get_window_extent().width <= room or entries == 1:
+            return
+        size = texts[0].get_fontsize()
+        handles = [handle for handle in box.legend_handles if handle is not None]
+        labels = [text.get_text() for text in texts]
+        above = "upper" in str(box._outside_loc)  # type: ignore[attr-defined]  # noqa: SLF001  not public
+        how: dict[str, Any] = {"fontsize": size, "labelcolor": texts[0].get_color()}
+        how |= {
+            name: getattr(box, name)
+            for name in ("handlelength", "handletextpad", "columnspacing", "labelspacing")
+        }
+        box.remove()
+        box = figure.legend(
+            handles,
+            labels,
+            loc="outside upper right" if above else "outside lower left",
+            ncols=max(count - 1, 1),
+            frameon=False,
+            **how,
+        )
+        figure.draw_without_rendering()
+        texts = box.get_texts()
+
+
+def _wrap_in(panel: Axes) -> None:
+    """Break text that is longer than its panel."""
+    wide, high = panel.bbox.width, panel.bbox.height
+    for text in (panel.title, *(child for child in panel.get_children() if isinstance(child, Text))):
+        _wrap(text, 0.98 * wide, text.get_window_extent().width)
+    for label in (panel.xaxis.label, panel.yaxis.label):
+        extent = label.get_window_extent()
+        along = label is panel.xaxis.label
+        _wrap(label, 1.1 * (wide if along else high), extent.width if along else extent.height)
+
+
+def _wrap(text: Text, room: float, length: float) -> None:
+    words = text.get_text()
+    if length <= room or room <= 0.0:
+        return
+    longest = max(len(line) for line in words.split("\n"))
+    characters = max(int(longest * room / length), 8)
+    text.set_text(
+        "\n".join(
+            textwrap.fill(line, characters, break_long_words=False, break_on_hyphens=False)
+            for line in words.split("\n")
+        )
+    )
