@@ -84,7 +84,7 @@ def evaluate(
         look: How to write the figures.
         json: Print one JSON object.
     """
-    from tvist_lab.evaluation.evaluate import MoveJob, report
+    from tvist_lab.evaluation.evaluate import MoveJob, arm_seed, report
     from tvist_lab.evaluation.evaluate import evaluate as run
     from tvist_lab.evaluation.running import ShaperFaultError
     from tvist_plant.description import DescriptionError, load
@@ -108,7 +108,7 @@ def evaluate(
         others = tuple(one for one in others if not one.told_target)
     jobs = [
         MoveJob(
-            plant, move, recipe, others, seed=_arm_seed(seed, place), conditions=conditions, stream=streams
+            plant, move, recipe, others, seed=arm_seed(seed, place), conditions=conditions, stream=streams
         )
         for place, move in enumerate(chosen)
     ]
@@ -287,11 +287,6 @@ def _recipe(
         recipe.elastic(description, recipe.make(description, masses[1]))
         # Without a calibration of the arm, no baseline can be designed for it.
         return recipe, every(recipe, description, masses) if baselines and known is not None else ()
-
-
-def _arm_seed(seed: int, place: int) -> int:
-    """Each move has gear errors of its own."""
-    return (1_000_003 * seed + place) % 2**63
 
 
 def _draw(jobs: list["MoveJob"], judged: list["JudgedMove"], files: "FigureFiles") -> None:

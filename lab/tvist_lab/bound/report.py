@@ -12,7 +12,7 @@ from tvist_lab.evaluation.evaluate import JudgedMove, MoveJob, judge
 from tvist_lab.evaluation.line import PAPER
 from tvist_lab.evaluation.moves import Move
 from tvist_lab.evaluation.recipes import Recipe
-from tvist_lab.evaluation.workers import spread
+from tvist_lab.runners import Processes, in_order
 from tvist_plant.description import RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_protocol.calibration import Calibration
@@ -63,7 +63,7 @@ class Bounded:
 
 def compare(jobs: Sequence[BoundJob]) -> Iterator[Bounded]:
     """Yield the results in order, each as soon as it is available."""
-    return spread(bounded, jobs, few=2, chunk=1)
+    return in_order(Processes(few=2, chunk=1), bounded, jobs)
 
 
 def bounded(job: BoundJob) -> Bounded:

@@ -6,16 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from tvist_controller.api import ElasticFeedForward, MotionLimits, body, paper_payload
+from tvist_controller.api import MotionLimits
 from tvist_lab.evaluation.baselines import Baseline
 from tvist_lab.evaluation.conditions import AS_KNOWN, Conditions
-from tvist_lab.evaluation.line import PAPER, control_line, point_to_point, shape, simulate
+from tvist_lab.evaluation.line import PAPER
 from tvist_lab.evaluation.moves import Move
-from tvist_lab.evaluation.own_moves import own_move
 from tvist_lab.evaluation.recipes import Recipe
-from tvist_lab.evaluation.running import sound
-from tvist_lab.evaluation.streams import stopped_stream
-from tvist_lab.evaluation.workers import spread
+from tvist_lab.evaluation.trial import Trial
 from tvist_lab.metrics import (
     NotMeasurableError,
     motions,
@@ -27,8 +24,8 @@ from tvist_lab.metrics import (
 from tvist_lab.metrics.common_clock import AFTER_STOP, STILL, peak_later_than
 from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.recordings import Floats, Recording
+from tvist_lab.runners import Processes, Runner, in_order
 from tvist_plant.description import RobotDescription
-from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD
 
 WORTH = 0.2
@@ -127,10 +124,21 @@ def judge(job: MoveJob) -> JudgedMove:
     )
 
 
-def evaluate(jobs: Sequence[MoveJob]) -> Iterator[JudgedMove]:
-    """Judge all jobs on all cores; yield the results in order, each as soon as it is available."""
+def arm_seed(seed: int, place: int) -> int:
+    """Return the seed of gear errors for the move at a place, so that each move has its own."""
+    return (1_000_003 * seed + place) % 2**63
+
+
+def evaluate(jobs: Sequence[MoveJob], runner: Runner | None = None) -> Iterator[JudgedMove]:
+    """Judge all jobs; yield the results in order, each as soon as it is available.
+
+    Args:
+        jobs: The moves.
+        runner: What runs the jobs; None for all cores of this machine.
+    """
     motions = max((job.motions for job in jobs), default=1)
-    return spread(judge, jobs, few=2 * AT_ONCE // motions, chunk=max(AT_ONCE // motions, 1))
+    here = Processes(few=2 * AT_ONCE // motions, chunk=max(AT_ONCE // motions, 1))
+    return in_order(runner or here, judge, jobs)
 
 
 def measured(
@@ -165,33 +173,11 @@ def _still_after(recording: Recording, motion: MotionRows, threshold: float) -> 
 
 
 def _record(job: MoveJob) -> tuple[Recording, Recording, dict[str, Recording]]:
-    description, recipe, limits = job.description, job.recipe, job.conditions.limits
-    move = job.conditions.declared(job.move)
-    start, target = np.array(move.start), np.array(move.target)
-    carried, declared = (body(paper_payload(description, one.mass)) for one in (job.move, move))
-    arm = FlexibleArm(job.conditions.arm(description, job.seed), carried)
-    cycle = control_line(description, start, declared, carried, arm)
-    if job.stream:
-        reference = stopped_stream(description, start, job.seed, limits)
-    else:
-        reference = point_to_point(start, target, limits)
-
-    def follow(shaped: Floats, elastic: ElasticFeedForward | None = None) -> Recording:
-        return simulate(cycle, start, reference, shaped, job.seed, elastic=elastic)
-
-    if job.stream:
-        tvist, own = recipe.make(description, move.mass), reference
-        tvist.reset(start)
-        tvist.aim(None)
-    else:
-        tvist, own = own_move(recipe, description, move, limits)
-    shaped = follow(shape(sound(tvist), own)[0], recipe.elastic(description, tvist))
+    trial = Trial(job.description, job.move, job.seed, job.conditions, stream=job.stream)
+    shaped = trial.shaped(job.recipe)
     ticks = round(motions(shaped)[0].shaped_duration(shaped) / PERIOD)
-    others = {
-        baseline.name: follow(baseline.shaped(recipe, description, move, reference, ticks, limits))
-        for baseline in job.baselines
-    }
-    return follow(reference), shaped, others
+    others = {baseline.name: trial.baseline(baseline, job.recipe, ticks) for baseline in job.baselines}
+    return trial.unshaped(), shaped, others
 
 
 def report(jobs: Sequence[MoveJob], judged: Sequence[JudgedMove]) -> dict[str, Any]:

@@ -12,9 +12,9 @@ from tvist_lab.evaluation.path_shaping import ALONG, JOINTS, UNSLOWED, WAYS, Ref
 from tvist_lab.evaluation.random_paths import KINDS, Kind, PathDraw, ToolMove
 from tvist_lab.evaluation.shaperbench import kinematics
 from tvist_lab.evaluation.tool_path import ToolPath
-from tvist_lab.evaluation.workers import spread
 from tvist_lab.metrics import in_motion_rms, motions
 from tvist_lab.recordings import Floats, Recording
+from tvist_lab.runners import Processes, in_order
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol.calibration import Calibration
@@ -113,7 +113,7 @@ def compare(jobs: Sequence[PathJob]) -> Iterator[JudgedPath]:
         PathsError: Hardly any drawn path can be followed.
         RefusalError: There is no such shaper for this robot.
     """
-    return spread(judge, jobs, few=1, chunk=1)
+    return in_order(Processes(few=1, chunk=1), judge, jobs)
 
 
 def judge(job: PathJob) -> JudgedPath:

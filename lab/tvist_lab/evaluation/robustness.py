@@ -13,7 +13,7 @@ from tvist_lab.evaluation.candidates import Candidate, Task
 from tvist_lab.evaluation.evaluate import QUIET, WORTH, measured
 from tvist_lab.evaluation.line import control_line, point_to_point, simulate
 from tvist_lab.evaluation.moves import Move
-from tvist_lab.evaluation.workers import spread
+from tvist_lab.runners import Processes, in_order
 from tvist_plant.description import RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
 
@@ -80,7 +80,7 @@ def error_jobs(
 
 def make_all(jobs: Sequence[ErrorJob]) -> Iterator[Robustness]:
     """Do all jobs in order, on all cores."""
-    return spread(make, jobs, few=2, chunk=1)
+    return in_order(Processes(few=2, chunk=1), make, jobs)
 
 
 def make(job: ErrorJob) -> Robustness:

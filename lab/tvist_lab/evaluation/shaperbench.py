@@ -14,7 +14,6 @@ from tvist_lab.evaluation.causality import check_causal
 from tvist_lab.evaluation.line import PAPER, control_line, point_to_point, simulate
 from tvist_lab.evaluation.moves import Move, draw_moves
 from tvist_lab.evaluation.running import ShaperFaultError
-from tvist_lab.evaluation.workers import spread
 from tvist_lab.metrics import (
     NotMeasurableError,
     best_tool_acceleration,
@@ -25,6 +24,7 @@ from tvist_lab.metrics import (
 )
 from tvist_lab.metrics.common_clock import Kinematics
 from tvist_lab.recordings import Floats, Recording
+from tvist_lab.runners import Processes, Runner, in_order
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, rigid_model
 from tvist_plant.plant import PERIOD
@@ -112,9 +112,9 @@ def jobs(
     ]
 
 
-def play(jobs: Sequence[BenchJob]) -> Iterator[Scores]:
-    """Do all jobs in order, on all cores."""
-    return spread(judge, jobs, few=2, chunk=1)
+def play(jobs: Sequence[BenchJob], runner: Runner | None = None) -> Iterator[Scores]:
+    """Do all jobs in order, by default on all cores of this machine."""
+    return in_order(runner or Processes(few=2, chunk=1), judge, jobs)
 
 
 def judge(job: BenchJob) -> Scores:

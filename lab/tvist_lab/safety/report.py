@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from tvist_lab.evaluation.workers import spread
+from tvist_lab.runners import Processes, in_order
 from tvist_lab.safety import changes, programs, sequences, stops, streams
 from tvist_plant.description import RobotDescription, load
 
@@ -60,7 +60,7 @@ def search(
 
     def run(what: str, count: int, work: Callable[[int], T]) -> list[T]:
         found = []
-        for one in spread(work, range(seed * APART, seed * APART + count)):
+        for one in in_order(Processes(), work, range(seed * APART, seed * APART + count)):
             found.append(one)
             progress(what)
         return found

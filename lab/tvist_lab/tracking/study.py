@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tvist_controller.api import Controller, Setup
-from tvist_lab.evaluation.workers import spread
 from tvist_lab.in_process import free_setup
 from tvist_lab.recordings import Floats
+from tvist_lab.runners import Processes, in_order
 from tvist_lab.tracking.following import follow
 from tvist_lab.tracking.ways import WAYS, WayName, level_end
 from tvist_shaping.named import BUILT_IN
@@ -90,7 +90,7 @@ def compare(jobs: Sequence[TrackingJob]) -> Iterator[Tracked]:
     Raises:
         TrackingError: A stop, or an error of the program, ended a motion.
     """
-    return spread(track, jobs)
+    return in_order(Processes(), track, jobs)
 
 
 def track(job: TrackingJob) -> Tracked:

@@ -1,0 +1,200 @@
+"""Dask for work of minutes and more: processes of this machine, or a cluster. A worker that dies costs its task alone.
+
+A worker takes a batch of tasks at a time. Dask repeats the batch of a worker that died on another one. If that happens
+again and again, the tasks of the batch are done one by one, each alone, so that only the one that kills its worker
+fails.
+"""
+
+import logging
+import math
+import multiprocessing.resource_tracker
+import signal
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+
+import dask
+from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
+
+from tvist_lab.runners.interface import Failed, Outcome, Result, Task, TaskError
+from tvist_lab.runners.parcels import do, pack, unpack
+from tvist_lab.runners.processes import cores
+
+SHARE = 16
+"""Least number of batches for each worker thread, so that all end at about the same time."""
+LARGEST = 8
+"""Largest number of tasks in a batch: as many are repeated when a worker dies."""
+AHEAD = 3
+"""Number of batches handed out for each worker thread, so that none waits for the next one."""
+PATIENCE = 30.0
+"""Time within which a scheduler and a worker have to answer [s]."""
+QUIET = {
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    "distributed.worker.memory.terminate": False,
+    "distributed.admin.tick.limit": "1h",
+}
+"""Configuration of Dask: a task needs little memory, and a busy machine is no reason for a warning."""
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """Runs tasks by Dask."""
+
+    scheduler: str | None = None
+    """Address of a scheduler, such as tcp://HOST:8786; None for processes of this machine, which end with the run."""
+    processes: int | None = None
+    """Number of processes of this machine; None for one for each core."""
+
+    def run(self, work: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[Outcome[Result]]:
+        """Yield an outcome for each task; see `Runner.run`.
+
+        Raises:
+            ConnectionError: There is no scheduler at the address, it has no workers, or it has gone.
+        """
+        with _quiet(), self._client() as client:
+            yield from _Run(client, work, tasks, self.scheduler).outcomes()
+
+    @contextmanager
+    def _client(self) -> Iterator[Client]:
+        if self.scheduler is not None:
+            with _connected(self.scheduler) as client:
+                yield client
+            return
+        with _local(self.processes or cores()) as cluster, Client(cluster, set_as_default=False) as client:
+            yield client
+
+
+@contextmanager
+def _connected(address: str) -> Iterator[Client]:
+    try:
+        client = Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ConnectionError(f"no Dask scheduler answers at {address}") from error
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=PATIENCE)
+        except TimeoutError as error:
+            raise ConnectionError(
+                f"the Dask scheduler at {address} has no workers: start some with dask worker {address}"
+            ) from error
+        yield client
+
+
+@contextmanager
+def _local(processes: int) -> Iterator[LocalCluster]:
+    """Start processes that Control+C does not reach, so that this one can end them in order.
+
+    They inherit a mask from the thread that starts them, which inherits it from this one, as do those that replace a
+    killed one. Starting the resource tracker removes the mask, so that it has to run before.
+    """
+    multiprocessing.resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        cluster = LocalCluster(
+            n_workers=processes,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            memory_limit=0,
+            silence_logs=logging.CRITICAL,
+        )
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    with cluster:
+        yield cluster
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep Dask's log and warnings from the terminal: what matters becomes a failure or an error."""
+    log = logging.getLogger("distributed")
+    level = log.level
+    log.setLevel(logging.CRITICAL + 1)
+    try:
+        with warnings.catch_warnings(), dask.config.set(QUIET):
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        log.setLevel(level)
+
+
+class _Run:
+    """Tasks on their way.
+
+    Args:
+        client: The client of a scheduler.
+        work: The work.
+        tasks: The tasks.
+        address: Address of the scheduler, for messages; None for a local one.
+    """
+
+    def __init__(
+        self, client: Client, work: Callable[[Task], Result], tasks: Sequence[Task], address: str | None
+    ) -> None:
+        self._client, self._tasks, self._address = client, tasks, address
+        self._work = partial(do, work)
+        size = math.ceil(len(tasks) / (SHARE * max(self._threads(), 1)))
+        self._batch = min(max(size, 1), LARGEST)
+        self._out: dict[str, list[int]] = {}
+        self._suspects: deque[int] = deque()
+
+    def outcomes(self) -> Iterator[Outcome[Result]]:
+        """Yield an outcome for each task."""
+        arriving = as_completed(loop=self._client.loop, raise_errors=False)
+        batches = deque(
+            range(first, min(first + self._batch, len(self._tasks)))
+            for first in range(0, len(self._tasks), self._batch)
+        )
+        yield from self._hand_out(arriving, batches)
+        for future in arriving:
+            yield from self._arrived(future)
+            yield from self._hand_out(arriving, batches)
+        while self._suspects:
+            alone = as_completed(loop=self._client.loop, raise_errors=False)
+            yield from self._submit(alone, [self._suspects.popleft()])
+            for future in alone:
+                yield from self._arrived(future, alone=True)
+
+    def _threads(self) -> int:
+        return sum(self._client.nthreads().values())
+
+    def _hand_out(self, arriving: as_completed, batches: deque[range]) -> Iterator[Outcome[Result]]:
+        """Submit batches for all workers that there are by now; yield a failure for each task that cannot go."""
+        most = AHEAD * max(self._threads(), 1)
+        while batches and len(self._out) < most:
+            yield from self._submit(arriving, batches.popleft())
+
+    def _submit(self, arriving: as_completed, indices: Sequence[int]) -> Iterator[Outcome[Result]]:
+        going, packed = [], []
+        for index in indices:
+            one = pack(self._tasks[index])
+            if isinstance(one, Failed):
+                yield index, one
+            else:
+                going.append(index)
+                packed.append(one)
+        if going:
+            future = self._client.submit(self._work, packed, pure=False)
+            self._out[str(future.key)] = going
+            arriving.add(future)
+
+    def _arrived(self, future: "Future[list[bytes]]", *, alone: bool = False) -> Iterator[Outcome[Result]]:
+        indices = self._out.pop(str(future.key))
+        if future.status == "finished":
+            yield from zip(indices, map(unpack, future.result()), strict=True)
+            return
+        if future.status != "error":
+            raise ConnectionError(f"the Dask scheduler at {self._address} has gone")
+        error = future.exception()
+        if isinstance(error, KilledWorker) and not alone:
+            self._suspects.extend(indices)
+            return
+        if isinstance(error, KilledWorker):
+            error = TaskError("every worker that did it died")
+        for index in indices:
+            yield index, Failed(error)

@@ -1,0 +1,87 @@
+"""Processes of this machine for work of seconds: quick to start."""
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+
+from tvist_lab.runners.interface import Failed, Outcome, Result, Task
+from tvist_lab.runners.parcels import attempt, do, pack, unpack
+
+AHEAD = 4
+"""Number of chunks handed out for each process, so that none waits for the next one."""
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@dataclass(frozen=True)
+class Processes:
+    """Runs tasks on all cores of this machine, in processes that end with the run.
+
+    A process that dies ends the run: use `tvist_lab.runners.cluster.Cluster` for work that has to survive it.
+    """
+
+    few: int = 8
+    """Largest number of tasks that are done in this process, since starting others takes seconds."""
+    chunk: int = 4
+    """Number of tasks that a process takes at a time."""
+
+    def run(self, work: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[Outcome[Result]]:
+        """Yield an outcome for each task; see `Runner.run`.
+
+        Raises:
+            ChildProcessError: A process died, such as for want of memory.
+        """
+        processes = min(cores(), len(tasks))
+        if processes <= 1 or len(tasks) <= self.few:
+            for index, task in enumerate(tasks):
+                yield index, attempt(work, task)
+            return
+        others = set(multiprocessing.active_children())
+        # Control+C reaches all processes of a terminal; this one ends the others, which ignore it.
+        ignored = (signal.SIGINT, signal.SIG_IGN)
+        pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), signal.signal, ignored)
+        try:
+            yield from self._through(pool, work, tasks, AHEAD * processes)
+        except BrokenProcessPool:
+            raise ChildProcessError("a process died while it did a task; perhaps memory ran out") from None
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in set(multiprocessing.active_children()) - others:
+                process.terminate()
+
+    def _through(
+        self,
+        pool: ProcessPoolExecutor,
+        work: Callable[[Task], Result],
+        tasks: Sequence[Task],
+        most: int,
+    ) -> Iterator[Outcome[Result]]:
+        """Hand out chunks, at most so many at a time, and yield what comes back."""
+        out: dict[Future[list[bytes]], list[int]] = {}
+        for first in range(0, len(tasks), self.chunk):
+            indices, packed = [], []
+            for index in range(first, min(first + self.chunk, len(tasks))):
+                one = pack(tasks[index])
+                if isinstance(one, Failed):
+                    yield index, one
+                else:
+                    indices.append(index)
+                    packed.append(one)
+            out[pool.submit(do, work, packed)] = indices
+            if len(out) >= most:
+                yield from _arrived(out)
+        while out:
+            yield from _arrived(out)
+
+
+def _arrived(out: dict[Future[list[bytes]], list[int]]) -> Iterator[Outcome[Result]]:
+    """Wait for a chunk, and yield the outcomes of all that have arrived."""
+    for future in wait(out, return_when=FIRST_COMPLETED).done:
+        yield from zip(out.pop(future), map(unpack, future.result()), strict=True)
