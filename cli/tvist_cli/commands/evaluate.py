@@ -9,10 +9,13 @@ from tvist_cli.evaluated import print_evaluation
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import print_json, progress
+from tvist_cli.report_file import command_line, write_report
 from tvist_cli.shapers_of import loaded
 from tvist_cli.simulated_arm import disturbed, masses_of, named
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from tvist_controller.own_shapers import OwnShaper
     from tvist_lab.evaluation.conditions import Conditions
     from tvist_lab.evaluation.evaluate import JudgedMove, MoveJob
@@ -45,6 +48,7 @@ def evaluate(
     save_moves: Path | None = None,
     figures: Path | None = None,
     look: FigureOptions = AS_USUAL,
+    report: Path | None = None,
     json: bool = False,
 ) -> None:
     """Simulate moves unshaped and shaped, as fast as possible, and report the vibration after each.
@@ -82,10 +86,12 @@ def evaluate(
         save_moves: File to write the moves and their payloads to.
         figures: Folder to write figures to.
         look: How to write the figures.
+        report: File to write a web page with the verdict, the tables and the figures to.
         json: Print one JSON object.
     """
-    from tvist_lab.evaluation.evaluate import MoveJob, arm_seed, report
+    from tvist_lab.evaluation.evaluate import MoveJob, arm_seed
     from tvist_lab.evaluation.evaluate import evaluate as run
+    from tvist_lab.evaluation.evaluate import report as summary
     from tvist_lab.evaluation.running import ShaperFaultError
     from tvist_plant.description import DescriptionError, load
 
@@ -125,8 +131,6 @@ def evaluate(
                     bar(job.motions, None)
             except ShaperFaultError as fault:
                 raise Failure(f"shaper {shaper} {fault}") from fault
-        if figures is not None:
-            _draw(jobs, judged, look.into(figures))
     from tvist_lab.evaluation.moves import collisions
 
     met = collisions(description, chosen) if moves is not None and not streams else []
@@ -141,7 +145,7 @@ def evaluate(
         "payload_error_percent": payload_error,
         "stiffness_error_percent": stiffness_error,
         "free_of_collision": share,
-        **report(jobs, judged),
+        **summary(jobs, judged),
     }
     result["notes"] = _notes(result, met, known, chosen, share)
     if len(chosen) < wanted:
@@ -150,6 +154,8 @@ def evaluate(
         )
     if baselines and not others:
         result["notes"].append("there are no baselines: they need a calibration of this arm")
+    if figures is not None or report is not None:
+        _show(result, _drawn(jobs, judged), None if figures is None else look.into(figures), report)
     if json:
         print_json(result)
     else:
@@ -289,19 +295,34 @@ def _recipe(
         return recipe, every(recipe, description, masses) if baselines and known is not None else ()
 
 
-def _draw(jobs: list["MoveJob"], judged: list["JudgedMove"], files: "FigureFiles") -> None:
+def _show(
+    result: dict[str, Any],
+    drawn: dict[str, tuple["Figure", str]],
+    files: "FigureFiles | None",
+    report: Path | None,
+) -> None:
+    with told(OSError):
+        if files is not None:
+            write(files, {name: figure for name, (figure, _) in drawn.items()})
+        if report is not None:
+            from tvist_lab.report import evaluation_page
+
+            pictures = {caption: figure for figure, caption in drawn.values()}
+            write_report(report, evaluation_page(result, pictures, command_line()))
+
+
+def _drawn(jobs: list["MoveJob"], judged: list["JudgedMove"]) -> dict[str, tuple["Figure", str]]:
+    """Figures by the names of their files, each with a caption."""
     from tvist_lab.evaluation.evaluate import record
     from tvist_lab.figures import residual_by_move_figure, vibration_figure
 
     counted = [place for place, one in enumerate(judged) if one.counts] or list(range(len(judged)))
     middle = sorted(counted, key=lambda place: judged[place].unshaped.peak)[len(counted) // 2]
-    write(
-        files,
-        {
-            "moves": residual_by_move_figure(judged),
-            "one_move": vibration_figure(*record(jobs[middle]), middle + 1),
-        },
-    )
+    one = vibration_figure(*record(jobs[middle]), middle + 1)
+    return {
+        "moves": (residual_by_move_figure(judged), "Vibration after each move, unshaped and shaped."),
+        "one_move": (one, f"Move {middle + 1}, which vibrates like the median of all moves."),
+    }
 
 
 def _notes(

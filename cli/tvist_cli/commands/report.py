@@ -1,10 +1,10 @@
 """`tvist report`: a web page about recordings, in one file."""
 
-import shlex
 from pathlib import Path
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import print_json, say
+from tvist_cli.output import out, print_json
+from tvist_cli.report_file import command_line, write_report
 
 
 def report(*files: Path, output: Path = Path("report.html"), force: bool = False, json: bool = False) -> None:
@@ -24,18 +24,15 @@ def report(*files: Path, output: Path = Path("report.html"), force: bool = False
     if output.exists() and not force:
         raise Failure(f"{output} exists already: give --force to replace it, or --output")
     from tvist_lab.recordings import RecordingError
-    from tvist_lab.recordings.whole_file import whole_file
-    from tvist_lab.report import recordings_page, render
+    from tvist_lab.report import recordings_page
 
     with told(RecordingError):
-        page = recordings_page(files, shlex.join(["tvist", "report", *map(str, files)]))
-    with whole_file(output) as stream:
-        stream.write(render(page).encode())
+        page = recordings_page(files, command_line())
+    write_report(output, page)
     if json:
         print_json(
             {"files": [str(file) for file in files], "report": str(output), "verdict": list(page.verdict)}
         )
         return
     for sentence in page.verdict:
-        say(sentence)
-    say(f"the report is in {output}")
+        out.print(sentence)

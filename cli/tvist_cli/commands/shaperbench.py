@@ -8,6 +8,7 @@ from cyclopts import Parameter
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import number, out, print_json, progress, say, table, write_json
+from tvist_cli.report_file import write_report
 from tvist_cli.shapers_of import load_given
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ def shaperbench(
     figures: Path | None = None,
     look: FigureOptions = AS_USUAL,
     markdown: Path | None = None,
+    report: Path | None = None,
     json: bool = False,
 ) -> None:
     """Rank shapers by how soon ten different arms come to rest, and by the vibration until then.
@@ -55,6 +57,7 @@ def shaperbench(
         figures: Folder to write figures of settling time against residual vibration and against delay to.
         look: How to write the figures.
         markdown: File to write a page with the tables to.
+        report: File to write a web page with the verdict, the tables and the figures to.
         json: Print one JSON object.
     """
     from tvist_lab.evaluation import curves, leaderboard
@@ -97,7 +100,8 @@ def shaperbench(
         "calibration": known.name,
         **leaderboard.leaderboard(standing, faults, jobs, done, bent),
     }
-    _write(result, output, markdown, figures, look)
+    _write(result, output, markdown)
+    _show(result, figures, look, report)
     if json:
         print_json(result)
     else:
@@ -178,8 +182,6 @@ def _write(
     result: dict[str, Any],
     output: Path | None,
     markdown: Path | None,
-    figures: Path | None,
-    look: FigureOptions,
 ) -> None:
     with told(OSError):
         if output is not None:
@@ -188,11 +190,23 @@ def _write(
             from tvist_lab.evaluation.markdown import page
 
             markdown.write_text(page(result), encoding="utf-8")
-        if figures is not None:
-            from tvist_lab.figures import pareto_figure, settling_figure
 
-            rows = result["shapers"]
-            write(look.into(figures), {"pareto": pareto_figure(rows), "settling": settling_figure(rows)})
+
+def _show(result: dict[str, Any], figures: Path | None, look: FigureOptions, report: Path | None) -> None:
+    if figures is None and report is None:
+        return
+    from tvist_lab.figures import pareto_figure, settling_figure
+    from tvist_lab.report import shaperbench_page
+
+    pareto, settling = pareto_figure(result["shapers"]), settling_figure(result["shapers"])
+    if figures is not None:
+        write(look.into(figures), {"pareto": pareto, "settling": settling})
+    if report is not None:
+        captions = {
+            "Settling time against residual vibration.": pareto,
+            "Settling time against delay.": settling,
+        }
+        write_report(report, shaperbench_page(result, captions))
 
 
 def _print(result: dict[str, Any]) -> None:

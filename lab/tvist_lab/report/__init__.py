@@ -1,6 +1,17 @@
 """Reports: one self-contained web page each, with a verdict in a sentence, tables, figures and provenance."""
 
 from tvist_lab.report.of_recordings import recordings_page, recordings_verdict
+from tvist_lab.report.of_studies import evaluation_page, shaperbench_page
 from tvist_lab.report.page import Page, PageTable, Picture, Section, render
 
-__all__ = ["Page", "PageTable", "Picture", "Section", "recordings_page", "recordings_verdict", "render"]
+__all__ = [
+    "Page",
+    "PageTable",
+    "Picture",
+    "Section",
+    "evaluation_page",
+    "recordings_page",
+    "recordings_verdict",
+    "render",
+    "shaperbench_page",
+]

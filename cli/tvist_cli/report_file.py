@@ -1,0 +1,26 @@
+"""The web page that a command writes about its result."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tvist_cli.output import say
+
+if TYPE_CHECKING:
+    from tvist_lab.report import Page
+
+
+def command_line() -> str:
+    """Return the command that was called, for a page's provenance."""
+    return shlex.join(["tvist", *sys.argv[1:]])
+
+
+def write_report(path: Path, page: "Page") -> None:
+    """Write a page, all of it or nothing, and say where it is."""
+    from tvist_lab.recordings.whole_file import whole_file
+    from tvist_lab.report import render
+
+    with whole_file(path) as stream:
+        stream.write(render(page).encode())
+    say(f"the report is in {path}")

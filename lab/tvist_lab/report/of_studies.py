@@ -1,0 +1,192 @@
+"""Reports of `tvist evaluate` and `tvist shaperbench`, from what they print with `--json`."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from tvist_lab.report.page import Page, PageTable, Section, picture
+
+LISTED = 200
+"""Largest number of moves that are listed one by one."""
+
+
+def evaluation_page(result: Mapping[str, Any], figures: Mapping[str, Figure], command: str) -> Page:
+    """Build the report of an evaluation.
+
+    Args:
+        result: What `tvist evaluate --json` prints.
+        figures: Caption to figure.
+        command: The command that makes the report, for its provenance.
+    """
+    ways = {result["shaper"]: result, **result["baselines"]}
+    columns = (
+        "",
+        "less, median",
+        "p5",
+        "least",
+        "less than waiting",
+        "delay ms",
+        "still ms",
+        "largest q̈ / limit",
+    )
+    rows = [
+        (
+            name,
+            *(_text(way["reduction_percent"][key], 1, " %") for key in ("median", "p5", "min")),
+            _text(way["less_than_waiting_percent"]["median"], 1, " %"),
+            _text(way["delay_ms"]["median"], 0),
+            _text(way["still_after_unshaped_stop_ms"]["median"], 0),
+            _text(way["peak_acceleration_ratio"]["max"], 3),
+        )
+        for name, way in ways.items()
+    ]
+    sections = [Section("Shapers", tables=[PageTable(columns, rows)]), _drawn(figures)]
+    sections.append(Section("Moves", tables=[_moves(result["moves"])]))
+    if result["notes"]:
+        sections.append(Section("Notes", points=result["notes"]))
+    words = {
+        "less": "Reduction of the largest acceleration of the tool, later than 10 ms after the reference stops.",
+        "less than waiting": "The same against an unshaped arm that waits as long as the shaper is late.",
+        "delay": "Time by which shaping lengthens a move, median.",
+        "still": "Last time |α| exceeds 0.1 m/s², from the stop of the unshaped reference, median.",
+        "p5": "The fifth percentile: 95 of 100 moves are better.",
+    }
+    facts = {
+        "Command": command,
+        "Arm": str(result["plant"]),
+        "Calibration": str(result["calibration"]),
+        "Limits": str(result["limits"]),
+        "Seed": str(result["seed"]),
+    }
+    sections += [Section("What the words mean", facts=words), Section("Provenance", facts=facts)]
+    return Page(f"Evaluation of the shaper {result['shaper']}", _verdict_on_evaluation(result), sections)
+
+
+def _verdict_on_evaluation(result: Mapping[str, Any]) -> list[str]:
+    name, less, delay = result["shaper"], result["reduction_percent"], result["delay_ms"]["median"]
+    if less["median"] is None:
+        return [f"No move vibrates enough unshaped to show what {name} does."]
+    moves = f"{result['counted']} move{'' if result['counted'] == 1 else 's'}"
+    if less["median"] <= 0.0:
+        lead = f"{name} does not reduce the vibration of {moves}: the median is {-less['median']:.0f} % more."
+    else:
+        lead = (
+            f"{name} leaves {less['median']:.0f} % less vibration after the stop (median of {moves}), "
+            f"{less['p5']:.0f} % less in all but one of twenty, and makes a move {delay:.0f} ms longer."
+        )
+    better = [
+        f"{other} ({way['reduction_percent']['median']:.0f} %, {way['delay_ms']['median']:.0f} ms)"
+        for other, way in result["baselines"].items()
+        if way["reduction_percent"]["median"] is not None
+        and way["reduction_percent"]["median"] > less["median"]
+        and way["delay_ms"]["median"] <= delay
+    ]
+    if not result["baselines"]:
+        return [lead]
+    if better:
+        return [lead, f"Better, and not later: {', '.join(better)}."]
+    return [lead, "No baseline leaves less without being later."]
+
+
+def _moves(moves: Sequence[Mapping[str, Any]]) -> PageTable:
+    columns = (
+        "move",
+        "payload kg",
+        "unshaped m/s²",
+        "shaped m/s²",
+        "less",
+        "delay ms",
+        "still ms",
+        "q̈ / limit",
+    )
+    rows = [
+        (
+            str(place),
+            _text(move["payload_kg"], 2),
+            _text(move["unshaped_peak_m_s2"], 3),
+            _text(move["shaped_peak_m_s2"], 3),
+            _text(move["reduction_percent"], 1, " %"),
+            _text(move["delay_ms"], 0),
+            _text(move["still_after_ms"]["shaped"], 0),
+            _text(move["peak_acceleration_ratio"], 3),
+        )
+        for place, move in enumerate(moves[:LISTED], 1)
+    ]
+    more = f"The first {LISTED} of {len(moves)} moves" if len(moves) > LISTED else ""
+    return PageTable(columns, rows, more)
+
+
+def shaperbench_page(result: Mapping[str, Any], figures: Mapping[str, Figure]) -> Page:
+    """Build the report of a ranking of shapers.
+
+    Args:
+        result: What `tvist shaperbench --json` prints.
+        figures: Caption to figure.
+    """
+    ranked = [row for row in result["shapers"] if row["ranked"]]
+    columns = (
+        "shaper",
+        "still ms",
+        "p90",
+        "vibration m/s²",
+        "less than waiting",
+        "p5",
+        "delay ms",
+        "largest q̈ / limit",
+    )
+    rows = [
+        (
+            row["name"] + (" *" if row["pareto"] else ""),
+            _text(row["time_until_still_ms"]["median"], 0),
+            _text(row["time_until_still_ms"]["p90"], 0),
+            _text(row["residual_m_s2"]["median"], 3),
+            _text(row["reduction_percent"]["median"], 1, " %"),
+            _text(row["reduction_percent"]["p5"], 1, " %"),
+            _text(row["delay_ms"]["median"], 0),
+            _text(row["peak_acceleration_ratio"]["max"], 3),
+        )
+        for row in ranked
+    ]
+    caption = "* keeps the limits, and no other shaper that keeps them is better in both still and vibration"
+    sections = [Section("Shapers", tables=[PageTable(columns, rows, caption)]), _drawn(figures)]
+    if others := [f"{row['name']}: it {row['fault']}" for row in result["shapers"] if not row["ranked"]]:
+        sections.append(Section("Not ranked", points=others))
+    sections.append(Section("Arms", facts=result["arms"]))
+    errors = ", ".join(f"{100 * error:+.0f} %" for error in result["payload_errors"])
+    facts = {
+        "Command": result["command"],
+        "Moves": f"{result['moves']}, payload errors of {errors}",
+        "Calibration": str(result["calibration"]),
+        "Seed": str(result["seed"]),
+    }
+    sections.append(Section("Provenance", facts=facts))
+    return Page(
+        f"Ranking of {len(ranked)} shapers", _verdict_on_ranking(ranked, len(result["arms"])), sections
+    )
+
+
+def _verdict_on_ranking(ranked: Sequence[Mapping[str, Any]], arms: int) -> list[str]:
+    still = [
+        row for row in ranked if row["keeps_limits"] and row["time_until_still_ms"]["median"] is not None
+    ]
+    if not still:
+        return ["No shaper that keeps the limits brings the arms to rest."]
+    first = min(still, key=lambda row: row["time_until_still_ms"]["median"])
+    quiet = min(still, key=lambda row: row["residual_m_s2"]["median"])
+    still_at, less = first["time_until_still_ms"]["median"], first["reduction_percent"]["median"]
+    lead = (
+        f"Of those that keep the limits, {first['name']} is at rest first: {still_at:.0f} ms after the unshaped stop "
+        f"(median over {arms} arms), with {less:.0f} % less vibration than waiting."
+    )
+    if quiet is first:
+        return [lead, "It also leaves the least vibration."]
+    return [lead, f"{quiet['name']} leaves the least vibration: {quiet['residual_m_s2']['median']:.3f} m/s²."]
+
+
+def _drawn(figures: Mapping[str, Figure]) -> Section:
+    return Section("Figures", pictures=[picture(figure, caption) for caption, figure in figures.items()])
+
+
+def _text(value: float | None, digits: int, unit: str = "") -> str:
+    return "–" if value is None else f"{value:.{digits}f}{unit}"
