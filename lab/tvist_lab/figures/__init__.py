@@ -15,6 +15,7 @@ from tvist_lab.figures.residual import figure_16
 from tvist_lab.figures.robustness import robustness_figure
 from tvist_lab.figures.sensitivity import figure_4
 from tvist_lab.figures.style import save
+from tvist_lab.figures.sweep import sweep_figure
 
 __all__ = [
     "Recorded",
@@ -35,5 +36,6 @@ __all__ = [
     "residual_by_move_figure",
     "robustness_figure",
     "save",
+    "sweep_figure",
     "vibration_figure",
 ]
