@@ -37,6 +37,7 @@ COMMANDS = {
     "paths": "Compare paths shaped along the path with the same paths shaped joint by joint.",
     "tracking": "Measure how closely the arm follows positions sent to servoj, with every shaper.",
     "robustness": "Compare shapers on arms that are stiffer, softer or loaded otherwise than they are told.",
+    "sweep": "Compare shapers over payloads, errors, moves and robots, on all cores or a cluster.",
     "shaperbench": "Rank shapers, your own included, on ten simulated arms.",
     "search": "Search for cases in which a robot breaks its promises.",
     "bench": "Measure how fast tvist runs on this machine.",

@@ -1,4 +1,4 @@
-"""Load shapers that a command line names, or gives as FILE.py:NAME."""
+"""Load shapers that a command line names, or gives as FILE.py:NAME, and the calibrations that they need."""
 
 from typing import TYPE_CHECKING
 
@@ -6,6 +6,8 @@ from tvist_cli.failure import told
 
 if TYPE_CHECKING:
     from tvist_controller.own_shapers import OwnShaper
+    from tvist_plant.description import RobotDescription
+    from tvist_protocol.calibration import Calibration
 
 
 def loaded(shaper: str) -> "tuple[str, tuple[OwnShaper, ...]]":
@@ -35,3 +37,43 @@ def load_given(place: str) -> "OwnShaper":
 
     with told(OwnShaperError, code=2):
         return load_own(place)
+
+
+def calibration_for(
+    name: str | None,
+    shaper: str,
+    own: "tuple[OwnShaper, ...]",
+    modes: int,
+    description: "RobotDescription",
+) -> "Calibration | None":
+    """Return the calibration that was named, or the one of this robot: for several modes, a modal one.
+
+    Args:
+        name: Name of a calibration that comes with the package, or path of a calibration file; None for the robot's.
+        shaper: Name of the shaper.
+        own: Shapers from files.
+        modes: Number of modes that are asked for.
+        description: The robot.
+
+    Raises:
+        Failure: There is no such calibration or shaper.
+    """
+    from tvist_controller.calibrations import default_for, load
+    from tvist_controller.choices import wanted_modes
+    from tvist_controller.mode_source import modal_source
+    from tvist_controller.refusal import RefusalError
+    from tvist_protocol.calibration import CalibrationError
+    from tvist_shaping import Registry
+
+    with told(CalibrationError, RefusalError, code=2):
+        known = Registry(one.shaper for one in own)
+        several = wanted_modes(shaper, modes, "shaper", known) > 1
+        several = several or known.feed_forward_of(shaper) != "rigid"
+        if name is not None:
+            return load(name)
+        default = default_for(description.robot.model)
+        if default is None:
+            return None
+        calibration = load(default)
+        found = modal_source(description, calibration) if several else None
+        return calibration if found is None else found.calibration

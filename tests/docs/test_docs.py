@@ -126,6 +126,9 @@ def check_command(words):
             unknown = {word for word in arguments if word.startswith("--")} - marimo_options(*verbs)
             assert not unknown, f"marimo {' '.join(verbs)} does not know {unknown}"
             assert all((ROOT / word).exists() for word in arguments if word.startswith("lab/"))
+        case "dask":
+            unknown = {word for word in arguments if word.startswith("--")} - dask_options(arguments[0])
+            assert not unknown, f"dask {arguments[0]} does not know {unknown}"
         case "python" if arguments[0] == "-m":
             assert importlib.util.find_spec(arguments[1]) is not None, arguments[1]
         case "python" | "cp":
@@ -146,6 +149,11 @@ def options(*command):
 @functools.cache
 def marimo_options(*verbs):
     return set(re.findall(r"--[\w-]+", assert_well(run("-m", "marimo", *verbs, "--help"))))
+
+
+@functools.cache
+def dask_options(verb):
+    return set(re.findall(r"--[\w-]+", assert_well(run("-m", "dask", verb, "--help"))))
 
 
 @pytest.fixture(scope="module")

@@ -82,6 +82,9 @@ MISUSE = [
     (("evaluate", "--random", "0"), ["random is 0"]),
     (("evaluate", "--random", "2", "--modes", "9"), ["modes is 9", "1 to 6"]),
     (("evaluate", "--random", "2", "--payload", "heavy"), ["payload is 'heavy'", "0 to 100 kg"]),
+    (("sweep",), ["spec is missing"]),
+    (("sweep", "x.toml", "--processes", "0"), ["processes is 0", "1 to 1024"]),
+    (("sweep", "x.toml", "--processes", "2", "--scheduler", "x"), ["either --processes or --scheduler"]),
     (("paths", "--random", "0"), ["random is 0", "1 to 100000"]),
     (("paths", "--kind", "spiral"), ["--kind is 'spiral'", "line, arc, blends"]),
     (("paths", "--shapers", "zzz"), ["'zzz'", "zvd"]),
@@ -201,6 +204,33 @@ def test_a_wrong_file_is_a_sentence_with_file_key_value_and_what_is_allowed(
 ):
     (tmp_path / name).write_text(content, encoding="utf-8")
     assert_said(tvist("serve", option, name), 2, [name, *words])
+
+
+SWEEP = """shapers = ["zv"]
+moves = 2
+payloads = [5]
+"""
+SWEEPS = [
+    (SWEEP + "shapes = 1", ["line 4", "'shapes'", "did you mean 'shapers'?"]),
+    (SWEEP.replace('["zv"]', "[]"), ["line 1", "shapers has 0 entries", "at least 1"]),
+    (SWEEP + "seed = = 1", ["not valid TOML", "line 4"]),
+    (SWEEP.replace("zv", "zvv"), ["shapers[0]", "'zvv'", "did you mean"]),
+    (SWEEP + "robots = ['ur5']", ["robots[0]", "'ur5'", "one-joint, ur5e"]),
+    (SWEEP + "robots = [{robot = 'ur5e', calibration = 'x'}]", ["shapers[0] with robots[0]", "calibration 'x'"]),
+    (SWEEP + "robots = ['one-joint']\nwrists = true", ["wrists", "2 joints"]),
+    (SWEEP.replace("zv", "mine.py:zv"), ["shapers[0]", "mine.py", "No such file"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("content", "words"), SWEEPS)
+def test_a_wrong_sweep_is_a_sentence_with_file_and_line_or_key(tvist, tmp_path, content, words):
+    (tmp_path / "x.toml").write_text(content, encoding="utf-8")
+    assert_said(tvist("sweep", "x.toml"), 1, ["x.toml", *words])
+    assert not (tmp_path / "x").exists()
+
+
+def test_a_sweep_without_a_file_is_a_sentence(tvist):
+    assert_said(tvist("sweep", "x.toml"), 1, ["x.toml", "No such file"])
 
 
 @pytest.mark.parametrize(

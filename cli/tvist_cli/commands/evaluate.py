@@ -10,7 +10,7 @@ from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
 from tvist_cli.output import print_json, progress
 from tvist_cli.report_file import command_line, write_report
-from tvist_cli.shapers_of import loaded
+from tvist_cli.shapers_of import calibration_for, loaded
 from tvist_cli.simulated_arm import disturbed, masses_of, named
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def evaluate(
         description = load(robot)
     masses = masses_of(payload, description)
     shaper, own = loaded(shaper)
-    known = _calibration(calibration, shaper, own, modes, description)
+    known = calibration_for(calibration, shaper, own, modes, description)
     chosen, share = _moves(moves, random, seed, masses, description, length, wrists=wrists)
     wanted, chosen = len(chosen), chosen if streams else _feasible(chosen, description, conditions)
     plant, kept = disturbed(description, disturbances, clean=clean)
@@ -216,35 +216,6 @@ def _feasible(moves: list["Move"], description: "RobotDescription", conditions: 
     if not found:
         raise Failure("the drives are too weak for all of these moves at these limits", code=2)
     return found
-
-
-def _calibration(
-    name: str | None,
-    shaper: str,
-    own: "tuple[OwnShaper, ...]",
-    modes: int,
-    description: "RobotDescription",
-) -> "Calibration | None":
-    """Return the calibration that was named, or the one of this robot: for several modes, a modal one."""
-    from tvist_controller.calibrations import default_for, load
-    from tvist_controller.choices import wanted_modes
-    from tvist_controller.mode_source import modal_source
-    from tvist_controller.refusal import RefusalError
-    from tvist_protocol.calibration import CalibrationError
-    from tvist_shaping import Registry
-
-    with told(CalibrationError, RefusalError, code=2):
-        known = Registry(one.shaper for one in own)
-        several = wanted_modes(shaper, modes, "shaper", known) > 1
-        several = several or known.feed_forward_of(shaper) != "rigid"
-        if name is not None:
-            return load(name)
-        default = default_for(description.robot.model)
-        if default is None:
-            return None
-        calibration = load(default)
-        found = modal_source(description, calibration) if several else None
-        return calibration if found is None else found.calibration
 
 
 def _moves(

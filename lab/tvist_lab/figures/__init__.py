@@ -20,6 +20,7 @@ from tvist_lab.figures.ring_down import ring_down_figure
 from tvist_lab.figures.robustness import robustness_figure
 from tvist_lab.figures.sensitivity import figure_4
 from tvist_lab.figures.settling_times import figure_15
+from tvist_lab.figures.sweep import sweep_figure
 
 __all__ = [
     "FORMATS",
@@ -48,5 +49,6 @@ __all__ = [
     "robustness_figure",
     "save",
     "settling_figure",
+    "sweep_figure",
     "vibration_figure",
 ]

@@ -1,0 +1,174 @@
+"""The folder of a sweep: what it is a sweep of, the parts done so far, and at the end all rows in one file.
+
+Each file is written under another name, and renamed when it is complete, so that every file of the folder can be read
+at any time, whatever ended the program.
+"""
+
+import fcntl
+import io
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import msgspec
+import polars as pl
+
+from tvist_lab.sweep.columns import FAILED, SCHEMA, Row, frame
+
+MANIFEST = "sweep.json"
+"""What the folder is a sweep of."""
+PARTS = "parts"
+"""Folder of the parts of a sweep that has not ended."""
+ROWS = "sweep.parquet"
+"""All rows of a sweep that has ended."""
+
+
+class StoreError(OSError):
+    """A folder cannot hold this sweep; the message names the folder or the file."""
+
+
+class Store:
+    """An open folder; no other process can open it meanwhile.
+
+    Args:
+        folder: The folder, which is created if it does not exist.
+        identity: What determines the rows, by name; the folder has to hold a sweep of the same, or nothing.
+
+    Raises:
+        StoreError: The folder holds another sweep or something else, is in use, or cannot be written.
+    """
+
+    def __init__(self, folder: Path, identity: dict[str, Any]) -> None:
+        self.folder = folder
+        self._parts = folder / PARTS
+        manifest = folder / MANIFEST
+        new = not manifest.exists()
+        if new and folder.is_dir() and any(folder.iterdir()):
+            raise StoreError(f"{folder} exists already and holds no sweep: give another --output")
+        try:
+            self._parts.mkdir(parents=True, exist_ok=True)
+            if new:
+                _write(manifest, msgspec.json.format(msgspec.json.encode(identity), indent=1) + b"\n")
+            self._lock = os.open(manifest, os.O_RDONLY | os.O_CLOEXEC)
+        except OSError as error:
+            raise _told(error, folder) from error
+        try:
+            self._take(manifest, identity)
+        except BaseException:
+            os.close(self._lock)
+            raise
+
+    def _take(self, manifest: Path, identity: dict[str, Any]) -> None:
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise StoreError(f"another tvist sweep is writing {self.folder}") from error
+        _check_same(self.folder, manifest, identity)
+        for forgotten in (*self.folder.glob(".*.tmp"), *self._parts.glob(".*.tmp")):
+            forgotten.unlink()
+        known = [*self._parts.glob("*.parquet")]
+        self._next = 1 + max((int(part.stem) for part in known), default=0)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        os.close(self._lock)
+
+    def rows(self) -> pl.DataFrame:
+        """Return all rows that there are, each once, in the order of their positions.
+
+        Raises:
+            StoreError: A file cannot be read.
+        """
+        files = [self.folder / ROWS, *sorted(self._parts.glob("*.parquet"))]
+        read = [_read(file) for file in files if file.exists()]
+        found = pl.concat([pl.DataFrame(schema=SCHEMA), *read])
+        return found.unique("row", keep="last", maintain_order=True).sort("row")
+
+    def done(self, shapers: int) -> set[int]:
+        """Return the positions of the tasks that are done: all rows are there, and none failed.
+
+        Args:
+            shapers: Number of rows of a task.
+        """
+        tasks = self.rows().select(task=pl.col("row") // shapers, well=pl.col("status") != FAILED)
+        counted = tasks.group_by("task").agg(pl.col("well").sum())
+        return set(counted.filter(pl.col("well") == shapers)["task"].to_list())
+
+    def keep(self, rows: Sequence[Row]) -> None:
+        """Write rows as a part.
+
+        Raises:
+            StoreError: The part cannot be written; the parts before it remain.
+        """
+        _write_frame(self._parts / f"{self._next:06d}.parquet", frame(rows), self.folder)
+        self._next += 1
+
+    def finish(self) -> pl.DataFrame:
+        """Write all rows to one file, remove the parts, and return the rows.
+
+        Raises:
+            StoreError: The file cannot be written; the parts remain.
+        """
+        found, parts = self.rows(), list(self._parts.glob("*.parquet"))
+        if parts:
+            _write_frame(self.folder / ROWS, found, self.folder)
+            _remove(parts)
+        return found
+
+
+def _check_same(folder: Path, manifest: Path, identity: dict[str, Any]) -> None:
+    try:
+        held = msgspec.json.decode(manifest.read_bytes(), type=dict[str, Any])
+    except (OSError, msgspec.DecodeError) as error:
+        raise StoreError(f"{manifest} cannot be read as what a sweep is of: give another --output") from error
+    wanted = msgspec.json.decode(msgspec.json.encode(identity))
+    changed = [name for name in dict.fromkeys((*wanted, *held)) if wanted.get(name) != held.get(name)]
+    if changed:
+        raise StoreError(
+            f"{folder} holds a sweep with other {', '.join(changed)}: give another --output, or remove the folder"
+        )
+
+
+def _read(file: Path) -> pl.DataFrame:
+    try:
+        return pl.read_parquet(file.read_bytes(), schema=SCHEMA)
+    except (pl.exceptions.PolarsError, OSError) as error:
+        raise StoreError(f"{file} cannot be read as rows of a sweep: remove it to run them again") from error
+
+
+def _write_frame(file: Path, rows: pl.DataFrame, folder: Path) -> None:
+    content = io.BytesIO()
+    rows.write_parquet(content)
+    try:
+        _write(file, content.getvalue())
+    except OSError as error:
+        raise _told(error, folder) from error
+
+
+def _write(file: Path, content: bytes) -> None:
+    """Write a file whole or not at all."""
+    unfinished = file.with_name(f".{file.name}.tmp")
+    try:
+        with unfinished.open("wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        unfinished.replace(file)
+    except BaseException:
+        unfinished.unlink(missing_ok=True)
+        raise
+
+
+def _remove(files: Iterable[Path]) -> None:
+    for file in files:
+        file.unlink()
+
+
+def _told(error: OSError, folder: Path) -> StoreError:
+    return StoreError(f"{folder} cannot be written: {error.strerror}; what was written before stays readable")
