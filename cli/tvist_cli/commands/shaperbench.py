@@ -192,7 +192,10 @@ def _write(
             from tvist_lab.figures import pareto_figure, settling_figure
 
             rows = result["shapers"]
-            write(look.into(figures), {"pareto": pareto_figure(rows), "settling": settling_figure(rows)})
+            write(
+                look.into(figures),
+                {"pareto": pareto_figure(rows), "settling_measured": settling_figure(rows)},
+            )
 
 
 def _print(result: dict[str, Any]) -> None:
