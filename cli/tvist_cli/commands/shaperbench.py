@@ -200,7 +200,7 @@ def _show(result: dict[str, Any], figures: Path | None, look: FigureOptions, rep
 
     pareto, settling = pareto_figure(result["shapers"]), settling_figure(result["shapers"])
     if figures is not None:
-        write(look.into(figures), {"pareto": pareto, "settling": settling})
+        write(look.into(figures), {"pareto": pareto, "settling_measured": settling})
     if report is not None:
         captions = {
             "Settling time against residual vibration.": pareto,

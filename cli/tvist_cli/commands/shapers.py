@@ -34,8 +34,8 @@ def shapers(
         f_d: Damped frequency of the mode in Hz.
         zeta: Damping ratio of the mode.
         shaper: FILE.py:NAME, repeatable: run that file and list the shaper in it, too.
-        figures: Folder to write figures to: residual vibration for a wrong frequency, and the effects of a varying
-            mean delay and of elastic feed-forward.
+        figures: Folder to write figures to: residual vibration for a wrong frequency, settling time against delay, and
+            the effects of a varying mean delay and of elastic feed-forward.
         look: How to write the figures.
         json: Print one JSON object.
     """
@@ -50,7 +50,12 @@ def shapers(
     listed: list[AnyShaper] = [*SHAPERS.values(), *own.values()]
     found = [_about(one, f_d, zeta) for one in listed]
     if figures is not None:
-        from tvist_lab.figures import catalogue_figure, elastic_figure, mean_delay_figure
+        from tvist_lab.figures import (
+            catalogue_figure,
+            elastic_figure,
+            mean_delay_figure,
+            settling_against_delay_figure,
+        )
 
         with told(OSError):
             of_impulses = [one for one in listed if isinstance(one, Shaper)]
@@ -60,6 +65,7 @@ def shapers(
                     "shapers": catalogue_figure(of_impulses, zeta),
                     "mean_delay": mean_delay_figure(),
                     "elastic": elastic_figure(),
+                    "settling": settling_against_delay_figure(of_impulses, f_d, zeta),
                 },
             )
     if json:

@@ -9,6 +9,7 @@ from tvist_lab.figures.elastic import elastic_figure
 from tvist_lab.figures.evaluated import residual_by_move_figure, vibration_figure
 from tvist_lab.figures.files import FORMATS, FigureFiles, save
 from tvist_lab.figures.flexibility import figure_1
+from tvist_lab.figures.frequency_error import sensitivity_figure, settling_against_delay_figure
 from tvist_lab.figures.identified import identified_figure
 from tvist_lab.figures.mean_delay import mean_delay_figure
 from tvist_lab.figures.one_joint import figure_2
@@ -21,6 +22,7 @@ from tvist_lab.figures.robustness import robustness_figure
 from tvist_lab.figures.sensitivity import figure_4
 from tvist_lab.figures.settling_times import figure_15
 from tvist_lab.figures.sweep import sweep_figure
+from tvist_lab.figures.workspace_map import workspace_map_figure
 
 __all__ = [
     "FORMATS",
@@ -48,7 +50,10 @@ __all__ = [
     "ring_down_figure",
     "robustness_figure",
     "save",
+    "sensitivity_figure",
+    "settling_against_delay_figure",
     "settling_figure",
     "sweep_figure",
     "vibration_figure",
+    "workspace_map_figure",
 ]

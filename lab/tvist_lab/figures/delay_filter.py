@@ -22,7 +22,7 @@ from tvist_lab.figures.style import (
 
 PERIOD = 0.002
 """Tick [s]."""
-F_D, ZETA = 14.7, 0.14
+F_D, ZETA = 14.35, 0.14
 """The mode as it is estimated at this tick: damped frequency [Hz] and damping ratio [-]; τ is between two ticks."""
 BUFFERED = 22
 """Number of samples in the buffer."""
@@ -113,7 +113,7 @@ def _draw_parts(panel: Axes) -> None:
             bbox=None if last else box,
         )
         if not last:
-            panel.annotate("", (1.05 * place + 0.72, 0.0), (1.05 * place + 0.5, 0.0), arrowprops=arrow)
+            panel.annotate("", (1.05 * place + 0.72, 0.0), (1.05 * place + 0.56, 0.0), arrowprops=arrow)
     panel.annotate("", (-0.2, 0.0), (-0.42, 0.0), arrowprops=arrow)
     panel.text(-0.44, 0.22, "$x_i$", ha="left", fontsize=8.5, color=INK)
     panel.text(
@@ -121,9 +121,8 @@ def _draw_parts(panel: Axes) -> None:
     )
     panel.annotate("", (2.22, -0.3), (2.22, -0.7), arrowprops=arrow)
     panel.text(2.28, -0.55, "$I_i$", fontsize=8.5, color=INK)
-    panel.annotate(
-        "", (2.62, -1.0), (3.27, -0.15), arrowprops=arrow | {"connectionstyle": "angle,angleA=0,angleB=90"}
-    )
+    panel.plot([3.27, 3.27, 2.74], [-0.2, -1.0, -1.0], color=INK, linewidth=1.1)
+    panel.annotate("", (2.68, -1.0), (2.9, -1.0), arrowprops=arrow)
     panel.text(3.33, -0.75, "$x^*_{i-1}$", fontsize=8.5, color=MUTED)
 
 

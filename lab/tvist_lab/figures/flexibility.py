@@ -40,7 +40,7 @@ RAISED = 0.6
 """Angle of the shoulder over the stretched arm at which the motion starts [rad]."""
 WATCHED = 0.3
 """Time after the stop in which the largest deflection is looked for [s]."""
-MAGNIFIED = 150.0
+MAGNIFIED = 600.0
 """By how much the deflection is drawn larger [-]."""
 
 
@@ -94,7 +94,7 @@ def figure_1() -> Figure:
     bent = largest_deflection(description)
     figure, (arm, parts) = panels(2, 5.4, share_x=False, ratios=(1.5, 1.0))
     _draw_arm(arm, bent)
-    title(arm, "UR5e with 5 kg, stretched out, from the side, just after a stop")
+    title(arm, "UR5e with 5 kg, from the side, after a stop")
     joints = description.robot.joints
     bars = {f"gear of {name.replace('_', ' ')}": ("gear", place) for place, name in enumerate(joints)}
     bending = [name.removesuffix("_bending_z") for name in bent.flexible.model.names if "_bending_z" in name]
@@ -105,7 +105,7 @@ def figure_1() -> Figure:
         * np.hypot(bent.moved(part), bent.moved(("link", part[1] + 1)) if part[0] == "link" else 0.0)
         for name, part in bars.items()
     }
-    names = sorted(moved, key=lambda name: moved[name], reverse=True)
+    names = sorted((name for name in moved if moved[name] > 1e-4), key=lambda name: moved[name], reverse=True)
     colors = [OF_SHAPED.color if name.startswith("gear") else OF_UNSHAPED.color for name in names]
     parts.barh(names, [moved[name] for name in names], color=colors, height=0.6)
     parts.invert_yaxis()
@@ -139,18 +139,18 @@ def _draw_arm(panel: Axes, bent: Bent) -> None:
         where[:, 0], where[:, 2], **OF_UNSHAPED.points(6.0, markerfacecolor="white", zorder=4, label="Link")
     )
     tool = deflected[-1]
-    panel.plot([tool[0]], [tool[2]], **OF_THIRD.points(9.0, label="Payload"))
-    panel.set_aspect("equal", adjustable="datalim")
-    panel.margins(0.08)
+    panel.plot([tool[0]], [tool[2]], **OF_THIRD.points(6.0, label="Payload", zorder=5))
+    panel.set_aspect("equal")
+    panel.margins(0.08, 0.35)
     panel.set(xlabel="Along the arm (m)", ylabel="Height (m)")
     gone = 1e3 * np.linalg.norm(bent.line()[-1] - rigid[-1])
     note(
         panel,
         f"flange {gone:.2f} mm away",
         (tool[0], tool[2]),
-        xytext=(8, 12),
+        xytext=(6, 12),
         textcoords="offset points",
-        ha="left",
+        ha="right",
     )
 
 

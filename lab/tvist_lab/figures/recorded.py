@@ -85,11 +85,10 @@ def _figure(name: str, drawn: Sequence[tuple[Recorded, Series, str]]) -> Figure:
     note(
         errors,
         f"repeatability, {1e3 * REPEATABILITY:g} mm",
-        (1.0, 1e3 * REPEATABILITY),
+        (0.0, 1e3 * REPEATABILITY),
         xycoords=("axes fraction", "data"),
-        xytext=(-2, 2),
+        xytext=(3, 2),
         textcoords="offset points",
-        ha="right",
         color=MUTED,
     )
     accelerations.set_ylabel(r"$\ddot q^*$ (rad/s²)")
@@ -121,8 +120,9 @@ def _draw(axes: list[Axes], recorded: Recorded, style: Series, label: str) -> No
     time = recording.time[rows] - start
     accelerations, errors, alphas, frequencies, dampings = axes
     how = style.line(1.1)
-    for joint, qdd in enumerate(recording["target_qdd"][rows].T):
-        accelerations.plot(time, qdd, label=label if joint == 0 else None, **how)
+    # Dashes of equal curves would fill each other's gaps.
+    for number, (qdd, _) in enumerate(_alike(recording["target_qdd"][rows])):
+        accelerations.plot(time, qdd, label=label if number == 0 else None, **how)
     E = distance(recording, motion)
     errors.plot(recording.time[motion.start : motion.end] - start, 1e3 * E, **how)
     alphas.plot(time, amplitude(tool_acceleration(recording))[rows], **{**how, "linewidth": 0.8})
@@ -136,14 +136,7 @@ def _name_joints(panel: Axes, recorded: Recorded) -> None:
     recording, motion = recorded
     qdd = recording["target_qdd"][motion.start : motion.shaped_stop + 2]
     largest = float(np.max(np.abs(qdd)))
-    groups: list[tuple[Floats, list[int]]] = []
-    for joint, values in enumerate(qdd.T):
-        for other, joints in groups:
-            if np.max(np.abs(values - other)) < 0.02 * largest:
-                joints.append(joint)
-                break
-        else:
-            groups.append((values, [joint]))
+    groups = _alike(qdd)
     plateau = int(np.argmax(np.max(np.abs(qdd), axis=1) > 0.98 * largest))
     length = float(recording.time[motion.shaped_stop] - recording.time[motion.start])
     at = float(recording.time[motion.start + plateau] - recording.time[motion.start]) + 0.05 * length
@@ -158,6 +151,20 @@ def _name_joints(panel: Axes, recorded: Recorded) -> None:
             textcoords="offset points",
             va="top" if height > 0.0 else "bottom",
         )
+
+
+def _alike(qdd: Floats) -> list[tuple[Floats, list[int]]]:
+    """Accelerations that differ, shape (T,) [rad/s²], each with the joints that have it."""
+    largest = float(np.max(np.abs(qdd)))
+    groups: list[tuple[Floats, list[int]]] = []
+    for joint, values in enumerate(qdd.T):
+        for other, joints in groups:
+            if np.max(np.abs(values - other)) <= 0.02 * largest:
+                joints.append(joint)
+                break
+        else:
+            groups.append((values, [joint]))
+    return groups
 
 
 def _grow(panel: Axes, low: float, high: float) -> None:

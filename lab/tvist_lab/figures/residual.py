@@ -64,8 +64,8 @@ def figure_16(motions: Mapping[str, tuple[Recorded, Recorded]]) -> Figure:
         figure,
         {
             r"$|\alpha|$": "acceleration of the tool, without gravity",
-            "$t_b$": "stop of the reference",
-            "RV": "residual vibration, |α| of the fit at $t_b$",
+            "$t_b$, $t_b^*$": "stop of the reference and of the shaped one",
+            "RV": "residual vibration, |α| of the fit at the stop",
         },
     )
     return figure
@@ -89,7 +89,7 @@ def _draw(panel: Axes, recorded: Recorded, style: Series, label: str) -> tuple[R
     panel.plot([rv.stop - start], [rv.value], "D", color=color, markersize=4.5)
     note(
         panel,
-        r"$t_b$",
+        "$t_b$" if style is OF_UNSHAPED else "$t_b^*$",
         (rv.stop - start, 1.0),
         xycoords=("data", "axes fraction"),
         xytext=(3, -2),

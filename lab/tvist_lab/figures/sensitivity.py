@@ -45,7 +45,7 @@ def figure_4(
     panel.axhline(worst, color=INK, linewidth=0.8, linestyle=LIMIT)
     # Every curve is near zero in the middle, where the shapers are designed.
     note(panel, f"{worst:.1f} %", (design, worst), xytext=(0, 4), textcoords="offset points", ha="center")
-    title(panel, f"At least {worst:.1f} % remains at the ends of {span[0]:g} to {span[1]:g} Hz")
+    title(panel, f"{span[0]:g} to {span[1]:g} Hz: at least {worst:.1f} % remains")
     panel.set(xlim=SHOWN, ylim=(0.0, 72.0), xlabel="Frequency (Hz)", ylabel="Residual vibration (%)")
     legend(figure, panel)
     return figure

@@ -125,7 +125,8 @@ def panels(
     axes = list(grid.ravel())
     for panel in axes:
         _plain(panel)
-    figure.align_ylabels(axes)
+    if share_x:
+        figure.align_ylabels(axes)
     return figure, axes
 
 

@@ -1,0 +1,109 @@
+"""`tvist sensitivity`: what shapers leave of the vibration when the frequency is wrong."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from tvist_cli.commands.map import of_impulses
+from tvist_cli.failure import Failure, told
+from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
+from tvist_cli.output import number, out, print_json, table, write_json
+
+if TYPE_CHECKING:
+    from tvist_shaping import Shaper
+
+STANDARD = ("zv", "zvd", "ei")
+"""Shapers of the paper's Figure 4."""
+TABLED = (-0.2, -0.1, 0.0, 0.1, 0.2)
+"""Errors in the table [-]."""
+POINTS = 401
+"""Number of errors of a curve."""
+
+
+def sensitivity(
+    *,
+    shapers: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    zeta: float = 0.0,
+    errors: tuple[float, float] = (-40.0, 60.0),
+    output: Path | None = None,
+    figures: Path | None = None,
+    look: FigureOptions = AS_USUAL,
+    json: bool = False,
+) -> None:
+    """Compute the residual vibration of shapers for a mode whose frequency they assume wrongly.
+
+    Args:
+        shapers: Names of the shapers, as tvist shapers lists them, or FILE.py:NAME [zv zvd ei].
+        zeta: Damping ratio of the mode, both assumed and true.
+        errors: Lowest and highest percentage by which the assumed frequency is too high [-40 60].
+        output: JSON file to write the curves to.
+        figures: Folder to write a figure of the curves to.
+        look: How to write the figures.
+        json: Print one JSON object.
+    """
+    import numpy as np
+
+    from tvist_lab.frequency_error import residual_over_error
+    from tvist_shaping import ShapingError
+    from tvist_shaping.impulses import check_mode
+
+    look.check(figures)
+    low, high = errors
+    if not -90.0 <= low < high <= 900.0:
+        raise Failure(
+            f"errors is {low:g} {high:g}: must be two increasing percentages from -90 to 900", code=2
+        )
+    chosen = {one.name: one for one in (of_impulses(name) for name in shapers or STANDARD)}
+    span = 0.01 * np.linspace(low, high, POINTS)
+    curves: list[dict[str, Any]] = []
+    for shaper in chosen.values():
+        with told(ShapingError, code=2):
+            check_mode(1.0, zeta, shaper.zeta_max)
+            left = residual_over_error(shaper, zeta, span)
+            about = _about(shaper, zeta)
+        curves.append({**about, "residual_percent": (100.0 * left).tolist()})
+    result = {"zeta": zeta, "error_percent": (100.0 * span).tolist(), "shapers": curves}
+    with told(OSError):
+        if output is not None:
+            write_json(output, result)
+        if figures is not None:
+            from tvist_lab.figures import sensitivity_figure
+
+            drawn = sensitivity_figure(list(chosen.values()), zeta, span)
+            write(look.into(figures), {"sensitivity": drawn})
+    if json:
+        print_json(result)
+        return
+    rows = []
+    for shaper, curve in zip(chosen.values(), curves, strict=True):
+        left = 100.0 * residual_over_error(shaper, zeta, np.array(TABLED))
+        rows.append((
+            shaper.name, number(curve["delay_periods"], 2), *(number(float(value), 1) for value in left),
+            *(number(end, 1) for end in curve["error_of_5_percent"]),
+        ))  # fmt: skip
+    wrong = [f"{100.0 * error:+.0f} %" for error in TABLED]
+    table(
+        f"residual vibration in % when the assumed frequency is too high by, ζ = {zeta:g}",
+        ("shaper", "delay", *wrong, "5 % from", "to"),
+        rows,
+    )
+    out.print(
+        "delay: in damped periods; 5 %: errors in percent between which at most that much vibration remains"
+    )
+
+
+def _about(shaper: "Shaper", zeta: float) -> dict[str, Any]:
+    """Name, delay, and the errors between which at most 5 % is left, None for no end."""
+    import math
+
+    low, high = shaper.band(0.05 * (1.0 + 1e-4), zeta)  # a hump of exactly 5 % is inside
+    ends = [
+        None if not math.isfinite(ratio) or ratio <= 0.0 else 100.0 * (1.0 / ratio - 1.0)
+        for ratio in (high, low)
+    ]
+    return {
+        "name": shaper.name,
+        "delay_periods": shaper.impulses(1.0, zeta).duration,
+        "error_of_5_percent": ends,
+    }

@@ -1,0 +1,41 @@
+"""What a shaper that assumes a wrong frequency leaves of the vibration, and how long that takes to decay."""
+
+import numpy as np
+
+from tvist_lab.recordings import Floats
+from tvist_shaping import Shaper, residual
+
+ALLOWED = 0.05
+"""Residual vibration at which the mode counts as settled, as a share of the unshaped one [-]."""
+
+
+def residual_over_error(shaper: Shaper, zeta: float, errors: Floats) -> Floats:
+    """Residual vibration of a shaper designed for a wrong frequency, as a share of the unshaped vibration [-].
+
+    Args:
+        shaper: The shaper.
+        zeta: Damping ratio, both assumed and true [-].
+        errors: Shares by which the assumed frequency is too high [-], > -1, shape (E,).
+    """
+    return np.asarray(residual(1.0 / (1.0 + errors), zeta, shaper.impulses(1.0, zeta)))
+
+
+def settling_time(shaper: Shaper, f_d: float, zeta: float, error: float) -> float:
+    """Time from the unshaped stop until the mode is at 5 % of its unshaped vibration for good [s].
+
+    It is the shaper's delay, and after it the time in which what is left decays; infinite where nothing decays.
+
+    Args:
+        shaper: The shaper.
+        f_d: True damped frequency [Hz].
+        zeta: Damping ratio, both assumed and true [-].
+        error: Size of the error of the assumed frequency, of which the worse sign counts [-].
+    """
+    times = []
+    for side in (-error, error):
+        left = float(residual_over_error(shaper, zeta, np.array([side]))[0])
+        delay = shaper.impulses((1.0 + side) * f_d, zeta).duration
+        over = np.log(max(left / (ALLOWED * (1.0 + 1e-4)), 1.0))  # a hump of exactly 5 % is settled
+        sigma = 2.0 * np.pi * f_d * zeta / np.sqrt(1.0 - zeta**2)
+        times.append(delay + (0.0 if over == 0.0 else over / sigma if sigma else np.inf))
+    return float(max(times))
