@@ -9,7 +9,7 @@ import pytest
 
 from tvist_lab.recordings import Recording, mcap_file
 from tvist_lab.recordings.mcap_file import RecordingFileError, read
-from tvist_protocol import Event, Info, State, Truth
+from tvist_protocol import Event, Info, Io, State, Truth
 from tvist_protocol.generate import FOLDER
 from tvist_protocol.recorded import topics
 from tvist_server.recording.writer import RecordingWriter, heading
@@ -22,7 +22,7 @@ def golden(name, kind):
     return msgspec.json.decode((FOLDER / "fixtures" / "v1" / f"{name}.json").read_bytes(), type=kind)
 
 
-INFO, STATE, TRUTH = golden("info", Info), golden("state", State), golden("truth", Truth)
+INFO, STATE, TRUTH, IO = (golden(kind.__name__.lower(), kind) for kind in (Info, State, Truth, Io))
 
 
 def record(path, messages):
@@ -100,6 +100,31 @@ def test_the_columns_of_random_messages(seed, tmp_path):
     content = read(path)
     assert content.complete
     assert_equal(content.recording, of_objects(content))
+
+
+@pytest.mark.usefixtures("block")
+def test_inputs_and_outputs_hold_until_the_next_message(tmp_path):
+    ios = {
+        tick: msgspec.structs.replace(
+            IO,
+            tick=tick,
+            actual_digital_output_bits=bits,
+            input_double_register=[0.0, value] + [0.0] * 46,
+            output_int_register=[0] * 48,
+        )
+        for tick, bits, value in ((3, 0, 0.0), (5, 1, 0.0), (8, 2**17, 0.5))
+    }
+    messages = []
+    for tick in (1, 2, 3, 4, 5, 7, 9):
+        messages += [io for at, io in ios.items() if at <= tick and io not in messages]
+        messages.append(msgspec.structs.replace(STATE, tick=tick))
+    content = read(record(tmp_path / "run.mcap", messages))
+    assert content.io == tuple(ios.values())
+    bits = content.recording["actual_digital_output_bits"]
+    assert np.array_equal(bits, [np.nan, np.nan, 0, 0, 1, 1, 2**17], equal_nan=True)
+    assert content.recording["input_double_register"][2:, 1].tolist() == [0, 0, 0, 0, 0.5]
+    assert "output_int_register" not in content.recording
+    assert content.recording["tcp_offset"].shape == (7, 6)
 
 
 @pytest.mark.usefixtures("block")

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import UnionType
 from typing import Any, get_args, get_origin
 
 import msgspec
@@ -38,8 +39,11 @@ class JsonColumns:
     def __init__(self, kind: type[msgspec.Struct]) -> None:
         self._kind = kind
         self._reader: JsonReader[Any] = JsonReader(kind)
-        self._fields = {field.encode_name: field for field in msgspec.structs.fields(kind)}
-        self._types = {name: _type(field.type) for name, field in self._fields.items()}
+        fields = {field.encode_name: field for field in msgspec.structs.fields(kind)}
+        self._types = {
+            name: found for name, field in fields.items() if (found := _type(field.type)) is not None
+        }
+        self._fields = {name: fields[name] for name in self._types}
         self._blocks: list[Block] = []
         self._length = 0
 
@@ -90,12 +94,13 @@ class JsonColumns:
         return {name: _cells_of_values([getattr(message, name) for message in read]) for name in self._fields}
 
 
-def _type(annotation: Any) -> pl.DataType | type[pl.DataType]:
-    """Type of a field in a table, such as Int64 for `int | None`."""
-    choices = [choice for choice in get_args(annotation) if choice is not type(None)]
-    if get_origin(annotation) is not list and choices:
-        (annotation,) = choices
-    return pl.List(pl.Float64) if get_origin(annotation) is list else _SCALARS[annotation]
+def _type(annotation: Any) -> pl.DataType | type[pl.DataType] | None:
+    """Type of a field in a table, such as Int64 for `int | None`; None if it holds no numbers."""
+    if get_origin(annotation) is UnionType:
+        (annotation,) = (choice for choice in get_args(annotation) if choice is not type(None))
+    if get_origin(annotation) is list:
+        return pl.List(pl.Float64) if get_args(annotation)[0] in (int, float) else None
+    return _SCALARS.get(annotation) if get_origin(annotation) is None else None
 
 
 _SCALARS: dict[Any, type[pl.DataType]] = {int: pl.Int64, float: pl.Float64, bool: pl.Boolean}

@@ -19,6 +19,7 @@ from tvist_protocol.channels import tag
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Info
+from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import END_METADATA, FORMAT, METADATA, JsonReader
 from tvist_protocol.stream import Event, State, Truth
@@ -27,11 +28,11 @@ BLOCK = 4096
 """Number of messages decoded together; some 6 MB."""
 
 _TOPIC = re.compile(r"tvist/(?P<robot>[^/]+)/(?P<kind>\w+)")
-_TABLES: dict[str, type[State | Truth]] = {tag(kind): kind for kind in (State, Truth)}
+_TABLES: dict[str, type[State | Truth | Io]] = {tag(kind): kind for kind in (State, Truth, Io)}
 """Kinds that become columns."""
 _OBJECTS: dict[str, type[Event | Entry]] = {tag(kind): kind for kind in (Event, Entry)}
 """Kinds of which there are few."""
-_Kind = TypeVar("_Kind", State, Truth)
+_Kind = TypeVar("_Kind", State, Truth, Io)
 
 
 class RecordingFileError(RecordingError):
@@ -51,13 +52,13 @@ class RecordingFile:
     start: dict[str, Any] | None
     """How the robot's server was started; None in a file of another program."""
     counts: Mapping[str, int]
-    """Number of states and truths; at least one state."""
+    """Number of messages `state`, `truth` and `io`; at least one state."""
     events: tuple[Event, ...]
     """Recorded events."""
     journal: tuple[Entry, ...]
     """Inputs of the controller."""
     recording: Recording
-    """States, truth and events as columns."""
+    """States, truth and events as columns, with inputs and outputs where they were recorded."""
     complete: bool
     """Whether the file was closed properly, and read to its end."""
     dropped: Mapping[str, int] | None
@@ -83,8 +84,17 @@ class RecordingFile:
         """
         return tuple(self.messages(Truth))
 
+    @cached_property
+    def io(self) -> tuple[Io, ...]:
+        """Recorded inputs, outputs and registers, read from the file again; empty in older files.
+
+        Raises:
+            RecordingFileError: The file cannot be read any more.
+        """
+        return tuple(self.messages(Io))
+
     def messages(self, kind: type[_Kind]) -> Iterator[_Kind]:
-        """Read the states or the truth again, one after the other.
+        """Read messages of a kind again, one after the other.
 
         Raises:
             RecordingFileError: The file cannot be read any more.
@@ -187,7 +197,7 @@ class _Content:
         start = None if ours is None else self._json(ours, "start", dict[str, Any])
         events = tuple(self.objects[tag(Event)])
         states = self.tables[tag(State)].take()
-        truths = self.tables[tag(Truth)].take() if counts[tag(Truth)] else None
+        truths, io = (self.tables[tag(kind)].take() if counts[tag(kind)] else None for kind in (Truth, Io))
         return RecordingFile(
             path=self.path,
             robot=self.robot,
@@ -196,7 +206,7 @@ class _Content:
             counts=counts,
             events=events,
             journal=tuple(self.objects[tag(Entry)]),
-            recording=recording_of_blocks(states, truths, events, info),
+            recording=recording_of_blocks(states, truths, io, events, info),
             complete=self.damage is None,
             dropped=dropped,
             note=self._note(states, dropped),

@@ -9,16 +9,21 @@ from numpy.typing import NDArray
 from tvist_lab.recordings.json_columns import Block, Cells
 from tvist_lab.recordings.recording import STATE_COLUMNS, TRUTH_PREFIX, Floats, Recording
 
+REGISTERS = "_register"
+"""End of the names of banks of registers."""
 UNSHAPED = "unshaped_"
 """Prefix of columns that have the target's values where they are null."""
 
 
-def recording_of_blocks(states: Block, truths: Block | None, events: Iterable[Any], info: Any) -> Recording:
+def recording_of_blocks(
+    states: Block, truths: Block | None, io: Block | None, events: Iterable[Any], info: Any
+) -> Recording:
     """Make a recording; a repeated tick counts once, with its last message.
 
     Args:
         states: Fields of all states, at least one.
         truths: Fields of all truths, if there are any.
+        io: Fields of all messages about inputs and outputs, if there are any. Their values hold until the next one.
         events: Events.
         info: Stored unchanged.
     """
@@ -34,7 +39,26 @@ def recording_of_blocks(states: Block, truths: Block | None, events: Iterable[An
         for name, cells in truths.items():
             if name not in ("tick", "timestamp"):
                 columns[TRUTH_PREFIX + name] = _known(_at(cells, places), known)
+    if io is not None:
+        columns |= _held(io, columns["tick"])
     return Recording(columns, tuple(sorted(events, key=lambda event: int(event.tick))), info)
+
+
+def _held(io: Block, ticks: Floats) -> dict[str, Floats]:
+    """Values of inputs and outputs at each tick, NaN before the first message; without banks of registers that stay 0.
+
+    The force at the tool is left out: it is measured once a second and does not hold until the next message.
+    """
+    rows = _rows(io["tick"])
+    assert io["tick"].values is not None
+    place = np.searchsorted(io["tick"].values[rows], ticks, side="right") - 1
+    known = place >= 0
+    columns = {}
+    for name, cells in io.items():
+        unused = name.endswith(REGISTERS) and cells.values is not None and not np.any(cells.values)
+        if name not in ("tick", "actual_TCP_force") and not unused:
+            columns[name] = _known(_at(cells, rows[np.maximum(place, 0)]), known)
+    return columns
 
 
 def _rows(tick: Cells) -> NDArray[np.intp]:
