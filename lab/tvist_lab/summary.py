@@ -15,7 +15,7 @@ def summary(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Describe a file that `tvist_lab.recordings.read` reads.
 
     Returns:
-        Times in s on the recording's own clock; `complete`, `dropped`, `replayable` and `journal` are null for other
+        Times in s on the recording's own clock; `complete`, `dropped`, `replayable` and `messages` are null for other
         files than recordings of a served robot, `motions` if the columns do not show them.
 
     Raises:
@@ -42,7 +42,8 @@ def summary(path: str | os.PathLike[str]) -> dict[str, Any]:
         "complete": content and content.complete,
         "dropped": content.dropped and dict(content.dropped) if content else None,
         "replayable": content and bool(content.start),
-        "journal": content and len(content.journal),
+        "messages": content
+        and {**content.counts, "event": len(content.events), "journal": len(content.journal)},
         "events": dict(Counter(str(event.kind) for event in recording.events)),
         "motions": _motions(recording),
         "columns": [

@@ -1,6 +1,6 @@
 """Messages in a recording: JSON, in a form that viewers of recordings can open.
 
-A recording is an MCAP file with channels `state`, `event`, `truth` and `journal`, their topics named as the
+A recording is an MCAP file with channels `state`, `event`, `truth`, `io` and `journal`, their topics named as the
 robot's keys. Its times are ticks of 2 ms as nanoseconds since tick 0, never the wall clock. Metadata `tvist`
 holds the format, `info`, and `start` (how the server was started); metadata `tvist.end`, written when the
 file is closed, what was dropped on each channel.
@@ -18,11 +18,12 @@ import msgspec
 from tvist_protocol import keys
 from tvist_protocol.channels import tag
 from tvist_protocol.errors import ProtocolError, short
+from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.schema import json_schema
 from tvist_protocol.stream import Event, State, Truth
 
-Recorded = State | Event | Truth | Entry
+Recorded = State | Event | Truth | Io | Entry
 
 FORMAT = "1"
 """Version of this format."""
@@ -47,6 +48,7 @@ def topics(robot: str) -> dict[type[msgspec.Struct], str]:
         State: keys.state(robot),
         Event: keys.event(robot),
         Truth: keys.truth(robot),
+        Io: keys.io(robot),
         Entry: keys.state(robot).removesuffix("state") + tag(Entry),
     }
 
@@ -114,16 +116,24 @@ def viewer_schema(kind: type[msgspec.Struct]) -> dict[str, Any]:
     They require a single `type` other than null for every field, `properties` for every object, and no references.
     """
     schema = json_schema(kind)
+    shared = schema.pop("$defs", {})
     parts: Mapping[str, dict[str, Any]] = schema["properties"]
     required = [name for name in schema["required"] if not _has_null(parts[name])]
-    return schema | {"properties": {name: _plain(part) for name, part in parts.items()}, "required": required}
+    properties = {name: _plain(part, shared) for name, part in parts.items()}
+    return schema | {"properties": properties, "required": required}
 
 
-def _plain(part: dict[str, Any]) -> dict[str, Any]:
+def _plain(part: dict[str, Any], shared: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
     kept = {name: value for name, value in part.items() if name not in ("anyOf", "default")}
     if "anyOf" in part:
         (choice,) = (choice for choice in part["anyOf"] if choice != {"type": "null"})
         kept = choice | kept
+    if (reference := kept.pop("$ref", None)) is not None:
+        struct = shared[reference.removeprefix("#/$defs/")]
+        properties = {name: _plain(inner, shared) for name, inner in struct["properties"].items()}
+        kept = struct | kept | {"properties": properties}
+    if entries := kept.pop("prefixItems", None):
+        kept["items"] = {"type": entries[0]["type"]}
     return kept if "type" in kept else {"type": "string"} | kept
 
 

@@ -85,7 +85,7 @@ def test_messages_come_back_equal(path):
     assert found.journal[1] == journal[1]
     assert found.complete
     assert found.note is None
-    assert found.dropped == {"state": 0, "event": 0, "truth": 0, "journal": 0}
+    assert found.dropped == {"state": 0, "event": 0, "truth": 0, "io": 0, "journal": 0}
 
 
 def test_every_bit_comes_back(path):
@@ -161,7 +161,7 @@ def test_a_file_that_was_never_closed_says_so(path):
 def test_what_was_dropped_is_said(path):
     found = read(record(path, states(3), dropped={State: 4, Entry: 1}))
     assert found.complete
-    assert found.dropped == {"state": 4, "event": 0, "truth": 0, "journal": 1}
+    assert found.dropped == {"state": 4, "event": 0, "truth": 0, "io": 0, "journal": 1}
     assert "no room for: 4 of state, 1 of journal" in found.note
 
 

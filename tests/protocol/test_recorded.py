@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tvist_protocol import Event, ProtocolError, State, Truth
+from tvist_protocol import Event, Io, ProtocolError, State, Truth
 from tvist_protocol.generate import FOLDER
 from tvist_protocol.journal import Entry
+from tvist_protocol.programs import Interpreter
 from tvist_protocol.recorded import JsonReader, to_json, topics, viewer_schema
 
-KINDS = (State, Event, Truth, Entry)
+KINDS = (State, Event, Truth, Io, Entry)
 HARD_FLOATS = [5e-324, -0.0, 0.0, 0.1 + 0.2, 1e300, -1e300, 1.0, 1e22, 2.0**53 + 2, 1.7976931348623157e308]
 
 
@@ -31,6 +32,10 @@ MESSAGES = [
     Event(tick=1, kind="warning"),
     Event(tick=1, kind="warning", why='a "quoted":null sentence\n'),
     golden("truth", Truth),
+    golden("io", Io),
+    msgspec.structs.replace(
+        golden("io", Io), program="a", interpreter=Interpreter(executed=3), tcp_force_zero=[0.5] * 6
+    ),
     Entry(tick=4, kind="client_gone", client="x"),
     Entry(tick=4, kind="missed", count=3),
     Entry(tick=4, kind="setpoint", message={"type": "setpoint", "token": "t", "sequence": 0, "q": [0.5]}),
@@ -127,6 +132,7 @@ def test_topics_are_named_as_the_keys():
         "tvist/ur5e/state",
         "tvist/ur5e/event",
         "tvist/ur5e/truth",
+        "tvist/ur5e/io",
         "tvist/ur5e/journal",
     ]
     with pytest.raises(ProtocolError):

@@ -11,16 +11,18 @@ from tvist_controller.about import info_of
 from tvist_controller.own_shapers import OwnShaper, OwnShaperError, is_file, load_own
 from tvist_controller.planner import Planner
 from tvist_controller.setup import Setup
-from tvist_lab.recordings.mcap_file import RecordingFile
+from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
 from tvist_plant.user_file import UserFileError
 from tvist_protocol import commands as c
 from tvist_protocol.journal import entry_of
 from tvist_protocol.modes import SafetyMode
+from tvist_protocol.recorded import topics
 from tvist_protocol.replies import Done, Refused
 from tvist_protocol.simulation import SimulationReset
 from tvist_protocol.values import Frequency
 from tvist_server.config import ConfigError, from_mapping, read_toml
+from tvist_server.recording.writer import RecordingWriter, heading
 from tvist_shaping import FirShaper, Impulses, Shaper, zv
 from tvist_shaping.own import TRIED_F_D
 
@@ -349,7 +351,7 @@ class TestOneThatFails:
 
 class TestReplay:
     @pytest.fixture
-    def recorded(self, file):
+    def recorded(self, file, tmp_path):
         """A recording of a motion with a shaper of one's own."""
         made = setup(calibration=calibration(), shaper="mine", own_shapers=(load_own(f"{file}:mine"),))
         one = Robot(calibration=calibration(), shaper="mine", own_shapers=made.own_shapers)
@@ -360,10 +362,14 @@ class TestReplay:
         ]
         one.send(c.MoveJ, q=tuple(Q2.tolist()))
         one.tick(300)
-        return RecordingFile(
-            robot="ur5e", info=None, start=json.loads(json.dumps(made.to_builtins())), states=tuple(one.states),
-            events=(), truths=(), journal=tuple(journal), complete=True, dropped=None, note=None,
-        )  # fmt: skip
+        path = tmp_path / "run.mcap"
+        info = info_of(one.controller)
+        with path.open("wb") as stream:
+            writer = RecordingWriter(stream, topics(info.name), heading(info, made.to_builtins()))
+            for message in (*journal, *one.states):
+                writer.write(message)
+            writer.finish({})
+        return read(path)
 
     def test_it_is_equal_with_the_file_and_has_no_note(self, recorded, file):
         done = replay_file(recorded, None, [load_own(f"{file}:mine")])

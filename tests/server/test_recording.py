@@ -116,7 +116,7 @@ def test_what_finds_the_queue_full_is_dropped_and_counted_and_the_rest_keeps_its
     recorder.close()
     assert recorder.error is None
     assert [s.tick for s in read(path)["state"]] == [0, 1, 2, 3, 4, 5]
-    assert dropped_in(path) == {"state": 5, "event": 1, "truth": 0, "journal": 1}
+    assert dropped_in(path) == {"state": 5, "event": 1, "truth": 0, "io": 0, "journal": 1}
 
 
 def test_recording_goes_on_after_a_full_queue(path, gate):

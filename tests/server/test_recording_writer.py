@@ -59,10 +59,10 @@ def test_the_plain_reader_opens_it(recording):
     reader = make_reader(io.BytesIO(recording), validate_crcs=True)
     summary = reader.get_summary()
     assert {channel.topic: channel.message_encoding for channel in summary.channels.values()} == {
-        f"tvist/ur5e/{kind}": "json" for kind in ("state", "event", "truth", "journal")
+        f"tvist/ur5e/{kind}": "json" for kind in ("state", "event", "truth", "io", "journal")
     }
     assert {schema.name: schema.encoding for schema in summary.schemas.values()} == {
-        f"tvist.{kind}": "jsonschema" for kind in ("state", "event", "truth", "journal")
+        f"tvist.{kind}": "jsonschema" for kind in ("state", "event", "truth", "io", "journal")
     }
     assert len(summary.chunk_indexes) > 3
     assert {index.compression for index in summary.chunk_indexes} == {"zstd"}
@@ -102,7 +102,7 @@ def test_metadata_says_how_the_server_was_started_and_what_was_dropped(recording
     assert metadata["tvist"]["format"] == "1"
     assert json.loads(metadata["tvist"]["start"]) == START
     assert msgspec.json.decode(metadata["tvist"]["info"], type=Info) == INFO
-    assert metadata["tvist.end"] == {"state": "0", "event": "0", "truth": "0", "journal": "0"}
+    assert metadata["tvist.end"] == {"state": "0", "event": "0", "truth": "0", "io": "0", "journal": "0"}
 
 
 def test_equal_messages_make_equal_files(recording):

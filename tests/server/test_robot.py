@@ -2,9 +2,10 @@
 
 from tests.controller.robots import setup
 
+from tvist_lab.recordings.mcap_file import read
 from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
-from tvist_protocol.io import Io
+from tvist_protocol.io import Io, SetIo
 from tvist_protocol.programs import ProgramLoad, ProgramPlay
 from tvist_protocol.replies import Done
 from tvist_protocol.simulation import SimulationStep
@@ -50,3 +51,15 @@ def test_with_the_telemetry_io_is_told_as_it_is_and_not_as_it_was_before_the_las
     robot.driven.jobs.do_waiting()
     robot.hand_on()
     assert [(io.program, io.program_state) for io in gateway.told[1:]] == [("paper.urp", "PLAYING")]
+
+
+def test_the_recording_has_inputs_and_outputs_from_the_first_tick_on(tmp_path):
+    robot = ServedRobot(setup(clock="lockstep"), tmp_path / "run.mcap", tmp_path)
+    token = robot.request(c.TakeControl(client="a")).token
+    robot.request(SimulationStep(token=token, ticks=3))
+    robot.request(SetIo(token=token, digital_output_mask=2, digital_outputs=2))
+    robot.request(SimulationStep(token=token, ticks=2))
+    robot.close_recording()
+    content = read(tmp_path / "run.mcap")
+    assert [(io.tick, io.actual_digital_output_bits) for io in content.io] == [(1, 0), (4, 2)]
+    assert content.recording["actual_digital_output_bits"].tolist() == [0, 0, 0, 2, 2]

@@ -61,6 +61,7 @@ class ServedRobot:
         hosts = AllowedHosts(allowed)
         self._complete = None if programs is None else programs.complete
         lockstep = setup.clock != "realtime"
+        self._realtime = not lockstep
         # When a client advances time, nothing is late, and plans are made when they are needed.
         self._plans = None if lockstep else PlansOfPrograms(_planner(setup))
         self.controller = Controller(setup, order=None if self._plans is None else self._plans.order)
@@ -185,7 +186,10 @@ class ServedRobot:
         def tell() -> None:
             # Use the current io, not the last published one: a program may have been played since, before the next
             # tick.
-            self._publisher.telemetry(self._telemetry(punctuality), self.controller.io())
+            io = self.controller.io()
+            self._publisher.telemetry(self._telemetry(punctuality), io)
+            if self.recorder is not None and self._realtime:  # recordings of equal runs in lockstep are equal
+                self.recorder.io(io)
 
         self.driven.post(tell)
 

@@ -48,6 +48,7 @@ def _facts(found: dict[str, Any]) -> dict[str, str]:
     if found["complete"] is not None:
         facts["closed"] = "yes" if found["complete"] else "no: cut off or damaged"
         facts["replay"] = "yes" if found["replayable"] else "no: it does not contain the robot's commands"
+        facts["messages"] = ", ".join(f"{count} {kind}" for kind, count in found["messages"].items())
     if found["motions"] is not None:
         facts["motions"] = str(found["motions"])
     facts["events"] = ", ".join(f"{count} {kind}" for kind, count in found["events"].items()) or "none"

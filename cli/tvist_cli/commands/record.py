@@ -16,7 +16,7 @@ def record(
     seconds: float | None = None,
     json: bool = False,
 ) -> None:
-    """Record the states, events and, if published, the truth of a served robot as MCAP until Control+C.
+    """Record what a served robot publishes as MCAP until Control+C: states, events, truth, inputs and outputs.
 
     Commands are known only to the server and are not recorded: `tvist replay` needs a file from `tvist serve --record`.
 
@@ -46,6 +46,7 @@ def record(
                 robot.on_state(lambda state: ticks.append(state.tick))
                 robot.on_event(recorder.event)
                 robot.on_truth(recorder.truth)
+                robot.on_io(recorder.io)
                 say(f"recording {name} into {file}; press Control+C to stop")
                 end = asyncio.ensure_future(ended.wait())
                 # The requested time begins with the first state, which may come a second later in lockstep.

@@ -2,36 +2,37 @@
 
 import os
 import re
-import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar
 
-from mcap.exceptions import EndOfFile, McapError
-from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
-from mcap.stream_reader import StreamReader, breakup_chunk
-from zstandard import ZstdError
+from mcap.records import Channel, McapRecord, Message, Metadata
 
+from tvist_lab.recordings.json_columns import Block, JsonColumns
+from tvist_lab.recordings.mcap_records import CUT, DAMAGE, MAGIC, records
+from tvist_lab.recordings.recorded_columns import recording_of_blocks
 from tvist_lab.recordings.recording import Recording, RecordingError
 from tvist_protocol.channels import tag
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Info
+from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import END_METADATA, FORMAT, METADATA, JsonReader
 from tvist_protocol.stream import Event, State, Truth
 
-MAGIC = b"\x89MCAP0\r\n"
-"""First bytes of every MCAP file."""
-RECORD_LIMIT = 2**28
-"""Longest accepted record [bytes], so that a damaged length cannot exhaust the memory."""
+BLOCK = 4096
+"""Number of messages decoded together; some 6 MB."""
 
 _TOPIC = re.compile(r"tvist/(?P<robot>[^/]+)/(?P<kind>\w+)")
-_KINDS: dict[str, type[State | Event | Truth | Entry]] = {tag(k): k for k in (State, Event, Truth, Entry)}
-_DAMAGE = (McapError, ZstdError, ValueError, OverflowError, MemoryError)
-"""Exceptions for a damaged record: a wrong checksum is a ValueError, and a length may exceed the memory."""
+_TABLES: dict[str, type[State | Truth | Io]] = {tag(kind): kind for kind in (State, Truth, Io)}
+"""Kinds that become columns."""
+_OBJECTS: dict[str, type[Event | Entry]] = {tag(kind): kind for kind in (Event, Entry)}
+"""Kinds of which there are few."""
+_Kind = TypeVar("_Kind", State, Truth, Io)
 
 
 class RecordingFileError(RecordingError):
@@ -42,20 +43,22 @@ class RecordingFileError(RecordingError):
 class RecordingFile:
     """Content of a recording."""
 
+    path: Path
+    """The file."""
     robot: str
     """Name of the robot."""
     info: Info | None
     """Description of the robot when the recording began; None in a file of another program."""
     start: dict[str, Any] | None
     """How the robot's server was started; None in a file of another program."""
-    states: tuple[State, ...]
-    """Recorded states, at least one; NaN for numbers that were not finite."""
+    counts: Mapping[str, int]
+    """Number of messages `state`, `truth` and `io`; at least one state."""
     events: tuple[Event, ...]
     """Recorded events."""
-    truths: tuple[Truth, ...]
-    """Recorded truth; empty unless the robot published it."""
     journal: tuple[Entry, ...]
     """Inputs of the controller."""
+    recording: Recording
+    """States, truth and events as columns, with inputs and outputs where they were recorded."""
     complete: bool
     """Whether the file was closed properly, and read to its end."""
     dropped: Mapping[str, int] | None
@@ -64,9 +67,45 @@ class RecordingFile:
     """A sentence if something is missing."""
 
     @cached_property
-    def recording(self) -> Recording:
-        """Return states, truth and events as columns."""
-        return Recording.from_states(self.states, self.events, self.truths, self.info)
+    def states(self) -> tuple[State, ...]:
+        """Recorded states, read from the file again; NaN for numbers that were not finite.
+
+        Raises:
+            RecordingFileError: The file cannot be read any more.
+        """
+        return tuple(self.messages(State))
+
+    @cached_property
+    def truths(self) -> tuple[Truth, ...]:
+        """Recorded truth, read from the file again; empty unless the robot published it.
+
+        Raises:
+            RecordingFileError: The file cannot be read any more.
+        """
+        return tuple(self.messages(Truth))
+
+    @cached_property
+    def io(self) -> tuple[Io, ...]:
+        """Recorded inputs, outputs and registers, read from the file again; empty in older files.
+
+        Raises:
+            RecordingFileError: The file cannot be read any more.
+        """
+        return tuple(self.messages(Io))
+
+    def messages(self, kind: type[_Kind]) -> Iterator[_Kind]:
+        """Read messages of a kind again, one after the other.
+
+        Raises:
+            RecordingFileError: The file cannot be read any more.
+        """
+        count = self.counts[tag(kind)]
+        found = 0
+        for message in islice(_again(self.path, kind), count):
+            found += 1
+            yield message
+        if found < count:
+            raise RecordingFileError(f"{self.path} has changed since it was read")
 
 
 def read(path: str | os.PathLike[str]) -> RecordingFile:
@@ -89,73 +128,149 @@ def read(path: str | os.PathLike[str]) -> RecordingFile:
     return content.file()
 
 
+def _again(path: Path, kind: type[_Kind]) -> Iterator[_Kind]:
+    """Read messages up to the end or a damage of the file."""
+    reader, channels = JsonReader(kind), set()
+    try:
+        with path.open("rb") as stream:
+            for record in records(stream):
+                match record:
+                    case Message(channel_id=channel, data=data) if channel in channels:
+                        yield reader.read(data)
+                    case Channel(topic=topic, message_encoding="json"):
+                        found = _TOPIC.fullmatch(topic)
+                        if found is not None and found["kind"] == tag(kind):
+                            channels.add(record.id)
+    except OSError as error:
+        raise RecordingFileError(f"{path} cannot be read: {error.strerror}") from error
+    except (*DAMAGE, ProtocolError):
+        return
+
+
 @dataclass
 class _Content:
     """Content read so far."""
 
     path: Path
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
-    messages: dict[str, list[Any]] = field(default_factory=lambda: {kind: [] for kind in _KINDS})
+    tables: dict[str, JsonColumns] = field(
+        default_factory=lambda: {name: JsonColumns(kind) for name, kind in _TABLES.items()}
+    )
+    objects: dict[str, list[Any]] = field(default_factory=lambda: {name: [] for name in _OBJECTS})
+    readers: dict[str, JsonReader[Any]] = field(
+        default_factory=lambda: {name: JsonReader(kind) for name, kind in (_TABLES | _OBJECTS).items()}
+    )
     robot: str | None = None
     damage: str | None = None
-    readers: dict[int, tuple[JsonReader[Any], list[Any]]] = field(default_factory=dict)
+    channels: dict[int, str] = field(default_factory=dict)
+    """Kind of the messages of each channel."""
+    waiting: list[tuple[str, bytes]] = field(default_factory=list)
+    """Messages that are not yet decoded, in order."""
 
     def read(self, stream: IO[bytes]) -> None:
         try:
-            for record in _records(stream):
+            self._read(stream)
+            self._decode()
+        except ProtocolError as error:
+            self.damage = f"contains an invalid message ({error.why})"
+
+    def _read(self, stream: IO[bytes]) -> None:
+        try:
+            for record in records(stream):
                 self._take(record)
         except RecordingFileError:
             raise
-        except (EndOfFile, struct.error):
+        except CUT:
             self.damage = "was not closed"
-        except _DAMAGE as error:
+        except DAMAGE as error:
             self.damage = f"is damaged ({error or type(error).__name__})"
-        except ProtocolError as error:
-            self.damage = f"contains an invalid message ({error.why})"
 
     def file(self) -> RecordingFile:
         if self.robot is None:
             raise self._error("has no channel tvist/<robot>/state")
-        states: list[State] = self.messages[tag(State)]
-        if not states:
+        counts = {name: len(table) for name, table in self.tables.items()}
+        if not counts[tag(State)]:
             raise self._error("holds no state")
         ours = self.metadata.get(METADATA)
         dropped = self._dropped()
+        info = None if ours is None else self._json(ours, "info", Info)
+        start = None if ours is None else self._json(ours, "start", dict[str, Any])
+        events = tuple(self.objects[tag(Event)])
+        states = self.tables[tag(State)].take()
+        truths, io = (self.tables[tag(kind)].take() if counts[tag(kind)] else None for kind in (Truth, Io))
         return RecordingFile(
+            path=self.path,
             robot=self.robot,
-            info=None if ours is None else self._json(ours, "info", Info),
-            start=None if ours is None else self._json(ours, "start", dict[str, Any]),
-            states=tuple(states),
-            events=tuple(self.messages[tag(Event)]),
-            truths=tuple(self.messages[tag(Truth)]),
-            journal=tuple(self.messages[tag(Entry)]),
+            info=info,
+            start=start,
+            counts=counts,
+            events=events,
+            journal=tuple(self.objects[tag(Entry)]),
+            recording=recording_of_blocks(states, truths, io, events, info),
             complete=self.damage is None,
             dropped=dropped,
-            note=self._note(states[-1], dropped),
+            note=self._note(states, dropped),
         )
 
     def _take(self, record: McapRecord) -> None:
         match record:
             case Message(channel_id=channel, data=data):
-                if channel in self.readers:
-                    reader, messages = self.readers[channel]
-                    messages.append(reader.read(data))
+                if channel in self.channels:
+                    self.waiting.append((self.channels[channel], data))
+                    if len(self.waiting) >= BLOCK:
+                        self._decode()
             case Channel():
+                self._decode()
                 self._open(record)
             case Metadata(name=name, metadata=content):
+                self._decode()
                 self.metadata[name] = content
                 if name == METADATA and content.get("format") != FORMAT:
                     raise self._error(f"has format {content.get('format')}; {FORMAT} can be read")
 
+    def _decode(self) -> None:
+        """Decode the waiting messages.
+
+        Raises:
+            ProtocolError: One of them is invalid. Those before it are kept.
+        """
+        waiting, self.waiting = self.waiting, []
+        try:
+            self._keep(waiting)
+        except ProtocolError:
+            for index, (kind, data) in enumerate(waiting):
+                try:
+                    self.readers[kind].read(data)
+                except ProtocolError:
+                    self._keep(waiting[:index])
+                    raise
+            raise
+
+    def _keep(self, messages: list[tuple[str, bytes]]) -> None:
+        """Decode messages; keep all of them or none."""
+        by_kind: dict[str, list[bytes]] = {}
+        for kind, data in messages:
+            by_kind.setdefault(kind, []).append(data)
+        blocks = {kind: self.tables[kind].decode(by_kind[kind]) for kind in _TABLES if kind in by_kind}
+        objects = {
+            kind: [self.readers[kind].read(data) for data in by_kind[kind]]
+            for kind in _OBJECTS
+            if kind in by_kind
+        }
+        for kind, block in blocks.items():
+            self.tables[kind].add(block)
+        for kind, found in objects.items():
+            self.objects[kind] += found
+
     def _open(self, channel: Channel) -> None:
         found = _TOPIC.fullmatch(channel.topic)
-        if found is None or found["kind"] not in _KINDS or channel.message_encoding != "json":
+        if found is None or found["kind"] not in self.readers or channel.message_encoding != "json":
             return
         if self.robot not in (None, found["robot"]):
             raise self._error(f"contains several robots, {self.robot} and {found['robot']}")
         if found["kind"] == tag(State):
             self.robot = found["robot"]
-        self.readers.setdefault(channel.id, (JsonReader(_KINDS[found["kind"]]), self.messages[found["kind"]]))
+        self.channels.setdefault(channel.id, found["kind"])
 
     def _dropped(self) -> dict[str, int] | None:
         counts = self.metadata.get(END_METADATA)
@@ -172,8 +287,12 @@ class _Content:
         except ProtocolError as error:
             raise self._error(f"has no valid {name}: {error.why}") from error
 
-    def _note(self, last: State, dropped: Mapping[str, int] | None) -> str | None:
-        notes = [] if self.damage is None else [f"{self.damage}; it could be read up to tick {last.tick}"]
+    def _note(self, states: Block, dropped: Mapping[str, int] | None) -> str | None:
+        notes = []
+        if self.damage is not None:
+            tick = states["tick"].values
+            assert tick is not None
+            notes.append(f"{self.damage}; it could be read up to tick {int(tick[-1])}")
         if lost := {kind: count for kind, count in (dropped or {}).items() if count}:
             counts = ", ".join(f"{count} of {kind}" for kind, count in lost.items())
             notes.append(f"lacks messages the recorder had no room for: {counts}")
@@ -182,14 +301,3 @@ class _Content:
     def _error(self, what: str) -> RecordingFileError:
         also = f"; it {self.damage}" if self.damage else ""
         return RecordingFileError(f"{self.path} {what}{also}")
-
-
-def _records(stream: IO[bytes]) -> Iterator[McapRecord]:
-    """Yield records in order; those of a chunk only if the whole chunk is intact."""
-    for record in StreamReader(
-        stream, emit_chunks=True, validate_crcs=True, record_size_limit=RECORD_LIMIT
-    ).records:
-        if isinstance(record, Chunk):
-            yield from breakup_chunk(record, validate_crc=True)
-        else:
-            yield record

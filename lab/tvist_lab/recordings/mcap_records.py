@@ -2,11 +2,14 @@
 
 import struct
 from collections.abc import Iterator
+from io import BytesIO
 from typing import IO
 
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, McapError
-from mcap.records import Chunk, McapRecord
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, McapRecord, Message, Schema
+from mcap.stream_reader import StreamReader, get_chunk_data_stream
 from zstandard import ZstdError
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -18,6 +21,11 @@ CUT = (EndOfFile, struct.error)
 DAMAGE = (*CUT, McapError, ZstdError, ValueError, OverflowError, MemoryError)
 """Exceptions for a damaged record: a wrong checksum is a ValueError, and a length may exceed the memory."""
 
+_RECORD = struct.Struct("<BQ")
+"""Beginning of a record: its kind, and its length."""
+_MESSAGE = struct.Struct("<HIQQ")
+"""Beginning of a message: its channel, number and two times."""
+
 
 def records(stream: IO[bytes]) -> Iterator[McapRecord]:
     """Yield records in order; those of a chunk only if the whole chunk is intact."""
@@ -25,6 +33,27 @@ def records(stream: IO[bytes]) -> Iterator[McapRecord]:
         stream, emit_chunks=True, validate_crcs=True, record_size_limit=RECORD_LIMIT
     ).records:
         if isinstance(record, Chunk):
-            yield from breakup_chunk(record, validate_crc=True)
+            yield from _records_of(record)
         else:
             yield record
+
+
+def _records_of(chunk: Chunk) -> list[McapRecord]:
+    """Messages, channels and schemas of a chunk; several times faster than the library's own function."""
+    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
+    data = stream.read(length)
+    found: list[McapRecord] = []
+    place = 0
+    while place < length:
+        kind, size = _RECORD.unpack_from(data, place)
+        place += _RECORD.size
+        if (after := place + size) > length:
+            raise EndOfFile
+        if kind == Opcode.MESSAGE:
+            channel, sequence, time, publish_time = _MESSAGE.unpack_from(data, place)
+            found.append(Message(channel, time, data[place + _MESSAGE.size : after], publish_time, sequence))
+        elif kind in (Opcode.CHANNEL, Opcode.SCHEMA):
+            content = ReadDataStream(BytesIO(data[place:after]))
+            found.append(Channel.read(content) if kind == Opcode.CHANNEL else Schema.read(content))
+        place = after
+    return found

@@ -10,6 +10,7 @@ from typing import Any
 
 from tvist_controller.sink import Sink
 from tvist_protocol.info import Info
+from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import Recorded
 from tvist_protocol.stream import Event, State, Truth
@@ -62,6 +63,10 @@ class BlackBox(Sink):
         """Keep values that a real robot cannot measure."""
         self._kept.append(truth)
 
+    def io(self, io: Io) -> None:
+        """Keep inputs, outputs and registers."""
+        self._kept.append(io)
+
     def journal(self, entry: Entry) -> None:
         """Keep an input of the controller."""
         self._kept.append(entry)
@@ -87,6 +92,8 @@ class BlackBox(Sink):
                             recorder.event(message)
                         case Truth():
                             recorder.truth(message)
+                        case Io():
+                            recorder.io(message)
                         case Entry():
                             recorder.journal(message)
         except RecorderError as error:

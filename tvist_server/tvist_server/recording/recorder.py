@@ -16,6 +16,7 @@ import msgspec
 from tvist_controller.sink import Sink
 from tvist_protocol.errors import TvistError
 from tvist_protocol.info import Info
+from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import Recorded, topics
 from tvist_protocol.stream import Event, State, Truth
@@ -81,7 +82,7 @@ class Recorder(Sink):
         """Last known path of the file: `path`, unless it was moved. After `close`, the path at the end."""
         self.error: str | None = None
         """Why the recording stopped by itself, as a sentence."""
-        self._dropped: dict[type[msgspec.Struct], int] = dict.fromkeys((State, Event, Truth, Entry), 0)
+        self._dropped: dict[type[msgspec.Struct], int] = dict.fromkeys((State, Event, Truth, Io, Entry), 0)
         self._queue: deque[Recorded] = deque()
         self._queue_size = queue_size
         self._wait = wait
@@ -107,6 +108,10 @@ class Recorder(Sink):
     def truth(self, truth: Truth) -> None:
         """Record one tick of values that a real robot cannot measure."""
         self._offer(truth)
+
+    def io(self, io: Io) -> None:
+        """Record inputs, outputs and registers."""
+        self._offer(io)
 
     def journal(self, entry: Entry) -> None:
         """Record an input of the controller."""
