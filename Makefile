@@ -5,6 +5,8 @@ BIN := .venv/bin
 export OPENBLAS_NUM_THREADS ?= 1
 # Processes that run tests side by side.
 WORKERS ?= auto
+# How many examples Hypothesis tries in `make test-all`: full, half or quick.
+PROFILE ?= full
 READY := .venv/.ready
 
 .PHONY: setup demo notebooks test test-all lint bench soak format lock schemas clean
@@ -33,8 +35,8 @@ test: setup
 	$(BIN)/pytest --hypothesis-profile quick -m "realtime and not (slow or nightly)"
 
 test-all: setup
-	$(BESIDE) -m "not (nightly or realtime)" --durations 20
-	$(BIN)/pytest -m "realtime and not nightly" --durations 20
+	$(BESIDE) --hypothesis-profile $(PROFILE) -m "not (nightly or realtime)" --durations 20
+	$(BIN)/pytest --hypothesis-profile $(PROFILE) -m "realtime and not nightly" --durations 20
 
 lint: setup
 	$(BIN)/ruff check

@@ -488,7 +488,7 @@ def test_the_paper_in_one_run_prints_its_tables(tmp_path):
     assert (said["seed"], said["runs"], said["shaper"]) == (0, 1, "zv")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_bench_gives_its_figures():
     said = tvist("bench", "--seconds", 0, "--json").assert_done().json
     assert {"plant_us_per_tick", "mujoco_us_per_tick", "plant_ratio", "filter_us_per_tick"} <= said.keys()

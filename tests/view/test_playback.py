@@ -95,7 +95,7 @@ def test_the_film_is_slow_where_the_arm_rings_and_its_pictures_differ(tracks, tm
     assert (first != later).any()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_film_and_a_page_are_written_by_a_command(tmp_path):
     gif, html = tmp_path / "x.gif", tmp_path / "x.html"
     ended = run("--compare", "none", "zv", "--gif", gif, "--html", html)
