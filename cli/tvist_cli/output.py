@@ -43,6 +43,11 @@ def program() -> str:
     return shlex.quote(str(here.relative_to(folder) if here.is_relative_to(folder) else here))
 
 
+def typed() -> str:
+    """Return the command as it was typed, for the pages that name the command that made them."""
+    return shlex.join(["tvist", *sys.argv[1:]])
+
+
 def print_json(value: Any) -> None:
     """Print one JSON object and nothing else."""
     print(msgspec.json.encode(value).decode())

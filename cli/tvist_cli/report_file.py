@@ -1,7 +1,5 @@
 """The web page that a command writes about its result."""
 
-import shlex
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,11 +7,6 @@ from tvist_cli.output import say
 
 if TYPE_CHECKING:
     from tvist_lab.report import Page
-
-
-def command_line() -> str:
-    """Return the command that was called, for a page's provenance."""
-    return shlex.join(["tvist", *sys.argv[1:]])
 
 
 def write_report(path: Path, page: "Page") -> None:

@@ -161,7 +161,7 @@ def test_tvist_leaves_little_everywhere_and_a_fixed_shaper_only_where_it_is_desi
 
 
 def test_the_page_says_what_the_lesson_finds(done):
-    command = "tvist lesson --markdown docs/explanations/one-flexible-joint.md"
+    command = "tvist lesson --markdown docs/explanations/one-flexible-joint.md --figures docs/images"
     assert PAGE.read_text(encoding="utf-8") == page(done, command)
 
 

@@ -62,6 +62,8 @@ def test_the_report_is_ordered_by_delay_and_names_what_does_not_count(done):
     assert robustness_report(standing, jobs, quiet)[0]["payload"]["+0 %"]["moves"] == 0
     about = {"command": "tvist robustness", "moves": 1, "seed": 0, "shapers": rows}
     assert all(
-        f"{100 * error:+.0f} %" in robustness_page(about) for errors in ERRORS.values() for error in errors
+        f"{100 * error:+.0f} %" in robustness_page(about, "a command")
+        for errors in ERRORS.values()
+        for error in errors
     )
     assert len(robustness_figure(rows).axes) == len(ERRORS)

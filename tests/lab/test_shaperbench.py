@@ -424,7 +424,7 @@ class TestScores:
             "calibration": "",
             "arms": {ARMS[0].name: ARMS[0].label},
         }
-        written = page(about | board)
+        written = page(about | board, "a command")
         assert all(row["name"] in written for row in board["shapers"])
 
     def test_curved_paths_are_run_by_all_that_shape_references(self, ur5e, calibration):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import out, print_json, progress, table, words
+from tvist_cli.output import out, print_json, progress, table, typed, words
 from tvist_cli.simulated_arm import UNIFORM, disturbed, masses_of, named
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def bound(
     }
     with told(OSError):
         if markdown is not None:
-            markdown.write_text(page(result), encoding="utf-8")
+            markdown.write_text(page({**result, "command": typed()}), encoding="utf-8")
     if json:
         print_json(result)
         return

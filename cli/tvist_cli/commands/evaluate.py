@@ -8,8 +8,8 @@ from cyclopts import Parameter
 from tvist_cli.evaluated import print_evaluation
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import print_json, progress
-from tvist_cli.report_file import command_line, write_report
+from tvist_cli.output import print_json, progress, typed
+from tvist_cli.report_file import write_report
 from tvist_cli.shapers_of import calibration_for, loaded
 from tvist_cli.simulated_arm import disturbed, masses_of, named
 
@@ -279,7 +279,7 @@ def _show(
             from tvist_lab.report import evaluation_page
 
             pictures = {caption: figure for figure, caption in drawn.values()}
-            write_report(report, evaluation_page(result, pictures, command_line()))
+            write_report(report, evaluation_page(result, pictures, typed()))
 
 
 def _drawn(jobs: list["MoveJob"], judged: list["JudgedMove"]) -> dict[str, tuple["Figure", str]]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from tvist_cli.failure import told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import out, print_json, progress, table
+from tvist_cli.output import out, print_json, progress, table, typed
 from tvist_cli.pages import serve_page
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def lesson(
 
             write(look.into(figures), {"figure_02": figure_2(done)})
         if markdown is not None:
-            markdown.write_text(page(done, f"tvist lesson --markdown {markdown}"), encoding="utf-8")
+            markdown.write_text(page(done, typed()), encoding="utf-8")
     if json:
         print_json(done.as_dict())
         return

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import print_json, progress
+from tvist_cli.output import print_json, progress, typed
 from tvist_cli.tables import print_paper
 
 if TYPE_CHECKING:
@@ -67,8 +67,7 @@ def paper(
     if markdown is not None:
         from tvist_lab.paper.markdown import page
 
-        command = f"tvist paper --runs {runs} --seed {seed} --markdown {markdown}"
-        markdown.write_text(page(result, command), encoding="utf-8")
+        markdown.write_text(page(result, typed()), encoding="utf-8")
     if json:
         print_json(result)
     else:

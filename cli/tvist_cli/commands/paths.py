@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import out, print_json, progress, say, table, words
+from tvist_cli.output import out, print_json, progress, say, table, typed, words
 from tvist_cli.simulated_arm import UNIFORM, disturbed, masses_of, named
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def paths(
     }
     with told(OSError):
         if markdown is not None:
-            markdown.write_text(page(result), encoding="utf-8")
+            markdown.write_text(page({**result, "command": typed()}), encoding="utf-8")
         if figures is not None:
             _draw(result["paths"], plant, known, look.into(figures))
     if json:

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import out, print_json
-from tvist_cli.report_file import command_line, write_report
+from tvist_cli.output import out, print_json, typed
+from tvist_cli.report_file import write_report
 
 
 def report(*files: Path, output: Path = Path("report.html"), force: bool = False, json: bool = False) -> None:
@@ -27,7 +27,7 @@ def report(*files: Path, output: Path = Path("report.html"), force: bool = False
     from tvist_lab.report import recordings_page
 
     with told(RecordingError):
-        page = recordings_page(files, command_line())
+        page = recordings_page(files, typed())
     write_report(output, page)
     if json:
         print_json(

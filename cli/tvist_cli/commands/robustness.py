@@ -8,7 +8,7 @@ from cyclopts import Parameter
 from tvist_cli.commands.shaperbench import candidates_of, modal_calibration
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import number, print_json, progress, table, write_json
+from tvist_cli.output import number, print_json, progress, table, typed, write_json
 
 
 def robustness(
@@ -105,7 +105,7 @@ def _write(
         if markdown is not None:
             from tvist_lab.evaluation.robustness_page import robustness_page
 
-            markdown.write_text(robustness_page(result), encoding="utf-8")
+            markdown.write_text(robustness_page(result, typed()), encoding="utf-8")
         if figures is not None:
             from tvist_lab.figures import robustness_figure
 

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from tvist_cli.failure import Failure, told
-from tvist_cli.output import number, out, print_json, progress, say, table
+from tvist_cli.output import number, out, print_json, progress, say, table, typed
 
 
 def search(
@@ -64,12 +64,8 @@ def search(
     if markdown is not None:
         from tvist_lab.safety.markdown import page
 
-        asked = (
-            f"--stops {stops} --streams {streams} --changes {changes} --sequences {sequences} --seed {seed}"
-        )
-        command = f"tvist search {asked}{' --flexible' if flexible else ''}"
         with told(OSError):
-            markdown.write_text(page(result, command), encoding="utf-8")
+            markdown.write_text(page(result, typed()), encoding="utf-8")
     if json:
         print_json(result)
     else:

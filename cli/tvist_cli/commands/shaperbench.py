@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import number, out, print_json, progress, say, table, write_json
+from tvist_cli.output import number, out, print_json, progress, say, table, typed, write_json
 from tvist_cli.report_file import write_report
 from tvist_cli.shapers_of import load_given
 
@@ -106,8 +106,8 @@ def shaperbench(
         print_json(result)
     else:
         _print(result)
-    called = getattr(mine, "name", "file")
-    unranked = next((row for row in result["shapers"] if row["name"] == called and not row["ranked"]), None)
+    place = getattr(mine, "place", shaper)
+    unranked = next((row for row in result["shapers"] if row["label"] == place and not row["ranked"]), None)
     if unranked is not None:
         raise Failure(f"shaper {shaper} is not ranked: it {unranked['fault']}")
 
@@ -189,7 +189,7 @@ def _write(
         if markdown is not None:
             from tvist_lab.evaluation.markdown import page
 
-            markdown.write_text(page(result), encoding="utf-8")
+            markdown.write_text(page(result, typed()), encoding="utf-8")
 
 
 def _show(result: dict[str, Any], figures: Path | None, look: FigureOptions, report: Path | None) -> None:

@@ -7,7 +7,7 @@ from tvist_lab.bound.report import SUMMARY, TERMS, move_columns, move_rows, summ
 
 PAGE = """# How far from what is possible
 
-This page was made by `{command} --markdown docs/explanations/how-far-from-possible.md`; do not edit it.
+This page was made by `{command}`; do not edit it.
 
 A motion within limits of velocity, acceleration and jerk needs some time more if the arm is to rest when it ends. How
 much more is a property of the arm, the limits and the move, not of a shaper. Let s(t) be the way, with a jerk that is

@@ -9,8 +9,13 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def page(result: dict[str, Any]) -> str:
-    """Return all tables, with explanations of their columns."""
+def page(result: dict[str, Any], command: str) -> str:
+    """Return all tables, with explanations of their columns.
+
+    Args:
+        result: What was measured, with the leaderboard.
+        command: The command that made the page, as it was typed.
+    """
     ranked = [row for row in result["shapers"] if row["ranked"]]
     arms = list(result["arms"])
     return f"""# ShaperBench
@@ -18,9 +23,7 @@ def page(result: dict[str, Any]) -> str:
 This page was made by
 
 ```sh
-{
-        result["command"]
-    } --output docs/reference/leaderboard.json --markdown docs/reference/shaperbench.md --figures docs/images
+{command}
 ```
 
 The command also writes the numbers with all digits to [leaderboard.json](leaderboard.json). The bench has {

@@ -5,8 +5,13 @@ from typing import Any
 from tvist_lab.evaluation.robustness import ERRORS, PERCENTILES
 
 
-def robustness_page(result: dict[str, Any]) -> str:
-    """Return the tables of `tvist robustness` with their explanation."""
+def robustness_page(result: dict[str, Any], command: str) -> str:
+    """Return the tables of `tvist robustness` with their explanation.
+
+    Args:
+        result: What was measured.
+        command: The command that made the page, as it was typed.
+    """
     tables = "\n\n".join(
         f"## Wrong {kind}: {name}\n\n{_table(result['shapers'], kind, name)}"
         for kind in ERRORS
@@ -17,9 +22,7 @@ def robustness_page(result: dict[str, Any]) -> str:
 This page was made by
 
 ```sh
-{
-        result["command"]
-    } --output docs/reference/robustness.json --markdown docs/reference/robustness.md --figures docs/images
+{command}
 ```
 
 Every shaper makes {result["moves"]} random moves, seed {result["seed"]}, with payloads of 0 to 5 kg, on arms

@@ -1,6 +1,7 @@
 """The candidates of the benchmark."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from tvist_controller.api import OwnShaper
 from tvist_lab.evaluation.baselines import baselines, longest_mean_delay
@@ -64,8 +65,13 @@ def candidates(
     if isinstance(mine, OwnShaper):
         every.append(Named(Recipe(mine.name, calibration, own=(mine,)), mine.name, mine.place))
     elif mine is not None:
-        every.append(FromFile(mine, recipe, "file", mine))
+        every.append(FromFile(mine, recipe, _called(Path(mine), [one.name for one in every]), mine))
     return every
+
+
+def _called(file: Path, taken: list[str]) -> str:
+    """Name of the user's shaper in tables and figures: its file's, unless another one has that."""
+    return f"{file.stem}.py" if file.stem in taken else file.stem
 
 
 def _product(recipe: Recipe, description: RobotDescription) -> Held:

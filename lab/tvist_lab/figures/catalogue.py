@@ -79,16 +79,16 @@ def _price(panel: Axes, shapers: Sequence[Shaper], zeta: float) -> None:
         style = OF_SHAPED if group[0].peak == 1.0 else OF_UNSHAPED
         panel.plot(*place, **style.points(4.5))
         words = ", ".join(shaper.name for shaper in group)
-        ends = place[0] > 1.7 or group[0].peak > 1.0
-        above = 4 if words.endswith("_exact") and len(group) == 1 else 0
+        above, below = group[0].peak > 1.0, place[0] > 1.7
+        raised = 4 if words.endswith("_exact") and len(group) == 1 else 0
         note(
             panel,
             words,
             place,
-            xytext=(-6 if ends else 6, above),
+            xytext=(4, 4) if above else (4, -4) if below else (6, raised),
             textcoords="offset points",
-            ha="right" if ends else "left",
-            va="center",
+            ha="right" if above or below else "left",
+            va="bottom" if above else "top" if below else "center",
         )
     panel.set(xlim=(0.0, 2.1), xlabel="Duration (damped periods)", ylabel="Width of the 5 % band (–)")
     panel.margins(y=0.12)

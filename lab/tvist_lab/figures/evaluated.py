@@ -36,6 +36,7 @@ def residual_by_move_figure(judged: Sequence[JudgedMove]) -> Figure:
         share_x=False,
         ratios=(3, 2) if several else None,
     )
+    above.set(xscale="log", yscale="log")
     for counts, color, marker, label in (
         (True, SHAPED, "o", "Move"),
         (False, FAINT, "x", f"Below {WORTH:g} m/s² unshaped, not counted"),
@@ -45,12 +46,12 @@ def residual_by_move_figure(judged: Sequence[JudgedMove]) -> Figure:
             [one.unshaped.peak for one in chosen], [one.shaped.peak for one in chosen]
         ))  # fmt: skip
         if chosen:
-            above.loglog(before, after, marker, color=color, markersize=3.0, label=label)
-    decades(above, "x", "y")
+            above.plot(before, after, marker, color=color, markersize=3.0, label=label)
     low, high = above.get_xlim()
-    for share in (1.0, 0.1, 0.01):
-        above.loglog([low, high], [share * low, share * high], color=FAINT, linewidth=0.8)
-        note(above, f"−{100 * (1 - share):.0f} %", (high, share * high), color=MUTED, ha="right", va="center")
+    for share, words in ((1.0, "as unshaped"), (0.1, "−90 %"), (0.01, "−99 %")):
+        above.plot([low, high], [share * low, share * high], color=FAINT, linewidth=0.8)
+        note(above, words, (high, share * high), color=MUTED, ha="right", va="center")
+    decades(above, "x", "y")
     above.set(xlabel="Peak unshaped (m/s²)", ylabel="Peak shaped (m/s²)", xlim=(low, high))
     title(above, "Peak acceleration of the tool after the stop")
     for below in rest:

@@ -116,6 +116,13 @@ def _narrow(figure: Figure, box: Legend) -> None:
     texts = box.get_texts()
     room = 0.98 * figure.bbox.width
     entries = len(texts)
+    if not entries:
+        return
+    longest = max(text.get_window_extent().width for text in texts)
+    for text in texts:
+        _wrap(text, 0.9 * room, text.get_window_extent().width)
+    if longest > 0.9 * room:
+        figure.draw_without_rendering()
     for count in range(entries, 0, -1):
         if box.get_window_extent().width <= room or entries == 1:
             return

@@ -5,7 +5,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from tvist_lab.figures.style import FAINT, INK, LIMIT, SERIES, explain, legend, note, panels
+from tvist_lab.figures.naming import name_over
+from tvist_lab.figures.style import FAINT, INK, LIMIT, SERIES, explain, legend, panels, title
 from tvist_lab.frequency_error import ALLOWED, residual_over_error, settling_time
 from tvist_lab.recordings import Floats
 from tvist_shaping import Shaper
@@ -29,12 +30,12 @@ def sensitivity_figure(shapers: Sequence[Shaper], zeta: float, errors: Floats) -
         panel.plot(100.0 * errors, left, **SERIES[place % len(SERIES)].line(label=shaper.name))
     panel.set(
         xlim=(100.0 * errors[0], 100.0 * errors[-1]),
-        xlabel="Assumed over true frequency, less one (%)",
+        xlabel="Error of the assumed frequency (%)",
         ylabel="Residual vibration (%)",
     )
     panel.set_ylim(bottom=0.0)
+    title(panel, f"Mode with a damping ratio of {zeta:g}")
     legend(figure, panel)
-    explain(figure, {r"$\zeta$": f"damping ratio, {zeta:g} here, assumed and true"})
     return figure
 
 
@@ -59,32 +60,12 @@ def settling_against_delay_figure(shapers: Iterable[Shaper], f_d: float, zeta: f
         ends = np.where(np.isfinite(row), row, top)
         panel.plot(delay, ends, **style.points(4.5, label=f"Frequency wrong by {100.0 * error:g} %"))
     if not np.isfinite(times).all():
-        note(
-            panel,
-            "never: without damping, what is left does not decay",
-            (0.99, 0.98),
-            xycoords="axes fraction",
-            ha="right",
-            va="top",
-        )
-    names: dict[float, list[str]] = {}
-    for place, shaper in enumerate(shown):
-        names.setdefault(round(float(delay[place]), 1), []).append(shaper.name)
-    for moment, group in names.items():
-        note(
-            panel,
-            ", ".join(group),
-            (moment, 0.0),
-            xytext=(0, 3),
-            textcoords="offset points",
-            rotation=90,
-            ha="center",
-            va="bottom",
-        )
+        title(panel, "At the top: never, since nothing decays without damping")
+    name_over(panel, delay, np.where(np.isfinite(times), times, top).max(axis=0), [one.name for one in shown])
     panel.set(
         xlabel="Delay of the shaper (ms)",
         ylabel="Settled after the unshaped stop (ms)",
-        ylim=(0.0, 1.04 * top),
+        ylim=(0.0, 1.75 * top),
         xlim=(-0.04 * float(delay.max()), 1.06 * float(delay.max())),
     )
     legend(figure, panel)

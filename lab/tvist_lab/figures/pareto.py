@@ -4,8 +4,10 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
+from tvist_lab.figures.naming import name_over
 from tvist_lab.figures.style import FAINT, INK, OF_SHAPED, OF_UNSHAPED, decades, legend, note, panels, title
 
 NOTICEABLE = 1.01
@@ -58,7 +60,7 @@ def pareto_figure(rows: Sequence[dict[str, Any]]) -> Figure:
     panel.plot([], [], "^", color=OF_UNSHAPED.color, markerfacecolor="white", label="Exceeds one (times)")
     decades(panel, "y")
     panel.set(xlabel="Still after the unshaped reference's stop (ms)", ylabel="Residual, 3 to 60 Hz (m/s²)")
-    panel.margins(x=0.3)
+    panel.margins(x=0.6)
     title(panel, "Settling against residual vibration")
     legend(figure, panel)
     return figure
@@ -76,21 +78,10 @@ def settling_figure(rows: Sequence[dict[str, Any]]) -> Figure:
     known = [row for row in rows if row["ranked"] and row["time_until_still_ms"]["median"] is not None]
     for place, row in enumerate(sorted(known, key=lambda row: float(row["delay_ms"]["median"]))):
         x, still = row["delay_ms"]["median"], row["time_until_still_ms"]
-        high = still["p90"] if still["p90"] is not None else still["median"]
+        high = _slowest(still)
         panel.plot([x, x], [still["median"], high], color=FAINT, linewidth=1.0, zorder=1)
         panel.plot([x], [still["median"]], **OF_SHAPED.points(4.5, label="Median" if place == 0 else None))
         panel.plot([x], [high], **OF_UNSHAPED.points(3.0, label="90th percentile" if place == 0 else None))
-        note(
-            panel,
-            row["name"],
-            (x, still["median"] if place % 2 else high),
-            xytext=(0, -5 if place % 2 else 5),
-            textcoords="offset points",
-            ha="center",
-            va="top" if place % 2 else "bottom",
-            rotation=90,
-            fontsize=7,
-        )
     longest = max((float(row["delay_ms"]["median"]) for row in known), default=1.0)
     panel.plot(
         [0.0, longest],
@@ -101,9 +92,19 @@ def settling_figure(rows: Sequence[dict[str, Any]]) -> Figure:
         label="Still when the reference stops",
     )
     panel.set(xlabel="Delay of the shaper (ms)", ylabel="Still after the unshaped stop (ms)")
-    panel.margins(x=0.06, y=0.18)
+    if known:
+        ends = [(row["delay_ms"]["median"], _slowest(row["time_until_still_ms"])) for row in known]
+        delays, highest = np.array(ends, dtype=np.float64).T
+        name_over(panel, delays, highest, [row["name"] for row in known])
+        panel.set_ylim(0.0, 1.9 * float(highest.max()))
+    panel.margins(x=0.06)
     legend(figure, panel)
     return figure
+
+
+def _slowest(still: dict[str, Any]) -> float:
+    """90th percentile of the time until still, or the median where more than a tenth never are [ms]."""
+    return float(still["median"] if still["p90"] is None else still["p90"])
 
 
 def _excess(row: dict[str, Any]) -> float:

@@ -32,12 +32,14 @@ def robustness_figure(rows: Sequence[dict[str, Any]]) -> Figure:
                     label=label,
                 )
         panel.set(ylabel="Reduction (%)")
-        panel.legend(fontsize=8, frameon=False, ncols=2, loc="lower left", handlelength=3.0)
+        panel.legend(
+            fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5), handlelength=3.0
+        )
         title(panel, f"Wrong {kind}: median (thick) and 5th percentile (thin), the worse of ±")
     axes[-1].set_xticks(
         places, [f"{row['name']}, {row['delay_ms']:.0f} ms" for row in rows], rotation=90, fontsize=8
     )
-    axes[-1].set(xlabel="Shapers in the order of their delay (ms)")
+    axes[-1].set(xlabel="Shapers in the order of their delay")
     return figure
 
 

@@ -13,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
+from matplotlib.ticker import Formatter
 
 UNSHAPED = "#D55E00"
 """Vermilion (Okabe and Ito), of medium lightness."""
@@ -144,7 +145,9 @@ def _plain(panel: Axes) -> None:
 
 
 def decades(panel: Axes, *axes: str) -> None:
-    """Label an axis with a logarithmic scale in plain numbers: 1, 2 and 5 of each decade, all of one size.
+    """Label an axis with a logarithmic scale in plain numbers of one size: 1, 2 and 5 of each decade.
+
+    Where an axis is shorter than a decade, every digit is labelled.
 
     Args:
         panel: The panel, with its scale set.
@@ -153,7 +156,16 @@ def decades(panel: Axes, *axes: str) -> None:
     for name in axes:
         axis = panel.xaxis if name == "x" else panel.yaxis
         axis.set_major_formatter(lambda value, _: f"{value:g}")
-        axis.set_minor_formatter(lambda value, _: f"{value:g}" if f"{value:e}"[0] in "25" else "")
+        axis.set_minor_formatter(_Digits())
+
+
+class _Digits(Formatter):
+    """Labels of the ticks between powers of ten."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:  # noqa: ARG002  the interface's
+        low, high = (1.0, 1.0) if self.axis is None else self.axis.get_view_interval()
+        short = low > 0.0 and high < 10.0 * low
+        return f"{x:g}" if short or f"{x:e}"[0] in "25" else ""
 
 
 def title(panel: Axes, words: str) -> None:

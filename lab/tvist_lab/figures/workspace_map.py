@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
-from matplotlib.ticker import MultipleLocator
+from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from tvist_lab.figures.style import INK, explain, note, panels, title
 from tvist_lab.recordings import Floats
@@ -17,7 +17,7 @@ LABELS = {
 }
 """Key of a map to its symbol, its meaning and its unit."""
 LEVELS = 9
-"""Number of levels of a map."""
+"""Largest number of levels of a map."""
 
 
 def workspace_map_figure(found: WorkspaceMap, key: str, words: str, columns: int = 2) -> Figure:
@@ -39,14 +39,13 @@ def workspace_map_figure(found: WorkspaceMap, key: str, words: str, columns: int
         else panels(3, 8.4, share_x=True)
     )
     both = np.array([found.identified[key], found.true[key]])
-    levels = np.linspace(float(np.nanmin(both)), float(np.nanmax(both)), LEVELS)
+    levels = _levels(float(np.nanmin(both)), float(np.nanmax(both)))
     error = np.abs(found.error(key))
-    worst = max(float(np.nanmax(error)), 1e-3)
     for panel, values, heading in zip(axes, both, ("Identified", "True"), strict=False):
         drawn = _map(panel, found, values, levels)
         title(panel, heading)
     _bar(figure, drawn, list(axes[:2]), f"{symbol} ({unit})")
-    drawn = _map(axes[2], found, error, np.linspace(0.0, worst, LEVELS))
+    drawn = _map(axes[2], found, error, _levels(0.0, float(np.nanmax(error))))
     title(axes[2], "Size of the error")
     _bar(figure, drawn, [axes[2]], "Error (%)")
     rows, across = (name.replace("_", " ").capitalize() for name in found.names)
@@ -63,13 +62,21 @@ def _map(panel: Axes, found: WorkspaceMap, values: Floats, levels: Floats) -> Qu
     rows, across = (np.degrees(angles) for angles in found.angles)
     panel.grid(visible=False)
     drawn = panel.contourf(across, rows, values, levels=levels, cmap="cividis", extend="neither")
-    lines = panel.contour(across, rows, values, levels=levels[2:-1:2], colors="white", linewidths=0.7)
-    panel.clabel(lines, fmt=_short, fontsize=7)
+    inner = levels[1:-1]
+    # White on the dark half of the colours, ink on the light one.
+    colors = ["white" if place < 0.6 * len(inner) else INK for place in range(len(inner))]
+    lines = panel.contour(across, rows, values, levels=inner, colors=colors, linewidths=0.7)
+    panel.clabel(lines, list(inner[::2]), fmt=_short, fontsize=7)
     for axis in (panel.xaxis, panel.yaxis):
         axis.set_major_locator(MultipleLocator(60.0))
     if np.isnan(values).all():
         note(panel, "no free configuration", (0.5, 0.5), xycoords="axes fraction", ha="center")
     return drawn
+
+
+def _levels(low: float, high: float) -> Floats:
+    """Round levels that include a range."""
+    return np.asarray(MaxNLocator(LEVELS).tick_values(low, max(high, low + 1e-3 * abs(low) + 1e-6)))
 
 
 def _short(value: float) -> str:

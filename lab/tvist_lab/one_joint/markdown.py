@@ -10,8 +10,8 @@ HEAD = """\
 # One flexible joint
 
 Why one fixed shaper is not enough for a robot arm, on the smallest arm that shows it: the one of Figure 2 of the paper
-(Thomsen et al., ICINCO 2019). Made by `{command}`, its figure by
-`tvist lesson --figures docs/images`; do not edit.
+(Thomsen et al., ICINCO 2019). Made by
+`{command}`; do not edit.
 
 An actuator with flexibility turns an arm that can stretch and fold. The actuator is a motor that holds its reference,
 with a spring `K` and a damper `D` between it and the arm. The stretched arm has more inertia about the actuator, so it
