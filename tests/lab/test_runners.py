@@ -6,9 +6,13 @@ import threading
 import pytest
 from tests.lab.runner_work import OddError, die, die_once, function_of, square, square_or_raise
 
+from tvist_lab.evaluation.evaluate import MoveJob, evaluate, judge
+from tvist_lab.evaluation.moves import draw_moves
+from tvist_lab.evaluation.recipes import Recipe
 from tvist_lab.runners import Failed, Processes, TaskError, in_order
 from tvist_lab.runners.cluster import Cluster
 from tvist_lab.runners.parcels import do, pack, unpack
+from tvist_plant.description import load
 
 LOCAL = [Processes(few=2, chunk=3), Cluster(processes=2)]
 
@@ -30,6 +34,12 @@ class TestOrder:
         assert list(itertools.islice(results, 7)) == [n * n for n in range(7)]
         with pytest.raises(KeyError, match="task 7"):
             next(results)
+
+    def test_evaluations_do_not_depend_on_what_runs_them(self):
+        ur5e = load("ur5e")
+        moves = draw_moves(ur5e, 2, 1, (0.0, 5.0)).moves
+        jobs = [MoveJob(ur5e, move, Recipe("none", None), seed=seed) for seed, move in enumerate(moves)]
+        assert list(evaluate(jobs, Backwards())) == [judge(job) for job in jobs]
 
 
 class TestParcels:

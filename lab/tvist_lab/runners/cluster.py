@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from importlib.metadata import version
 
 import dask
 from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
@@ -29,8 +30,8 @@ LARGEST = 8
 """Largest number of tasks in a batch: as many are repeated when a worker dies."""
 AHEAD = 3
 """Number of batches handed out for each worker thread, so that none waits for the next one."""
-PATIENCE = 30.0
-"""Time within which a scheduler and a worker have to answer [s]."""
+PATIENCE = 10.0
+"""Time within which a scheduler has to answer, and to have a worker [s]."""
 QUIET = {
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
@@ -54,7 +55,8 @@ class Cluster:
         """Yield an outcome for each task; see `Runner.run`.
 
         Raises:
-            ConnectionError: There is no scheduler at the address, it has no workers, or it has gone.
+            ConnectionError: There is no scheduler at the address, it has no workers or other ones, or it has gone; or
+                processes cannot be started.
         """
         with _quiet(), self._client() as client:
             yield from _Run(client, work, tasks, self.scheduler).outcomes()
@@ -82,7 +84,17 @@ def _connected(address: str) -> Iterator[Client]:
             raise ConnectionError(
                 f"the Dask scheduler at {address} has no workers: start some with dask worker {address}"
             ) from error
+        _check_alike(client)
         yield client
+
+
+def _check_alike(client: Client) -> None:
+    """Refuse workers whose results could differ, or that cannot do the work at all."""
+    own = version("tvist")
+    for worker, found in client.run(version, "tvist", on_error="return").items():
+        if found != own:
+            has = f"tvist {found}" if isinstance(found, str) else "no tvist"
+            raise ConnectionError(f"the worker {worker} has {has}: install tvist {own}")
 
 
 @contextmanager
@@ -103,6 +115,9 @@ def _local(processes: int) -> Iterator[LocalCluster]:
             memory_limit=0,
             silence_logs=logging.CRITICAL,
         )
+    except (OSError, RuntimeError) as error:
+        why = " ".join(str(error.__cause__ or error).split())
+        raise ConnectionError(f"the processes for the work cannot be started: {why}") from error
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
     with cluster:

@@ -12,6 +12,7 @@ from tvist_lab.evaluation.recipes import Recipe
 from tvist_lab.evaluation.running import ShaperFaultError
 from tvist_lab.evaluation.trial import Trial
 from tvist_lab.recordings import Recording
+from tvist_lab.runners import TaskError
 from tvist_lab.sweep.columns import FAILED, MEASURED, TOO_WEAK, Row
 from tvist_lab.sweep.tasks import SweepTask
 
@@ -44,6 +45,8 @@ def failed(task: SweepTask, status: str, why: str) -> list[Row]:
 def why(error: Exception) -> str:
     """Return an error in one line."""
     said = " ".join(str(error).split())
+    if isinstance(error, TaskError):
+        return said
     return f"{type(error).__name__}: {said}" if said else type(error).__name__
 
 
