@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from tvist_cli.failure import told
 from tvist_cli.figure_files import AS_USUAL, FigureOptions, write
-from tvist_cli.output import number, out, print_json, say, table
+from tvist_cli.output import number, out, print_json, progress, say, table
 
 if TYPE_CHECKING:
     from tvist_lab.figures import FigureFiles
@@ -43,7 +43,11 @@ def analyze(
     with told(RecordingError):
         recording = read(file)
         found = motions(recording)
-    results = [measure(recording, motion) for motion in found]
+    results = []
+    with progress(len(found), "motions") as bar:
+        for motion in found:
+            results.append(measure(recording, motion))
+            bar(1, None)
     for note in recording.notes:
         say(f"{file}: {note}")
     if figures is not None:
