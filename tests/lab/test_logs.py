@@ -19,10 +19,17 @@ def within(result, f_d=MODE[0], zeta=MODE[1]):
     return True
 
 
+def commented(path):
+    path.write_text(f"# written by hand\n# {path.read_text()}")
+    return path
+
+
 FORMATS = {
     "commas": lambda log, path: log.csv(path / "log.csv"),
     "spaces": lambda log, path: log.csv(path / "log.txt", " "),
     "semicolons": lambda log, path: log.csv(path / "log.csv", ";"),
+    "commas and blanks": lambda log, path: log.csv(path / "log.csv", ", "),
+    "a header of NumPy": lambda log, path: commented(log.csv(path / "log.csv", " ", "{:.18e}".format)),
     "six digits": lambda log, path: log.csv(path / "log.csv", ",", "{:.6f}".format),
     "packets of 1116 bytes": lambda log, path: log.dump(path / "dump"),
     "packets of 1220 bytes begun midway": lambda log, path: log.dump(path / "dump", 1220, skip=777, lost=99),
@@ -179,6 +186,15 @@ REFUSED = {
     ),
     "no header": (broken(lambda lines: lines[1:]), "line 1.*header"),
     "only a header": (broken(lambda lines: lines[:1]), "no rows"),
+    "milliseconds": (
+        broken(
+            lambda lines: [
+                lines[0],
+                *(f"{2 * n},{line.split(',', 1)[1]}" for n, line in enumerate(lines[1:])),
+            ]
+        ),
+        "grows by 2 from row to row; it must be in seconds",
+    ),
     "one row": (broken(lambda lines: lines[:2]), "1 row"),
     "decimal commas": (broken(lambda lines: [line.replace(".", ",") for line in lines]), "decimal comma"),
     "decimal commas and semicolons": (

@@ -75,13 +75,11 @@ def _lines(path: Path) -> _Lines:
     raw = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
     ends_whole = raw.endswith(b"\n")
     all_lines = raw.splitlines()
-    top = next(
-        (at for at, line in enumerate(all_lines) if line.strip() and not line.lstrip().startswith(b"#")), None
-    )
+    top = _top(all_lines)
     if top is None:
         raise LogError(f"{path} holds no rows")
     try:
-        header = all_lines[top].decode("utf-8").strip()
+        header = all_lines[top].decode("utf-8").strip().lstrip("# ")
     except UnicodeDecodeError:
         raise LogError(f"{path} is neither a recording nor a log: its line {top + 1} is no text") from None
     separator = next((one for one in SEPARATORS if one in header), ",")
@@ -92,14 +90,15 @@ def _lines(path: Path) -> _Lines:
         raise LogError(
             f"{path}, line {top + 1}: there must be a header with RTDE's names, as in timestamp,actual_q_0"
         )
-    if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise LogError(f"{path}, line {top + 1}: the column {twice[0] or 'without a name'} is there twice")
-    body = [(at + 1, line) for at, line in enumerate(all_lines[top + 1 :], top + 1) if line.strip()]
+    if twice := sorted({name for name in names if name and names.count(name) > 1}):
+        raise LogError(f"{path}, line {top + 1}: the column {twice[0]} is there twice")
+    below = enumerate(all_lines[top + 1 :], top + 2)
+    body = [(at, line) for at, line in below if line.strip() and not line.lstrip().startswith(b"#")]
     if separator == " ":
         body = [(at, b" ".join(line.split())) for at, line in body]
     cells = np.array([line.count(separator.encode()) + 1 for _, line in body], dtype=np.int64)
     whole = cells == len(names)
-    if body and not whole.any() and (cells > len(names)).all() and separator == ",":
+    if body and separator == "," and np.mean(cells > len(names)) > 0.5:
         raise LogError(
             f"{path}, line {body[0][0]}: {cells[0]} cells under a header of {len(names)}: are there decimal commas? "
             "Write numbers with a decimal point"
@@ -126,6 +125,17 @@ def _lines(path: Path) -> _Lines:
         np.array([at for at, _ in kept], dtype=np.float64),
         tuple(notes),
     )
+
+
+def _top(lines: list[bytes]) -> int | None:
+    """Index of the header: the first line that is no comment, or a comment with names right above numbers."""
+    filled = [at for at, line in enumerate(lines) if line.strip()]
+    above = None
+    for at in filled:
+        if not lines[at].lstrip().startswith(b"#"):
+            return at if above is None or re.search(rb"[A-DF-Za-df-z_]", lines[at]) else above
+        above = at if re.match(rb"[#\s]*\"?[A-Za-z_]\w*[\s\",;]", lines[at]) else None
+    return None
 
 
 def _numbers(path: Path, lines: _Lines) -> Floats:

@@ -16,6 +16,8 @@ WIDTHS = {"actual_TCP_pose": 6, "target_TCP_pose": 6, "actual_TCP_speed": 6, "ac
 """Number of entries that a vector needs to be of use; joint angles have as many as the arm has joints."""
 OURS = ("tick", "reference_q", "unshaped_q", "target_q", "actual_TCP_pose")
 """Columns that only recordings of this controller have, all together."""
+PERIODS = (1e-4, 0.1)
+"""Shortest and longest time between rows [s]; anything else is no time in seconds, or shows no vibration."""
 LONG_GAP = 0.02
 """Shortest time without rows that a note reports [s]."""
 
@@ -49,7 +51,7 @@ def recording_of(rows: Rows) -> Recording:
     Rows that repeat the time of the row before them, or have no time, are left out; a note counts them.
 
     Raises:
-        LogError: There is no time or no joint angles, fewer than two rows, or time goes back.
+        LogError: There is no time or no joint angles, fewer than two rows, or time goes back or is not in seconds.
     """
     columns, notes = _vectors(rows)
     if TIME not in columns or columns[TIME].ndim != 1:
@@ -57,6 +59,7 @@ def recording_of(rows: Rows) -> Recording:
     if not any(name in columns and columns[name].ndim == 2 for name in ("target_q", "actual_q")):
         raise LogError(f"{rows.path} has neither target_q_0 … nor actual_q_0 …; {_found(rows)}")
     kept, more = _increasing(rows, columns[TIME])
+    _check_period(rows, columns[TIME][kept])
     notes += more
     columns = {name: column[kept] for name, column in columns.items()}
     ours = all(name in columns for name in OURS)
@@ -78,6 +81,8 @@ def _vectors(rows: Rows) -> tuple[dict[str, Floats], list[str]]:
     columns: dict[str, Floats] = {}
     for place, name in enumerate(rows.names):
         found = _INDEXED.fullmatch(name)
+        if not name:
+            continue
         if found is None:
             columns[name] = rows.values[:, place]
         else:
@@ -119,6 +124,15 @@ def _increasing(rows: Rows, time: Floats) -> tuple[NDArray[np.intp], list[str]]:
             f"{rows.path} has {kept.size} row{'' if kept.size == 1 else 's'} with a {TIME} of its own; two are needed"
         )
     return kept, notes
+
+
+def _check_period(rows: Rows, time: Floats) -> None:
+    period = float(np.median(np.diff(time)))
+    if not PERIODS[0] <= period <= PERIODS[1]:
+        raise LogError(
+            f"{rows.path}: {TIME} grows by {period:.3g} from row to row; it must be in seconds, and a row come every "
+            f"{PERIODS[0]:g} to {PERIODS[1]:g} s"
+        )
 
 
 def _left_out(rows: Rows, count: int, what: str, first: int) -> str:
