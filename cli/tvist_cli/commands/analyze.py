@@ -61,6 +61,9 @@ def analyze(
             }
         )
         return
+    if not results:
+        out.print(f"{file} contains no motion.", markup=False)
+        return
     table(f"{file}: {len(results)} motions", COLUMNS, [_row(index, r) for index, r in enumerate(results, 1)])
     for note in _grouped(results):
         out.print(note)
