@@ -31,7 +31,7 @@ def paper(
     Args:
         runs: Number of repetitions, each with different noise and gear errors.
         seed: Seed of the first repetition.
-        figures: Folder to write figures 2, 4, 7, 12, 13, 14 and 16 to.
+        figures: Folder to write figures 1 to 4, 7, 8 and 12 to 16 to, and the spectrogram of a ring-down.
         look: How to write the figures.
         calibration: Name of a calibration that comes with the package, or path of a calibration file.
         baselines: Run the baselines for comparison as well.

@@ -79,7 +79,6 @@ def fit(figure: Figure, columns: int) -> None:
     if now != columns:
         figure.set_size_inches(COLUMN_MM[columns] / 25.4, height * LOWER[columns] / LOWER[now])
         _scale(figure, SMALLER[columns] / SMALLER[now])
-    figure.draw_without_rendering()
     for box in list(figure.legends):
         _narrow(figure, box)
     figure.draw_without_rendering()
@@ -118,11 +117,8 @@ def _narrow(figure: Figure, box: Legend) -> None:
     entries = len(texts)
     if not entries:
         return
-    longest = max(text.get_window_extent().width for text in texts)
     for text in texts:
         _wrap(text, 0.9 * room, text.get_window_extent().width)
-    if longest > 0.9 * room:
-        figure.draw_without_rendering()
     for count in range(entries, 0, -1):
         if box.get_window_extent().width <= room or entries == 1:
             return
@@ -144,7 +140,6 @@ def _narrow(figure: Figure, box: Legend) -> None:
             frameon=False,
             **how,
         )
-        figure.draw_without_rendering()
         texts = box.get_texts()
 
 

@@ -1,0 +1,217 @@
+"""Every figure has labelled axes with units and text that can be read, over one column and over two."""
+
+import json
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tvist_controller.api import load_calibration
+from tvist_lab.metrics import motions
+from tvist_lab.workspace_map import WorkspaceMap
+from tvist_shaping import SHAPERS
+
+DOCS = Path(__file__).parents[2] / "docs"
+TICKS = 1500
+UNIT = re.compile(r"\((ms|s|Hz|%|–|°|m|mm|mrad|rad/s|rad/s²|m/s²|dB|ticks|ticks of 2 ms|damped periods)\)$")
+LEAST_POINTS = {1: 5.5, 2: 7.0}
+"""Smallest size of text by columns [pt]."""
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    """The module, imported where it is used: matplotlib takes a second that other tests need not wait."""
+    import tvist_lab.figures
+
+    return tvist_lab.figures
+
+
+@pytest.fixture(scope="module")
+def found():
+    grid = np.linspace(6.0, 15.0, 9).reshape(3, 3)
+    told = {"f_d_hz": grid, "zeta": 0.02 * grid, "delay_ms": 500.0 / grid}
+    true = {key: 1.03 * value for key, value in told.items()}
+    true["zeta"] = true["zeta"] + 0.001 * grid**0.5
+    angles = np.linspace(-1.0, 1.0, 3)
+    return WorkspaceMap((1, 2), ("shoulder", "elbow"), (angles, angles), (0.0,) * 6, told, true)
+
+
+@pytest.fixture
+def make(drawn, one_motion, ring, found):
+    """Make a figure by its name, from small data."""
+
+    def recorded(shaped_ticks, amplitude):
+        position = np.zeros((TICKS, 3))
+        position[:, 0] = np.interp(np.arange(TICKS), [100, 540], [0.5, 0.0])
+        qdd = np.zeros((TICKS, 6))
+        qdd[101:200, 0], qdd[101:200, 1:3] = 2.0, 1.0
+        rung = ring(TICKS, 501 + shaped_ticks, 10.0, 0.1, amplitude)
+        recording = one_motion(shaped_ticks, alpha=rung, truth=rung, position=position, target_qdd=qdd)
+        return recording, motions(recording)[0]
+
+    def judged(count, *, counts=True):
+        shaken = SimpleNamespace(peak=0.4)
+        left = [SimpleNamespace(peak=0.01 * (1 + place)) for place in range(count)]
+        return [
+            SimpleNamespace(
+                counts=counts, unshaped=shaken, shaped=one, reduction=lambda one: 100.0 - one.peak
+            )
+            for one in left
+        ]
+
+    def paths():
+        way = {"reduction_percent": 90.0, "in_motion_ratio": 0.9, "off_mm": 0.1}
+        return [{"unshaped_peak_m_s2": 1.0, "shaped": {"zv": {"along": way, "joints": way}}}] * 3
+
+    def leaderboard(name):
+        return json.loads((DOCS / "reference" / f"{name}.json").read_text(encoding="utf-8"))["shapers"]
+
+    calibration = load_calibration("ur5e_5kg")
+    q = np.random.default_rng(0).uniform(-1.0, 1.0, (5, 6))
+    f_d, zeta = np.linspace(7.0, 9.0, 5), np.linspace(0.2, 0.3, 5)
+    pair = recorded(0, 1.0), recorded(37, 0.1)
+    known = SHAPERS.values()
+    makers = {
+        "figure_1": drawn.figure_1,
+        "figure_3": drawn.figure_3,
+        "figure_4": drawn.figure_4,
+        "figure_7": drawn.figure_7,
+        "figure_8": drawn.figure_8,
+        "figure_12": lambda: drawn.motion_figure("Q1-Q2", *pair),
+        "observed": lambda: drawn.observed_figure("motion 1", pair[0]),
+        "figure_15": lambda: drawn.figure_15("Q1-Q2", *pair),
+        "figure_16": lambda: drawn.figure_16({"Q1-Q2": pair}),
+        "after_stop": lambda: drawn.after_stop_figure(*pair, "Q1-Q2"),
+        "ring_down": lambda: drawn.ring_down_figure("Q1-Q2", pair[0]),
+        "catalogue": lambda: drawn.catalogue_figure(known),
+        "sensitivity": lambda: drawn.sensitivity_figure([SHAPERS["zv"]], 0.0, np.linspace(-0.4, 0.6, 51)),
+        "settling_against_delay": lambda: drawn.settling_against_delay_figure(known, 10.0, 0.1),
+        "elastic": drawn.elastic_figure,
+        "mean_delay": drawn.mean_delay_figure,
+        "pareto": lambda: drawn.pareto_figure(leaderboard("leaderboard")),
+        "settling": lambda: drawn.settling_figure(leaderboard("leaderboard")),
+        "robustness": lambda: drawn.robustness_figure(leaderboard("robustness")),
+        "moves": lambda: drawn.residual_by_move_figure(judged(4)),
+        "one_move": lambda: drawn.vibration_figure(pair[0][0], pair[1][0], 3),
+        "paths": lambda: drawn.path_shaping_figure(paths()),
+        "identified": lambda: drawn.identified_figure(calibration, q, f_d, zeta, f_d, zeta),
+        "map": lambda: drawn.workspace_map_figure(found, "f_d_hz", "an arm", 1),
+        "map over two columns": lambda: drawn.workspace_map_figure(found, "zeta", "an arm", 2),
+        "no move that counts": lambda: drawn.residual_by_move_figure(judged(2, counts=False)),
+    }
+    return lambda name: makers[name]()
+
+
+NAMES = [
+    "figure_1", "figure_3", "figure_4", "figure_7", "figure_8", "figure_12", "observed", "figure_15", "figure_16",
+    "after_stop", "ring_down", "catalogue", "sensitivity", "settling_against_delay", "elastic", "mean_delay", "pareto",
+    "settling", "robustness", "moves", "one_move", "paths", "identified", "map", "map over two columns",
+    "no move that counts",
+]  # fmt: skip
+
+
+def words_of(figure):
+    """All text that is drawn."""
+    from matplotlib.text import Text
+
+    return [
+        text
+        for text in figure.findobj(Text)
+        if isinstance(text, Text) and text.get_visible() and text.get_text().strip()
+    ]
+
+
+def named(axis):
+    """Whether an axis counts names instead of a quantity."""
+    return any(re.search("[a-z]", label.get_text()) for label in axis.get_ticklabels())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_axes_have_units_and_text_is_large_enough_and_within_the_figure(make, name):
+    figure = make(name)
+    columns = 2 if "two" in name else 1
+    from tvist_lab.figures.files import fit
+
+    fit(figure, columns)
+    figure.draw_without_rendering()
+    labels = [
+        axis.label.get_text()
+        for panel in figure.axes
+        if panel.axison
+        for axis in (panel.xaxis, panel.yaxis)
+        if axis.label.get_text() and not named(axis)
+    ]
+    assert labels
+    assert all(UNIT.search(label.replace("\n", " ")) for label in labels), labels
+    for panel in figure.axes:
+        assert not panel.axison or panel.get_lines() or panel.collections or panel.patches, "an empty panel"
+    assert min(text.get_fontsize() for text in words_of(figure)) >= LEAST_POINTS[columns]
+    renderer = figure.canvas.get_renderer()
+    boxes = [panel.get_tightbbox(renderer) for panel in figure.axes]
+    for box in [*boxes, *(one.get_window_extent() for one in figure.legends)]:
+        assert -2.0 <= box.x0 < box.x1 <= figure.bbox.width + 2.0
+        assert -2.0 <= box.y0 < box.y1 <= figure.bbox.height + 2.0
+
+
+@pytest.mark.parametrize(("columns", "millimetres"), [(1, 89.0), (2, 183.0)])
+def test_a_file_has_the_width_of_its_columns(drawn, tmp_path, columns, millimetres):
+    from PIL import Image
+
+    files = drawn.FigureFiles(tmp_path / "new", "png", 120, columns)
+    with Image.open(files.write(drawn.figure_4(), "figure")) as image:
+        assert image.info["dpi"] == pytest.approx((120.0, 120.0), abs=0.1)
+        assert 25.4 * image.width / 120.0 == pytest.approx(millimetres, abs=0.3)
+    svg = drawn.FigureFiles(tmp_path, "svg", columns=columns).write(drawn.figure_4(), "figure").read_text()
+    assert 25.4 / 72.0 * float(re.search(r'width="([\d.]+)pt"', svg)[1]) == pytest.approx(
+        millimetres, abs=0.1
+    )
+    pdf = drawn.FigureFiles(tmp_path, "pdf", columns=columns).write(drawn.figure_4(), "figure").read_bytes()
+    box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+)", pdf)
+    assert 25.4 / 72.0 * float(box[1]) == pytest.approx(millimetres, abs=0.1)
+    assert b"/Type3" not in pdf
+
+
+def test_resolution_multiplies_the_pixels_of_a_bitmap(drawn, tmp_path):
+    from PIL import Image
+
+    sizes = []
+    for dpi in (60, 180):
+        with Image.open(drawn.save(drawn.figure_4(), tmp_path / f"{dpi}.png", dpi=dpi)) as image:
+            sizes.append(image.size)
+    assert np.array(sizes[1]) == pytest.approx(3.0 * np.array(sizes[0]), abs=3)
+
+
+@pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
+def test_equal_figures_give_equal_files(drawn, tmp_path, suffix):
+    first, second = (
+        drawn.save(drawn.figure_4(), tmp_path / f"{name}.{suffix}").read_bytes() for name in "ab"
+    )
+    assert first == second
+
+
+def test_a_figure_can_be_written_twice_without_shrinking(drawn, tmp_path):
+    figure = drawn.figure_4()
+    for columns in (1, 1, 2):
+        drawn.save(figure, tmp_path / "x.png", dpi=50, columns=columns)
+    assert figure.axes[0].xaxis.label.get_fontsize() == pytest.approx(9.0)
+
+
+def test_a_figure_of_no_counted_move_has_no_empty_panel(make):
+    assert len(make("no move that counts").axes) == 1
+
+
+def test_a_triangle_is_one_that_exceeds_a_limit_by_more_than_a_percent(drawn):
+    row = {
+        "ranked": True, "pareto": False, "residual_m_s2": {"median": 0.1}, "time_until_still_ms": {"median": 50.0},
+        "peak_velocity_ratio": {"max": 1.0}, "keeps_limits": False,
+    }  # fmt: skip
+    rows = [
+        row | {"name": "near", "peak_acceleration_ratio": {"max": 1.003}},
+        row | {"name": "far", "peak_acceleration_ratio": {"max": 2.5}, "residual_m_s2": {"median": 0.2}},
+    ]
+    (panel,) = drawn.pareto_figure(rows).axes
+    markers = [line.get_marker() for line in panel.get_lines() if len(line.get_xdata()) == 1]
+    assert markers == ["o", "^"]
+    assert [text.get_text() for text in panel.texts] == ["near", "far (2.5×)"]

@@ -1,0 +1,45 @@
+"""Residual vibration and settling for a wrong frequency agree with the catalogue and with a simulated mode."""
+
+import numpy as np
+import pytest
+
+from tvist_lab.frequency_error import ALLOWED, residual_over_error, settling_time
+from tvist_shaping import SHAPERS
+
+
+def test_an_error_at_an_end_of_the_band_leaves_what_bounds_it():
+    low, high = SHAPERS["zvd"].band(ALLOWED, 0.1)
+    errors = np.array([1.0 / high - 1.0, 0.0, 1.0 / low - 1.0])
+    assert residual_over_error(SHAPERS["zvd"], 0.1, errors) == pytest.approx(
+        [ALLOWED, 0.0, ALLOWED], abs=1e-6
+    )
+
+
+@pytest.mark.parametrize("name", ["zv", "zvd", "ei", "ei3"])
+def test_with_the_right_frequency_a_mode_settles_when_the_reference_stops(name):
+    shaper = SHAPERS[name]
+    assert settling_time(shaper, 8.0, 0.1, 0.0) == pytest.approx(shaper.impulses(8.0, 0.1).duration)
+
+
+def test_without_a_shaper_it_settles_when_the_decay_reaches_the_bound():
+    f_d, zeta = 8.0, 0.1
+    time = settling_time(SHAPERS["none"], f_d, zeta, 0.2)
+    sigma = 2.0 * np.pi * f_d * zeta / np.sqrt(1.0 - zeta**2)
+    assert np.exp(-sigma * time) == pytest.approx(ALLOWED, rel=1e-3)
+
+
+def test_without_damping_what_is_left_never_decays():
+    assert settling_time(SHAPERS["zv"], 8.0, 0.0, 0.2) == np.inf
+    assert np.isfinite(settling_time(SHAPERS["zv"], 8.0, 0.0, 0.0))
+
+
+def test_the_time_is_that_after_which_an_impulse_response_stays_small():
+    shaper, f_d, zeta, error = SHAPERS["zv"], 8.0, 0.1, 0.15
+    omega = 2.0 * np.pi * f_d
+    sigma = omega * zeta / np.sqrt(1.0 - zeta**2)
+    still = []
+    for wrong in (1.0 - error, 1.0 + error):
+        impulses = shaper.impulses(wrong * f_d, zeta)
+        after = np.exp((sigma - 1j * omega) * impulses.tau) @ impulses.A  # the envelope, seen from t = 0
+        still.append(np.log(abs(after) / ALLOWED) / sigma)
+    assert settling_time(shaper, f_d, zeta, error) == pytest.approx(max(still), rel=1e-3)
