@@ -238,6 +238,12 @@ class TestFolder:
         with Store(tmp_path / "x", {}) as store:
             assert store.rows().is_empty()
 
+    def test_a_sweep_that_kept_nothing_does_not_reserve_its_folder(self, tmp_path):
+        with Store(tmp_path / "x", {"moves": 1}):
+            pass
+        with Store(tmp_path / "x", {"moves": 2}) as store:
+            assert store.rows().is_empty()
+
     def test_a_full_disk_is_a_sentence_and_leaves_whole_files(self, tmp_path, tasks, whole, monkeypatch):
         monkeypatch.setattr("tvist_lab.sweep.study.PART", 2)
         room = iter(range(4))  # manifest and three parts

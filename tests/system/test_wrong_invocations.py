@@ -84,6 +84,7 @@ MISUSE = [
     (("evaluate", "--random", "2", "--payload", "heavy"), ["payload is 'heavy'", "0 to 100 kg"]),
     (("sweep",), ["spec is missing"]),
     (("sweep", "x.toml", "--processes", "0"), ["processes is 0", "1 to 1024"]),
+    (("sweep", "x.toml", "--scheduler", "localhost"), ["scheduler is 'localhost'", "tcp://HOST:8786"]),
     (("sweep", "x.toml", "--processes", "2", "--scheduler", "x"), ["either --processes or --scheduler"]),
     (("paths", "--random", "0"), ["random is 0", "1 to 100000"]),
     (("paths", "--kind", "spiral"), ["--kind is 'spiral'", "line, arc, blends"]),

@@ -1,16 +1,21 @@
 """`tvist sweep`: compare shapers over payloads, errors, moves and robots, on all cores or a cluster."""
 
+import re
 import time
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import Failure, told
+from tvist_cli.figure_files import AS_USUAL, FigureOptions
 from tvist_cli.output import number, print_json, progress, say, table
 
 if TYPE_CHECKING:
+    from tvist_lab.figures import FigureFiles
     from tvist_lab.sweep.study import Study
 
+ADDRESS = re.compile(r"((tcp|tls|ws|wss)://)?([^\s:/\[\]]+|\[[\da-fA-F:.]+\]):\d{1,5}")
+"""Address of a scheduler."""
 SHOWN = 5
 """Largest number of failed rows that are told one by one."""
 DRAWN = 100
@@ -23,6 +28,7 @@ def sweep(
     output: Path | None = None,
     processes: int | None = None,
     scheduler: str | None = None,
+    look: FigureOptions = AS_USUAL,
     json: bool = False,
 ) -> None:
     """Make random moves of robots with every shaper, payload and error that a file lists, and keep a row for each.
@@ -37,6 +43,7 @@ def sweep(
         output: Folder for the rows [that of the file, with its name but without .toml].
         processes: Number of processes on this machine [one for each core].
         scheduler: Address of a Dask scheduler whose workers to use instead, such as tcp://HOST:8786.
+        look: How to write the figure.
         json: Print one JSON object.
     """
     from tvist_cli.swept import tasks_of
@@ -47,10 +54,13 @@ def sweep(
         raise Failure("give either --processes or --scheduler", code=2)
     if processes is not None and not 1 <= processes <= 1024:
         raise Failure(f"processes is {processes}: must be 1 to 1024", code=2)
-    tasks = tasks_of(spec)
+    if scheduler is not None and not ADDRESS.fullmatch(scheduler):
+        raise Failure(f"scheduler is {scheduler!r}: must be an address such as tcp://HOST:8786", code=2)
     if output is None and not spec.suffix:
         raise Failure(f"{spec} has no suffix to leave out: give a folder as --output", code=2)
     folder = spec.with_suffix("") if output is None else output
+    look.check(folder)
+    tasks = tasks_of(spec)
     began = time.monotonic()
     with told(OSError), ExitStack() as stack:
         kept = f"they are kept in {folder}, and the same command continues"
@@ -62,7 +72,7 @@ def sweep(
         study = run(tasks, folder, Cluster(scheduler, processes), begin)
     elapsed = time.monotonic() - began
     result = _result(spec, folder, study, elapsed)
-    _draw(result, folder)
+    _draw(result, look.into(folder))
     if json:
         print_json(result)
     else:
@@ -94,15 +104,15 @@ def _result(spec: Path, folder: Path, study: "Study", elapsed: float) -> dict[st
     }
 
 
-def _draw(result: dict[str, Any], folder: Path) -> None:
-    from tvist_lab.figures import save, sweep_figure
+def _draw(result: dict[str, Any], files: "FigureFiles") -> None:
+    from tvist_lab.figures import sweep_figure
     from tvist_lab.sweep.summary import setting_name
 
     entries = result["summary"]
     settings = [setting_name(entry) for entry in entries]
     result["figure"] = None
     if len(set(settings)) <= DRAWN:
-        result["figure"] = str(save(sweep_figure(entries, settings), folder / "sweep.png"))
+        result["figure"] = str(files.write(sweep_figure(entries, settings), "sweep"))
 
 
 def _print(result: dict[str, Any]) -> None:

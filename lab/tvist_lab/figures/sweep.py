@@ -6,13 +6,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from tvist_lab.figures.style import FAINT, SHAPED, THIRD, UNSHAPED, panels, title
+from tvist_lab.figures.style import FAINT, SERIES, legend, panels, title
 
-COLORS = (SHAPED, UNSHAPED, THIRD, "#E69F00", "#CC79A7", "#56B4E9")
-MARKERS = "osD^v<>P*"
-"""Colours and markers of the shapers, in their order; they repeat at different lengths."""
-IN_A_LINE = 4
-"""Largest number of shapers in a line of the legend."""
 EACH = 0.22
 """Height of a setting [inch]."""
 
@@ -29,7 +24,7 @@ def sweep_figure(entries: Sequence[dict[str, Any]], settings: Sequence[str]) -> 
     height = 1.9 + EACH * (1.0 + 0.3 * len(shapers)) * len(names)
     figure, (less, late) = panels(2, 2.0 * height, share_x=False)
     for place, shaper in enumerate(shapers):
-        color, marker = COLORS[place % len(COLORS)], MARKERS[place % len(MARKERS)]
+        style = SERIES[place % len(SERIES)]
         offset = 0.6 * ((place + 0.5) / len(shapers) - 0.5)
         mine = [(one, name) for one, name in zip(entries, settings, strict=True) if one["shaper"] == shaper]
         y = np.array([names.index(name) + offset for _, name in mine])
@@ -41,10 +36,10 @@ def sweep_figure(entries: Sequence[dict[str, Any]], settings: Sequence[str]) -> 
                 ("delay_ms", "median"),
             )
         )
-        less.hlines(y, p5, median, color=color, linewidth=1.0)
-        less.plot(p5, y, "|", color=color, markersize=5)
-        less.plot(median, y, marker, color=color, markersize=4, label=shaper)
-        late.plot(delay, y, marker, color=color, markersize=4, label=shaper, clip_on=False)
+        less.hlines(y, p5, median, color=style.color, linewidth=1.0)
+        less.plot(p5, y, "|", color=style.color, markersize=5)
+        less.plot(median, y, **style.points(), label=shaper)
+        late.plot(delay, y, **style.points(), clip_on=False)
     less.axvline(0.0, color=FAINT, linewidth=0.8)
     for panel, words in (
         (less, "Reduction: median, line to 5th percentile"),
@@ -56,7 +51,5 @@ def sweep_figure(entries: Sequence[dict[str, Any]], settings: Sequence[str]) -> 
     less.set(xlabel="Reduction (%)")
     late.set(xlabel="Delay (ms)")
     late.set_xlim(left=0.0)
-    handles, labels = less.get_legend_handles_labels()
-    columns = min(len(labels), IN_A_LINE)
-    figure.legend(handles, labels, loc="outside upper right", ncols=columns, fontsize=8, frameon=False)
+    legend(figure, less)
     return figure

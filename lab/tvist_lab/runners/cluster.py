@@ -127,15 +127,17 @@ def _local(processes: int) -> Iterator[LocalCluster]:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Keep Dask's log and warnings from the terminal: what matters becomes a failure or an error."""
-    log = logging.getLogger("distributed")
-    level = log.level
-    log.setLevel(logging.CRITICAL + 1)
+    known = [name for name in logging.root.manager.loggerDict if name.split(".")[0] == "distributed"]
+    levels = {name: logging.getLogger(name).level for name in known}
+    for name in levels:  # Dask gives several of them a level and an output of their own
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         with warnings.catch_warnings(), dask.config.set(QUIET):
             warnings.simplefilter("ignore")
             yield
     finally:
-        log.setLevel(level)
+        for name, level in levels.items():
+            logging.getLogger(name).setLevel(level)
 
 
 class _Run:

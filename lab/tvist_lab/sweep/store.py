@@ -44,14 +44,11 @@ class Store:
         self.folder = folder
         self._parts = folder / PARTS
         manifest = folder / MANIFEST
-        new = not manifest.exists()
-        if new and folder.is_dir() and any(folder.iterdir()):
+        if not manifest.exists() and folder.is_dir() and any(folder.iterdir()):
             raise StoreError(f"{folder} exists already and holds no sweep: give another --output")
         try:
             self._parts.mkdir(parents=True, exist_ok=True)
-            if new:
-                _write(manifest, msgspec.json.format(msgspec.json.encode(identity), indent=1) + b"\n")
-            self._lock = os.open(manifest, os.O_RDONLY | os.O_CLOEXEC)
+            self._lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
         except OSError as error:
             raise _told(error, folder) from error
         try:
@@ -65,11 +62,22 @@ class Store:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             raise StoreError(f"another tvist sweep is writing {self.folder}") from error
-        _check_same(self.folder, manifest, identity)
+        if self._files():
+            _check_same(self.folder, manifest, identity)
+        else:
+            content = msgspec.json.format(msgspec.json.encode(identity), indent=1) + b"\n"
+            try:
+                _write(manifest, content)
+            except OSError as error:
+                raise _told(error, self.folder) from error
         for forgotten in (*self.folder.glob(".*.tmp"), *self._parts.glob(".*.tmp")):
             forgotten.unlink()
-        known = [*self._parts.glob("*.parquet")]
-        self._next = 1 + max((int(part.stem) for part in known), default=0)
+        self._next = 1 + max((int(part.stem) for part in self._parts.glob("*.parquet")), default=0)
+
+    def _files(self) -> list[Path]:
+        """Return the files with rows, the newest last."""
+        files = [self.folder / ROWS, *sorted(self._parts.glob("*.parquet"))]
+        return [file for file in files if file.exists()]
 
     def __enter__(self) -> Self:
         return self
@@ -85,9 +93,7 @@ class Store:
         Raises:
             StoreError: A file cannot be read.
         """
-        files = [self.folder / ROWS, *sorted(self._parts.glob("*.parquet"))]
-        read = [_read(file) for file in files if file.exists()]
-        found = pl.concat([pl.DataFrame(schema=SCHEMA), *read])
+        found = pl.concat([pl.DataFrame(schema=SCHEMA), *map(_read, self._files())])
         return found.unique("row", keep="last", maintain_order=True).sort("row")
 
     def done(self, shapers: int) -> set[int]:
