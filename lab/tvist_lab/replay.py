@@ -78,6 +78,11 @@ def replay_file(
         raise ReplayError(
             "the recording has no initial setup of its robot; only tvist serve --record writes it"
         )
+    if content.from_tick is not None:
+        raise ReplayError(
+            f"the recording has forgotten all before tick {content.from_tick}, so its run cannot be repeated; "
+            "--publish puts its messages on the network"
+        )
     if (content.dropped or {}).get("journal"):
         raise ReplayError("the recorder dropped messages of the journal, so an equal run is not possible")
     used, notes = _used(content.start, own_shapers)

@@ -33,9 +33,19 @@ METADATA = "tvist"
 """Name of the metadata written first: `format`, and `info` and `start` as JSON."""
 END_METADATA = "tvist.end"
 """Name of the metadata written last: for each channel, how many messages were dropped."""
+RING = "ring"
+"""Entry of that metadata in a recording that forgets its beginning: how many ticks it keeps at least."""
+FROM_TICK = "from_tick"
+"""Entry of that metadata in a recording that has forgotten its beginning: its first tick."""
 
 _Some = TypeVar("_Some", bound=Recorded)
 _ENCODER = msgspec.json.Encoder()
+
+
+def earlier_name(name: str) -> str:
+    """Return the name of the file with the older part of a ring: `run.earlier.mcap` for `run.mcap`."""
+    stem, dot, ending = name.rpartition(".")
+    return f"{stem}.earlier.{ending}" if dot and stem else f"{name}.earlier"
 
 
 def topics(robot: str) -> dict[type[msgspec.Struct], str]:

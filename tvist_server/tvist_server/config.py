@@ -19,6 +19,7 @@ from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Clock
 from tvist_protocol.values import RobotName, Seed
+from tvist_server.durations import ticks_of
 from tvist_server.fleet import members
 from tvist_server.initial import read_state, shaped_by
 from tvist_server.profiles import PLAIN, PROFILES, Profile, ProfileName
@@ -81,6 +82,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Seed of sensor noise and gear errors; with several robots, each further one adds 1."""
     record: str | None = None
     """MCAP file to record into; with several robots, each has a file of its own that ends with its name."""
+    keep: str | None = None
+    """Duration that the recording keeps at least, such as "10min"; it forgets what was before. Default: all of it."""
     dump: str = tempfile.gettempdir()
     """Folder to save the last second before a failure of the simulated arm to."""
     truth: bool = False
@@ -149,6 +152,21 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         if not Path(self.dump).is_dir():
             raise ConfigError(f"dump is {self.dump!r}: must be a folder that exists")
         return Path(self.dump)
+
+    def keep_ticks(self) -> int | None:
+        """Return the number of ticks that a recording keeps at least; None if it keeps all.
+
+        Raises:
+            ConfigError: `keep` is no duration, or nothing is recorded.
+        """
+        if self.keep is None:
+            return None
+        if self.record is None:
+            raise ConfigError(f"keep is {self.keep}, but nothing is recorded: give record, too")
+        try:
+            return ticks_of(self.keep, "keep")
+        except ValueError as error:
+            raise ConfigError(str(error)) from error
 
     def interfaces(self, number: int) -> tuple[str, dict[InterfaceName, int]]:
         """Return the address of a robot's UR interfaces, and the port of each.

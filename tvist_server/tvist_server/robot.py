@@ -42,6 +42,7 @@ class ServedRobot:
         observe: Makes a further sink of the controller's messages.
         programs: Folder with programs that clients load by their names.
         allowed: Machines that programs may connect to, besides the one that sent them.
+        keep: Number of ticks that the recording keeps at least; None keeps all.
 
     Raises:
         ValueError: The setup is invalid, or a machine is none.
@@ -56,6 +57,7 @@ class ServedRobot:
         observe: Callable[[Controller], Sink] | None = None,
         programs: ProgramFolder | None = None,
         allowed: Sequence[str] = (),
+        keep: int | None = None,
     ) -> None:
         self.setup = setup
         hosts = AllowedHosts(allowed)
@@ -72,6 +74,7 @@ class ServedRobot:
                 record,
                 info_of(self.controller),
                 setup.to_builtins(),
+                keep=keep,
                 wait=lockstep,
                 on_error=self._warn,
                 on_moved=self._warn,

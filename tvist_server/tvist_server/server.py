@@ -195,9 +195,9 @@ def _robot(
     path = None
     if config.record is not None:
         path = recording_of(config.record, setup.name) if several else Path(config.record)
-    programs, dump = config.program_folder(setup.name), config.dump_folder()
+    programs, dump, keep = config.program_folder(setup.name), config.dump_folder(), config.keep_ticks()
     try:
-        return ServedRobot(setup, path, dump, observe, programs, config.ur_allow)
+        return ServedRobot(setup, path, dump, observe, programs, config.ur_allow, keep)
     except ValueError as error:
         raise ConfigError(str(error)) from error
 

@@ -14,6 +14,7 @@ def record(
     name: str = "ur5e",
     security: Path | None = None,
     seconds: float | None = None,
+    keep: str | None = None,
     json: bool = False,
 ) -> None:
     """Record what a served robot publishes as MCAP until Control+C: states, events, truth, inputs and outputs.
@@ -26,14 +27,18 @@ def record(
         name: Name of the robot.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         seconds: Stop this many seconds after the first state.
+        keep: Keep the last 90s, 10min or 2h, and at most twice as much, and forget what was before [keep all].
         json: Print one JSON object at the end.
     """
     if seconds is not None and seconds <= 0.0:
         raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
     from tvist_client.robot import Robot
+    from tvist_server.durations import ticks_of
     from tvist_server.ending import Ending
     from tvist_server.recording import Recorder, RecorderError
 
+    with told(ValueError, code=2):
+        kept = None if keep is None else ticks_of(keep, "keep")
     ending = Ending()
 
     async def run() -> tuple[Path | None, int, int]:
@@ -41,7 +46,7 @@ def record(
         ended, loop = asyncio.Event(), asyncio.get_running_loop()
         ending.hear(lambda: loop.call_soon_threadsafe(ended.set))
         async with await Robot.connect(endpoint, name, security=security) as robot:
-            with Recorder(file, await robot.info(), {}, on_error=say, on_moved=say) as recorder:
+            with Recorder(file, await robot.info(), {}, keep=kept, on_error=say, on_moved=say) as recorder:
                 robot.on_state(recorder.state)
                 robot.on_state(lambda state: ticks.append(state.tick))
                 robot.on_event(recorder.event)

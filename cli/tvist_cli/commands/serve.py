@@ -40,6 +40,7 @@ def serve(
     state: str | None = None,
     seed: int | None = None,
     record: str | None = None,
+    keep: str | None = None,
     dump: str | None = None,
     truth: bool = False,
     quiet: Annotated[bool | None, Parameter(negative="--no-quiet")] = None,
@@ -85,6 +86,8 @@ def serve(
         state: TOML or JSON file with the state to start in: any of q, payload (the carried one), mode, shaper, seed.
         seed: Seed of sensor noise and gear errors [0]. With several robots, the second uses seed + 1, and so on.
         record: MCAP file to record into. With several robots, each records into a file of its own, FILE-NAME.mcap.
+        keep: Let the recording keep the last 90s, 10min or 2h, and at most twice as much, and forget what was before
+            [it keeps all].
         dump: Folder to save the last second before a failure of the simulated arm to [the system's temporary folder].
         truth: Publish what a real robot cannot measure, such as the arm's deflection, on tvist/NAME/truth and in the
             recording.
@@ -111,7 +114,7 @@ def serve(
         "overload": overload or None, "shaper": lower(shaper), "shape_servo": shape_servo or None,
         "calibration": calibration, "clock": lower(clock), "speed": speed,
         "realtime_priority": realtime_priority or None, "start": start, "state": state, "seed": seed,
-        "record": record, "dump": dump, "truth": truth or None, "quiet": quiet,
+        "record": record, "keep": keep, "dump": dump, "truth": truth or None, "quiet": quiet,
         "floor": floor, "compensate_sag": compensate_sag, "programs": programs,
         "ur": (ur or ur_address is not None or ur_port is not None) or None, "ur_address": ur_address,
         "ur_ports": ur_ports(ur_port), "ur_allow": ur_allow,

@@ -1,8 +1,7 @@
 """Reader of recordings: MCAP files of one robot, complete or truncated."""
 
 import os
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import islice
@@ -12,22 +11,22 @@ from typing import IO, Any, TypeVar
 from mcap.records import Channel, McapRecord, Message, Metadata
 
 from tvist_lab.recordings.json_columns import Block, JsonColumns
-from tvist_lab.recordings.mcap_records import CUT, DAMAGE, MAGIC, records
+from tvist_lab.recordings.mcap_records import CUT, DAMAGE, MAGIC
 from tvist_lab.recordings.recorded_columns import recording_of_blocks
 from tvist_lab.recordings.recording import Recording, RecordingError
+from tvist_lab.recordings.ring_records import TOPIC, opened, ring_records
 from tvist_protocol.channels import tag
 from tvist_protocol.content import checked, parse_json
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Info
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
-from tvist_protocol.recorded import END_METADATA, FORMAT, METADATA, JsonReader
+from tvist_protocol.recorded import END_METADATA, FORMAT, FROM_TICK, METADATA, JsonReader
 from tvist_protocol.stream import Event, State, Truth
 
 BLOCK = 4096
 """Number of messages decoded together; some 6 MB."""
 
-_TOPIC = re.compile(r"tvist/(?P<robot>[^/]+)/(?P<kind>\w+)")
 _TABLES: dict[str, type[State | Truth | Io]] = {tag(kind): kind for kind in (State, Truth, Io)}
 """Kinds that become columns."""
 _OBJECTS: dict[str, type[Event | Entry]] = {tag(kind): kind for kind in (Event, Entry)}
@@ -59,6 +58,8 @@ class RecordingFile:
     """Inputs of the controller."""
     recording: Recording
     """States, truth and events as columns, with inputs and outputs where they were recorded."""
+    from_tick: int | None
+    """First tick of a recording that has forgotten those before; None if it began with the robot's first tick."""
     complete: bool
     """Whether the file was closed properly, and read to its end."""
     dropped: Mapping[str, int] | None
@@ -118,11 +119,11 @@ def read(path: str | os.PathLike[str]) -> RecordingFile:
     path = Path(path)
     content = _Content(path)
     try:
-        with path.open("rb") as stream:
-            if (first := stream.read(len(MAGIC))) != MAGIC:
+        with opened(path) as streams:
+            if (first := streams[-1].read(len(MAGIC))) != MAGIC:
                 raise RecordingFileError(f"{path} is {'no MCAP file' if first else 'empty'}")
-            stream.seek(0)
-            content.read(stream)
+            streams[-1].seek(0)
+            content.read(streams)
     except OSError as error:
         raise RecordingFileError(f"{path} cannot be read: {error.strerror}") from error
     return content.file()
@@ -132,13 +133,13 @@ def _again(path: Path, kind: type[_Kind]) -> Iterator[_Kind]:
     """Read messages up to the end or a damage of the file."""
     reader, channels = JsonReader(kind), set()
     try:
-        with path.open("rb") as stream:
-            for record in records(stream):
+        with opened(path) as streams:
+            for record in ring_records(streams):
                 match record:
                     case Message(channel_id=channel, data=data) if channel in channels:
                         yield reader.read(data)
                     case Channel(topic=topic, message_encoding="json"):
-                        found = _TOPIC.fullmatch(topic)
+                        found = TOPIC.fullmatch(topic)
                         if found is not None and found["kind"] == tag(kind):
                             channels.add(record.id)
     except OSError as error:
@@ -167,16 +168,16 @@ class _Content:
     waiting: list[tuple[str, bytes]] = field(default_factory=list)
     """Messages that are not yet decoded, in order."""
 
-    def read(self, stream: IO[bytes]) -> None:
+    def read(self, streams: Sequence[IO[bytes]]) -> None:
         try:
-            self._read(stream)
+            self._read(streams)
             self._decode()
         except ProtocolError as error:
             self.damage = f"contains an invalid message ({error.why})"
 
-    def _read(self, stream: IO[bytes]) -> None:
+    def _read(self, streams: Sequence[IO[bytes]]) -> None:
         try:
-            for record in records(stream):
+            for record in ring_records(streams):
                 self._take(record)
         except RecordingFileError:
             raise
@@ -207,6 +208,7 @@ class _Content:
             events=events,
             journal=tuple(self.objects[tag(Entry)]),
             recording=recording_of_blocks(states, truths, io, events, info),
+            from_tick=None if ours is None else self._from_tick(ours),
             complete=self.damage is None,
             dropped=dropped,
             note=self._note(states, dropped),
@@ -224,7 +226,7 @@ class _Content:
                 self._open(record)
             case Metadata(name=name, metadata=content):
                 self._decode()
-                self.metadata[name] = content
+                self.metadata.setdefault(name, content)  # a ring's older file comes first
                 if name == METADATA and content.get("format") != FORMAT:
                     raise self._error(f"has format {content.get('format')}; {FORMAT} can be read")
 
@@ -263,7 +265,7 @@ class _Content:
             self.objects[kind] += found
 
     def _open(self, channel: Channel) -> None:
-        found = _TOPIC.fullmatch(channel.topic)
+        found = TOPIC.fullmatch(channel.topic)
         if found is None or found["kind"] not in self.readers or channel.message_encoding != "json":
             return
         if self.robot not in (None, found["robot"]):
@@ -278,6 +280,12 @@ class _Content:
             return None if counts is None else {kind: int(count) for kind, count in counts.items()}
         except ValueError as error:
             raise self._error(f"has no valid {END_METADATA}: {error}") from error
+
+    def _from_tick(self, ours: Mapping[str, str]) -> int | None:
+        try:
+            return int(ours[FROM_TICK]) if FROM_TICK in ours else None
+        except ValueError as error:
+            raise self._error(f"has no valid {FROM_TICK}: {error}") from error
 
     def _json(self, metadata: Mapping[str, str], name: str, kind: Any) -> Any:
         try:

@@ -20,8 +20,10 @@ from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import Recorded, topics
 from tvist_protocol.stream import Event, State, Truth
+from tvist_server.recording.one_file import OneFile
+from tvist_server.recording.ring import Ring
 from tvist_server.recording.whereabouts import DeletedError, whereabouts
-from tvist_server.recording.writer import RecordingWriter, heading
+from tvist_server.recording.writer import heading
 
 QUEUE_SIZE = 8192
 """Number of messages that may wait. State, truth and a set-point every tick make 1500 messages a second, so this
@@ -39,6 +41,10 @@ class RecorderError(TvistError):
     """A recording cannot be started."""
 
 
+class MovedError(Exception):
+    """The file of a recording that forgets its beginning has been moved."""
+
+
 class Recorder(Sink):
     """Records one robot until it is closed.
 
@@ -51,6 +57,8 @@ class Recorder(Sink):
         info: Description of the robot.
         start: How the server was started: everything besides the journal that a replay needs, as JSON types.
         overwrite: Whether to replace an existing file.
+        keep: Number of ticks that the recording keeps at least; it forgets those before, and the end of the recording
+            joins what is left to one file. None: it keeps all.
         queue_size: Number of messages that may wait for the writer.
         wait: Whether to wait when the queue is full: for robots whose time waits too, with the clocks lockstep and
             free.
@@ -70,6 +78,7 @@ class Recorder(Sink):
         start: Mapping[str, Any],
         *,
         overwrite: bool = False,
+        keep: int | None = None,
         queue_size: int = QUEUE_SIZE,
         wait: bool = False,
         on_error: Callable[[str], None] | None = None,
@@ -92,7 +101,7 @@ class Recorder(Sink):
         self._closing = False
         self._wake = Flag()
         self._room = Flag()
-        self._begin(info, start, overwrite)
+        self._begin(info, start, overwrite, keep)
         # A daemon thread does not keep a program that ends without closing from ending, and the file stays readable.
         self._thread = Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
@@ -155,23 +164,23 @@ class Recorder(Sink):
         while len(self._queue) >= self._queue_size and not self._stopped:
             self._room.wait(PAUSE)
 
-    def _begin(self, info: Info, start: Mapping[str, Any], overwrite: bool) -> None:
+    def _begin(self, info: Info, start: Mapping[str, Any], overwrite: bool, keep: int | None) -> None:
+        self._file: OneFile | Ring
         try:
             topic_of, first = topics(info.name), heading(info, start)
         except (TypeError, ValueError, TvistError) as error:
             raise RecorderError(f"{self.path} cannot be started: {error}") from error
         try:
-            self._stream = self.path.open("wb" if overwrite else "xb")
-        except FileExistsError:
+            if keep is None:
+                self._file = OneFile(self.path, topic_of, first, overwrite=overwrite)
+            else:
+                self._file = Ring(self.path, topic_of, first, overwrite=overwrite, keep=keep)
+        except FileExistsError as error:
+            existing = error.filename or self.path
             raise RecorderError(
-                f"{self.path} exists already and is not overwritten: choose another file"
+                f"{existing} exists already and is not overwritten: choose another file"
             ) from None
         except OSError as error:
-            raise RecorderError(f"{self.path} cannot be written: {_reason(error)}") from error
-        try:
-            self._writer = RecordingWriter(self._stream, topic_of, first)
-        except OSError as error:
-            self._abandon()
             raise RecorderError(f"{self.path} cannot be written: {_reason(error)}") from error
 
     def _run(self) -> None:
@@ -185,13 +194,21 @@ class Recorder(Sink):
                     self._look()
                     looked = time.monotonic()
             self._drain()
-            self._writer.finish(self._dropped)
-            self._look()
-            self._stream.close()
+            if isinstance(self._file, Ring):
+                self._look()
+                self._file.finish(self._dropped)
+            else:
+                self._file.finish(self._dropped)
+                self._look()
+            self._file.close()
         except DeletedError:
             self._stop(
                 f"the recording {self.path} was deleted, or moved to another file system, where it ends: "
                 "no more is recorded"
+            )
+        except MovedError:
+            self._stop(
+                f"the recording {self.path} was moved: new files could not take its place, so no more is recorded"
             )
         except Exception as error:  # noqa: BLE001  a thread has nobody above it: whatever it was must be told
             self._stop(f"the recording {self.path} has stopped and is incomplete: {_reason(error)}")
@@ -201,8 +218,11 @@ class Recorder(Sink):
 
         Raises:
             DeletedError: The file was deleted; continuing would fill the disk with data that cannot be read.
+            MovedError: The file was moved, and its recording needs the name for the next file.
         """
-        self.place = whereabouts(self.path, self._stream.fileno())
+        self.place = whereabouts(self.path, self._file.fileno())
+        if self.place != self.path and isinstance(self._file, Ring):
+            raise MovedError
         if self.place != self.path and self._on_moved is not None:
             where = "it continues in that file" if self.place is None else f"it continues in {self.place}"
             self._on_moved(f"the recording {self.path} was moved away: {where}")
@@ -211,8 +231,8 @@ class Recorder(Sink):
     def _drain(self) -> None:
         """Write the messages waiting now; later ones wait for the next call, so that the file is checked regularly."""
         for _ in range(len(self._queue)):
-            self._writer.write(self._queue.popleft())
-        self._writer.flush()
+            self._file.write(self._queue.popleft())
+        self._file.flush()
         self._room.set()
 
     def _stop(self, why: str) -> None:
@@ -226,7 +246,7 @@ class Recorder(Sink):
 
     def _abandon(self) -> None:
         with suppress(OSError):
-            self._stream.close()
+            self._file.close()
 
 
 def _reason(error: Exception) -> str:
