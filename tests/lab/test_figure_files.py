@@ -15,7 +15,7 @@ from tvist_shaping import SHAPERS
 
 DOCS = Path(__file__).parents[2] / "docs"
 TICKS = 1500
-UNIT = re.compile(r"\((ms|s|Hz|%|–|°|m|mm|mrad|rad/s|rad/s²|m/s²|dB|ticks|ticks of 2 ms|damped periods)\)$")
+UNIT = re.compile(r"\((ms|s|Hz|%|–|°|m|mm|mrad|rad/s|rad/s²|m/s|m/s²|dB|ticks|ticks of 2 ms|damped periods)\)$")
 LEAST_POINTS = {1: 5.5, 2: 7.0}
 """Smallest size of text by columns [pt]."""
 
