@@ -54,7 +54,7 @@ def ring_down_figure(name: str, recorded: Recorded) -> Figure:
         (alpha[rows] - ring.mean(axis=0)) @ axis,
         **OF_SHAPED.line(1.1, label="Along its strongest axis"),
     )
-    words = f"no mode is fitted: {fit.reason}"
+    words = "no mode is fitted"
     if fit.ok:
         late = np.linspace(0.0, len(ring) * period, 200)
         sigma = 2.0 * np.pi * fit.f_d * fit.zeta / np.sqrt(1.0 - fit.zeta**2)
@@ -108,6 +108,7 @@ def ring_down_figure(name: str, recorded: Recorded) -> Figure:
             r"$\alpha$": "acceleration of the tool, without gravity",
             "$f_d$": "damped frequency",
             r"$\zeta$": "damping ratio",
+            **({} if fit.ok else {"No mode": fit.reason}),
             "0 dB": f"largest level; a spectrum is of {1e3 * BLOCK:.0f} ms",
         },
     )
