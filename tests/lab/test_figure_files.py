@@ -147,6 +147,8 @@ def test_axes_have_units_and_text_is_large_enough_and_within_the_figure(make, na
     assert all(UNIT.search(label.replace("\n", " ")) for label in labels), labels
     for panel in figure.axes:
         assert not panel.axison or panel.get_lines() or panel.collections or panel.patches, "an empty panel"
+    lines = [line for panel in figure.axes for line in panel.get_lines()]
+    assert all(line.get_alpha() is None for line in lines), "colours mix where lines overlap"
     assert min(text.get_fontsize() for text in words_of(figure)) >= LEAST_POINTS[columns]
     renderer = figure.canvas.get_renderer()
     boxes = [panel.get_tightbbox(renderer) for panel in figure.axes]

@@ -17,7 +17,7 @@ def test_a_map_is_one_object_and_a_figure_of_each_quantity(tmp_path):
     assert json.loads(board.read_text(encoding="utf-8")) == ended.json
     for key, maps in ended.json["maps"].items():
         assert [len(maps[kind]) for kind in ("identified", "true", "error_percent")] == [5, 5, 5]
-        assert ended.json["errors"][key]["max_percent"] < 15.0
+        assert ended.json["errors"][key]["median_percent"] < 10.0
     assert {path.name for path in tmp_path.glob("*.svg")} == {"map_f_d.svg", "map_zeta.svg", "map_delay.svg"}
 
 

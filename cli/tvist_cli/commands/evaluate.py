@@ -298,8 +298,7 @@ def _draw(jobs: list["MoveJob"], judged: list["JudgedMove"], files: "FigureFiles
     from tvist_lab.evaluation.evaluate import record
     from tvist_lab.figures import residual_by_move_figure, vibration_figure
 
-    counted = [place for place, one in enumerate(judged) if one.counts] or list(range(len(judged)))
-    middle = sorted(counted, key=lambda place: judged[place].unshaped.peak)[len(counted) // 2]
+    middle = _example(judged)
     write(
         files,
         {
@@ -307,6 +306,12 @@ def _draw(jobs: list["MoveJob"], judged: list["JudgedMove"], files: "FigureFiles
             "one_move": vibration_figure(*record(jobs[middle]), middle + 1),
         },
     )
+
+
+def _example(judged: list["JudgedMove"]) -> int:
+    """Place of the move that is drawn: the middle one by unshaped vibration, of those that count if any do."""
+    counted = [place for place, one in enumerate(judged) if one.counts] or list(range(len(judged)))
+    return sorted(counted, key=lambda place: judged[place].unshaped.peak)[len(counted) // 2]
 
 
 def _notes(
