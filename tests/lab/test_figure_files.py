@@ -15,7 +15,9 @@ from tvist_shaping import SHAPERS
 
 DOCS = Path(__file__).parents[2] / "docs"
 TICKS = 1500
-UNIT = re.compile(r"\((ms|s|Hz|%|–|°|m|mm|mrad|rad/s|rad/s²|m/s|m/s²|dB|ticks|ticks of 2 ms|damped periods)\)$")
+UNIT = re.compile(
+    r"\((ms|s|Hz|%|–|°|m|mm|mrad|rad/s|rad/s²|m/s|m/s²|dB|ticks|ticks of 2 ms|damped periods)\)$"
+)
 LEAST_POINTS = {1: 5.5, 2: 7.0}
 """Smallest size of text by columns [pt]."""
 
@@ -147,6 +149,8 @@ def test_axes_have_units_and_text_is_large_enough_and_within_the_figure(make, na
     assert all(UNIT.search(label.replace("\n", " ")) for label in labels), labels
     for panel in figure.axes:
         assert not panel.axison or panel.get_lines() or panel.collections or panel.patches, "an empty panel"
+    lines = [line for panel in figure.axes for line in panel.get_lines()]
+    assert all(line.get_alpha() is None for line in lines), "colours mix where lines overlap"
     assert min(text.get_fontsize() for text in words_of(figure)) >= LEAST_POINTS[columns]
     renderer = figure.canvas.get_renderer()
     boxes = [panel.get_tightbbox(renderer) for panel in figure.axes]

@@ -1,12 +1,17 @@
 """The figures show the numbers they stand for."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from tvist_cli.commands.evaluate import _example
 from tvist_lab.metrics import motions
+from tvist_lab.metrics.residual import residual as measured
 from tvist_shaping import SHAPERS, custom, residual
 
 TICKS = 1500
+UNSHAPED = "#D55E00"
 
 
 @pytest.fixture(scope="module")
@@ -82,6 +87,32 @@ def test_figure_16_writes_the_rv_it_draws_and_where_it_is_no_fit(figures, record
     assert any("RV 0.9" in text or "RV 1.0" in text for text in words)
     assert any("largest value" in text for text in words)
     assert words.count("$t_b$") == words.count("$t_b^*$") == 1
+
+
+def test_figure_16_draws_no_decay_through_noise(figures, recorded, one_motion):
+    noise = 0.06 * np.random.default_rng(1).standard_normal((TICKS, 3))
+    noisy = one_motion(37, alpha=noise)
+    found = motions(noisy)[0]
+    assert measured(noisy, found).fitted, "its peaks look like a decay"
+    figure = figures.figure_16({"Q1-Q2": (recorded[0], (noisy, found))})
+    (panel,) = figure.axes
+    decays = [line for line in panel.get_lines() if line.get_linewidth() == 1.4 and len(line.get_xdata())]
+    assert [line.get_color() for line in decays] == [UNSHAPED]
+    assert any("fitted to noise" in text for text in texts(panel))
+
+
+def test_the_band_of_repeatability_has_its_number(figures, recorded):
+    assert "repeatability, 0.03 mm" in texts(figures.motion_figure("Q1-Q2", *recorded).axes[1])
+
+
+@pytest.mark.parametrize(("counts", "drawn"), [([True, False, True, True], 3), ([False] * 4, 2)])
+def test_the_example_is_the_middle_one_of_the_moves_that_count(counts, drawn):
+    peaks = [0.5, 0.1, 0.3, 0.4] if any(counts) else [0.01, 0.04, 0.03, 0.02]
+    judged = [
+        SimpleNamespace(counts=one, unshaped=SimpleNamespace(peak=peak))
+        for one, peak in zip(counts, peaks, strict=True)
+    ]
+    assert _example(judged) == drawn
 
 
 @pytest.fixture

@@ -169,7 +169,9 @@ class TestPaths:
                 assert one["delay_ms"] > 0.0
         assert set(told["summary"]) == {"all", "arc"}
         assert {"refused", "stopping", "circle", "seed", "calibration"} <= set(told)
-        assert told["command"] in (tmp_path / "page.md").read_text(encoding="utf-8")
+        page = (tmp_path / "page.md").read_text(encoding="utf-8")
+        typed = "tvist paths --random 1 --kind arc --shapers zv auto --seed 3 --payload 5 --clean --markdown"
+        assert page.startswith(f"```sh\n{typed} ")
 
     @pytest.mark.slow
     def test_words_and_figures_are_for_people(self, tmp_path):
@@ -219,8 +221,8 @@ class TestShaperBench:
             "--json",
         ).assert_failed(1, "not ranked", "peeks at the future")
         rows = {row["name"]: row for row in ended.json["shapers"]}
-        assert [rows[name]["ranked"] for name in ("none", "zv", "file")] == [True, True, False]
-        assert "peeks at the future" in rows["file"]["fault"]
+        assert [rows[name]["ranked"] for name in ("none", "zv", "peeks")] == [True, True, False]
+        assert "peeks at the future" in rows["peeks"]["fault"]
         assert json.loads(board.read_text(encoding="utf-8")) == ended.json
         assert set(rows["zv"]["by_arm"]) == set(ended.json["arms"])
         assert len(ended.json["arms"]) == 10

@@ -287,13 +287,18 @@ def _drawn(jobs: list["MoveJob"], judged: list["JudgedMove"]) -> dict[str, tuple
     from tvist_lab.evaluation.evaluate import record
     from tvist_lab.figures import residual_by_move_figure, vibration_figure
 
-    counted = [place for place, one in enumerate(judged) if one.counts] or list(range(len(judged)))
-    middle = sorted(counted, key=lambda place: judged[place].unshaped.peak)[len(counted) // 2]
+    middle = _example(judged)
     one = vibration_figure(*record(jobs[middle]), middle + 1)
     return {
         "moves": (residual_by_move_figure(judged), "Vibration after each move, unshaped and shaped."),
         "one_move": (one, f"Move {middle + 1}, which vibrates like the median of all moves."),
     }
+
+
+def _example(judged: list["JudgedMove"]) -> int:
+    """Place of the move that is drawn: the middle one by unshaped vibration, of those that count if any do."""
+    counted = [place for place, one in enumerate(judged) if one.counts] or list(range(len(judged)))
+    return sorted(counted, key=lambda place: judged[place].unshaped.peak)[len(counted) // 2]
 
 
 def _notes(

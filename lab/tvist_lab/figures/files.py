@@ -1,5 +1,6 @@
 """Files of figures: their format, their resolution, and their width in columns of a journal."""
 
+import re
 import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -81,9 +82,15 @@ def fit(figure: Figure, columns: int) -> None:
         _scale(figure, SMALLER[columns] / SMALLER[now])
     for box in list(figure.legends):
         _narrow(figure, box)
+    # Words that are still too long must not push the panels aside.
+    notes = [text for panel in figure.axes for text in panel.texts]
+    for text in notes:
+        text.set_in_layout(False)
     figure.draw_without_rendering()
     for panel in figure.axes:
         _wrap_in(panel)
+    for text in notes:
+        text.set_in_layout(True)
 
 
 def _scale(figure: Figure, factor: float) -> None:
@@ -146,8 +153,11 @@ def _narrow(figure: Figure, box: Legend) -> None:
 def _wrap_in(panel: Axes) -> None:
     """Break text that is longer than its panel."""
     wide, high = panel.bbox.width, panel.bbox.height
-    for text in (panel.title, *(child for child in panel.get_children() if isinstance(child, Text))):
-        _wrap(text, 0.98 * wide, text.get_window_extent().width)
+    for text in (child for child in panel.get_children() if isinstance(child, Text)):
+        extent, room = text.get_window_extent(), 0.98 * wide
+        if extent.x1 > panel.figure.bbox.width and text in panel.texts:
+            room = min(room, panel.bbox.x1 - extent.x0)
+        _wrap(text, room, extent.width)
     for label in (panel.xaxis.label, panel.yaxis.label):
         extent = label.get_window_extent()
         along = label is panel.xaxis.label
@@ -155,14 +165,14 @@ def _wrap_in(panel: Axes) -> None:
 
 
 def _wrap(text: Text, room: float, length: float) -> None:
+    """Break text between words; a number stays with its unit."""
     words = text.get_text()
     if length <= room or room <= 0.0:
         return
     longest = max(len(line) for line in words.split("\n"))
     characters = max(int(longest * room / length), 8)
-    text.set_text(
-        "\n".join(
-            textwrap.fill(line, characters, break_long_words=False, break_on_hyphens=False)
-            for line in words.split("\n")
-        )
-    )
+    lines = re.sub(r"(?<=\d) (?=[^\W\d]|%)| (?=\()", "\N{NO-BREAK SPACE}", words).split("\n")
+    broken = [
+        textwrap.fill(line, characters, break_long_words=False, break_on_hyphens=False) for line in lines
+    ]
+    text.set_text("\n".join(broken).replace("\N{NO-BREAK SPACE}", " "))

@@ -73,6 +73,7 @@ def ring_down_figure(name: str, recorded: Recorded) -> Figure:
             r"$\alpha$": "acceleration of the tool, without gravity",
             "$f_d$": "damped frequency",
             r"$\zeta$": "damping ratio",
+            **({} if fit.ok else {"No mode": fit.reason}),
             "0 dB": f"largest level; a spectrum is of {1e3 * BLOCK:.0f} ms",
         },
     )
@@ -92,7 +93,7 @@ def _draw_course(panel: Axes, time: Floats, alpha: Floats, after: NDArray[np.boo
     """The acceleration along its strongest axis, and the envelope of the fit."""
     along = alpha @ np.linalg.svd(alpha[after], full_matrices=False)[2][0]
     panel.plot(1e3 * time, along, **OF_SHAPED.line(1.1, label="Along its strongest axis"))
-    words = f"no mode is fitted: {fit.reason}"
+    words = "no mode is fitted"
     if fit.ok:
         late = np.linspace(0.0, time[-1], 200)
         sigma = 2.0 * np.pi * fit.f_d * fit.zeta / np.sqrt(1.0 - fit.zeta**2)
