@@ -112,7 +112,13 @@ def _draw(result: dict[str, Any], files: "FigureFiles") -> None:
     settings = [setting_name(entry) for entry in entries]
     result["figure"] = None
     if len(set(settings)) <= DRAWN:
-        result["figure"] = str(files.write(sweep_figure(entries, settings), "sweep"))
+        try:
+            result["figure"] = str(files.write(sweep_figure(entries, settings), "sweep"))
+        except OSError as error:
+            raise Failure(
+                f"the figure in {files.folder} cannot be written: {error.strerror}; "
+                f"all rows are in {result['rows_file']}"
+            ) from error
 
 
 def _print(result: dict[str, Any]) -> None:
