@@ -24,8 +24,8 @@ from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import END_METADATA, FORMAT, FROM_TICK, METADATA, JsonReader
 from tvist_protocol.stream import Event, State, Truth
 
-BLOCK = 4096
-"""Number of messages decoded together; some 6 MB."""
+BLOCK = 8192
+"""Number of messages decoded together; some 12 MB."""
 
 _TABLES: dict[str, type[State | Truth | Io]] = {tag(kind): kind for kind in (State, Truth, Io)}
 """Kinds that become columns."""
