@@ -27,7 +27,7 @@ COMMANDS = {
     "info": "Print what a recording holds.",
     "report": "Write a web page about recordings: a verdict, tables and figures in one file.",
     "export": "Write a recording as CSV, Parquet, npz or mat.",
-    "replay": "Run a recording's commands again and compare bit by bit.",
+    "replay": "Run a recording's commands again and compare bit by bit, or publish it.",
     "paper": "Run the paper's experiment and print its tables beside ours.",
     "lesson": "Show on an arm with one flexible joint why a fixed shaper is not enough.",
     "shapers": "List the shapers with their durations and their robustness to a wrong frequency.",

@@ -15,8 +15,9 @@ def summary(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Describe a file that `tvist_lab.recordings.read` reads.
 
     Returns:
-        Times in s on the recording's own clock; `complete`, `dropped`, `replayable` and `messages` are null for other
-        files than recordings of a served robot, `motions` if the columns do not show them.
+        Times in s on the recording's own clock. `complete`, `dropped`, `replayable`, `from_tick` and `messages` are
+        null for other files than recordings of a served robot, `motions` if the columns do not show them. `from_tick`
+        is the first tick of a recording that has forgotten those before.
 
     Raises:
         RecordingError: The file cannot be read; the message names it.
@@ -41,7 +42,8 @@ def summary(path: str | os.PathLike[str]) -> dict[str, Any]:
         "missing_ticks": recording.missing_ticks,
         "complete": content and content.complete,
         "dropped": content.dropped and dict(content.dropped) if content else None,
-        "replayable": content and bool(content.start),
+        "replayable": content and bool(content.start) and content.from_tick is None,
+        "from_tick": content and content.from_tick,
         "messages": content
         and {**content.counts, "event": len(content.events), "journal": len(content.journal)},
         "events": dict(Counter(str(event.kind) for event in recording.events)),

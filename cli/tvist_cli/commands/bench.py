@@ -14,6 +14,7 @@ def bench(
     hostile: int | None = None,
     viewed: int | None = None,
     reverse: float | None = None,
+    reading: float | None = None,
     json: bool = False,
 ) -> None:
     """Measure the plant, the filter, the whole control cycle, a served robot, and how many robots one core can run.
@@ -27,9 +28,15 @@ def bench(
             many pairs of runs of --seconds each, and report the page's pictures per second and its memory.
         reverse: Instead, for this many seconds, let a client steer the program of a served robot over a socket at
             500 Hz, as a driver does, and count the program's time-outs; two bare processes do the same meanwhile.
+        reading: Instead, record a moving robot for this many minutes of simulation, and compare how long this recording
+            takes to read with how long the bare MCAP reader takes; also export it to every format.
         json: Print one JSON object.
     """
-    _check(seconds, {"soak": soak, "reverse": reverse}, {"hostile": hostile, "viewed": viewed})
+    _check(
+        seconds,
+        {"soak": soak, "reverse": reverse, "reading": reading},
+        {"hostile": hostile, "viewed": viewed},
+    )
     try:
         if hostile is not None:
             _hostile(hostile, seconds, json)
@@ -37,6 +44,8 @@ def bench(
             _viewed(viewed, seconds, json)
         elif reverse is not None:
             _reverse(reverse, json)
+        elif reading is not None:
+            _reading(reading, json)
         elif soak is not None:
             _soak(soak, json)
         else:
@@ -104,6 +113,24 @@ def _reverse(seconds: float, json: bool) -> None:
         return
     rows = [(key, f"{value:.6g}") for key, value in result.items()]
     table("a program steered over a socket", ("what", "figure"), rows)
+
+
+def _reading(minutes: float, json: bool) -> None:
+    from tvist_lab.benchmark.reading import reading
+
+    result = asyncio.run(reading(minutes, tell=say))
+    if json:
+        print_json(result)
+        return
+    flat = {key: value for key, value in result.items() if not isinstance(value, dict)}
+    table(
+        f"a recording of {minutes:g} min",
+        ("what", "figure"),
+        [(key, f"{value:.6g}") for key, value in flat.items()],
+    )
+    formats = {key: value for key, value in result.items() if isinstance(value, dict)}
+    rows = [(key, *(f"{figure:.4g}" for figure in value.values())) for key, value in formats.items()]
+    table("export", ("format", "write s", "read s", "bytes", "equal"), rows)
 
 
 def _pairs(result: dict[str, Any], title: str) -> None:

@@ -47,7 +47,7 @@ def _facts(found: dict[str, Any]) -> dict[str, str]:
     facts["rows"] = f"{found['rows']}, {missing or 'no'} tick{'' if missing == 1 else 's'} missing"
     if found["complete"] is not None:
         facts["closed"] = "yes" if found["complete"] else "no: cut off or damaged"
-        facts["replay"] = "yes" if found["replayable"] else "no: it does not contain the robot's commands"
+        facts["replay"] = "yes" if found["replayable"] else f"no: it {_lack(found['from_tick'])}"
         facts["messages"] = ", ".join(f"{count} {kind}" for kind, count in found["messages"].items())
     if found["motions"] is not None:
         facts["motions"] = str(found["motions"])
@@ -56,3 +56,9 @@ def _facts(found: dict[str, Any]) -> dict[str, str]:
         size = found["bytes"]
         facts["size"] = f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.1f} kB"
     return facts
+
+
+def _lack(from_tick: int | None) -> str:
+    if from_tick is not None:
+        return f"has forgotten all before tick {from_tick}"
+    return "does not contain the robot's commands"

@@ -4,27 +4,72 @@ from pathlib import Path
 
 from tvist_cli.failure import Failure, told
 from tvist_cli.output import out, print_json, say
+from tvist_cli.playing_back import publish_recording
 from tvist_cli.shapers_of import load_given
+
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+"""Endpoint on which a recording is published."""
 
 
 def replay(
-    file: Path, output: Path | None = None, *, shaper: list[str] | None = None, json: bool = False
+    file: Path,
+    output: Path | None = None,
+    *,
+    shaper: list[str] | None = None,
+    publish: bool = False,
+    listen: list[str] | None = None,
+    name: str | None = None,
+    speed: float | None = None,
+    loop: bool = False,
+    security: str | None = None,
+    insecure: bool = False,
+    json: bool = False,
 ) -> None:
     """Run a recording's messages again on a new robot, without a clock, and compare every state bit by bit.
 
+    With --publish, put the recording itself on the network instead, for programs that watch or record a robot.
+
     Args:
-        file: MCAP file that `tvist serve --record` wrote.
+        file: MCAP file that `tvist serve --record` wrote; with --publish also one of `tvist record`.
         output: MCAP file to write the second run to.
         shaper: FILE.py:NAME, repeatable: your own shaper that the robot was served with. A recording names the file,
             but replay runs it only if it is given here.
+        publish: Serve the recording at its own time. All commands of clients are refused.
+        listen: With --publish, Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447].
+        name: With --publish, name of the robot on the network [that of the recording].
+        speed: With --publish, speed relative to the recording's own time [1].
+        loop: With --publish, begin again at the end of the recording.
+        security: With --publish, folder made by tvist keys, as for tvist serve.
+        insecure: With --publish, accept remote connections without TLS and do not authenticate clients.
         json: Print one JSON object.
     """
+    own_server = {
+        "listen": listen, "name": name, "speed": speed, "loop": loop or None, "security": security,
+        "insecure": insecure or None,
+    }  # fmt: skip
+    if not publish:
+        if given := [key for key, value in own_server.items() if value is not None]:
+            raise Failure(f"--{given[0]} needs --publish", code=2)
+        _run_again(file, output, shaper or [], json=json)
+        return
+    if output is not None or shaper:
+        raise Failure(
+            "--publish runs nothing again: leave out " + ("--shaper" if output is None else "the output"),
+            code=2,
+        )
+    publish_recording(
+        file, listen=listen or [DEFAULT_ENDPOINT], name=name, speed=1.0 if speed is None else speed, loop=loop,
+        security=security, insecure=insecure, json=json,
+    )  # fmt: skip
+
+
+def _run_again(file: Path, output: Path | None, shaper: list[str], *, json: bool) -> None:
     from tvist_lab.recordings import RecordingError
     from tvist_lab.recordings.mcap_file import read
     from tvist_lab.replay import ReplayError, replay_file
     from tvist_server.recording import RecorderError
 
-    own = [load_given(place) for place in shaper or []]
+    own = [load_given(place) for place in shaper]
     with told(RecordingError, ReplayError, RecorderError, ValueError):
         content = read(file)
         again = replay_file(content, output, own)

@@ -125,8 +125,10 @@ def _cells_of_series(column: pl.Series) -> Cells:
         return Cells(column.cast(pl.Float64).to_numpy(writable=True), null)
     lengths = column.list.len().fill_null(0).to_numpy()
     width = int(lengths.max())
-    entries = column.filter(lengths > 0).explode().to_numpy().astype(np.float64, copy=False)
-    if lengths.min() == width:
+    shortest = lengths.min()
+    entries = (column if shortest else column.filter(lengths > 0)).explode().to_numpy()
+    entries = entries.astype(np.float64, copy=False)
+    if shortest == width:
         return Cells(entries.reshape(len(column), width), null)
     values = np.full((len(column), width), np.nan)
     values[np.arange(width) < lengths[:, np.newaxis]] = entries

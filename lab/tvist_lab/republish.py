@@ -1,0 +1,177 @@
+"""A recording on the network at its own time, as a server of its own that takes no commands."""
+
+import asyncio
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from threading import Thread
+
+import msgspec
+
+from tvist_lab.recordings import RecordingError
+from tvist_lab.recordings.mcap_file import Published, RecordingFile
+from tvist_protocol import keys
+from tvist_protocol.codec import encode
+from tvist_protocol.commands import Command
+from tvist_protocol.info import Info
+from tvist_protocol.recorded import TICK_NS
+from tvist_protocol.replies import Refused
+from tvist_protocol.stream import State, Truth
+from tvist_server.gateways.base import Answer, Desk, Gateway
+from tvist_server.gateways.exposure import guarded
+from tvist_server.gateways.network import Network
+from tvist_server.publisher import TOPICS
+
+TICK = TICK_NS * 1e-9
+"""Duration of a tick [s]."""
+LEAVE = 0.6
+"""Longest time that clients have at the end to read what is on its way [s]."""
+REFUSAL = Refused(
+    code="wrong_mode",
+    where="",
+    why="a recording is being played back, which takes no commands: it only publishes",
+)
+"""Answer to every command."""
+
+
+class PlaybackDesk(Desk):
+    """Describes the recorded robot and refuses everything else.
+
+    Args:
+        info: Description of the robot when its recording began.
+        name: Name under which it is published.
+    """
+
+    def __init__(self, info: Info, name: str) -> None:
+        self._info = msgspec.structs.replace(info, name=name, clock="realtime", control=None, stepper=None)
+        self.tick = info.tick
+        """Tick of the last state published."""
+
+    def request(self, data: bytes, answer: Answer) -> None:  # noqa: ARG002  no command is carried out
+        """Refuse a command."""
+        answer(REFUSAL)
+
+    def command(self, command: Command, answer: Answer, origin: str | None = None) -> None:  # noqa: ARG002  likewise
+        """Refuse a command."""
+        answer(REFUSAL)
+
+    def setpoint(self, data: bytes) -> None:
+        """Ignore a set-point: nobody has control."""
+
+    def info(self, answer: Callable[[bytes], None]) -> None:
+        """Answer with the description of the robot and the present tick."""
+        answer(encode(msgspec.structs.replace(self._info, tick=self.tick)))
+
+    def client_seen(self, client: str, session: str = "") -> None:
+        """Ignore a client: none gets control."""
+
+    def client_gone(self, client: str, session: str = "") -> None:
+        """Ignore the end of a client."""
+
+    def session_gone(self, session: str) -> None:
+        """Ignore the end of a session."""
+
+    def holder(self) -> str | None:
+        """Return None: nobody has control."""
+        return None
+
+
+class Playback:
+    """Publishes a recording.
+
+    Args:
+        content: The recording.
+        listen: Zenoh endpoints to listen on.
+        name: Name of the robot; by default that of the recording.
+        speed: Speed relative to the recording's own time.
+        loop: Begin again at its end. Ticks go on from those of the last round, since a robot's never decrease.
+        security: Folder with certificates and roles.
+        insecure: Accept remote connections without TLS.
+
+    Raises:
+        RecordingError: The recording does not describe its robot.
+        ProtocolError: The name is not allowed.
+        ExposureError: The robot would be reachable in an unintended way.
+        GatewayError: The server cannot listen on an endpoint.
+    """
+
+    def __init__(
+        self,
+        content: RecordingFile,
+        listen: Sequence[str],
+        *,
+        name: str | None = None,
+        speed: float = 1.0,
+        loop: bool = False,
+        security: str | None = None,
+        insecure: bool = False,
+    ) -> None:
+        if content.info is None:
+            raise RecordingError(f"{content.path} does not describe its robot, so no client could read it")
+        self.name = keys.check_robot_name(name or content.robot)
+        """Name under which the robot is published."""
+        self.states = 0
+        """Number of states published."""
+        self._content, self._speed, self._loop = content, speed, loop
+        endpoints, guard = guarded(listen, [self.name], security=security, insecure=insecure)
+        self._desk = PlaybackDesk(content.info, self.name)
+        self._network = Network(endpoints, guard, lockstep=False)
+        try:
+            truth = content.counts["truth"] > 0
+            self._gateway: Gateway = self._network.gateway(self.name, self._desk, lockstep=False, truth=truth)
+        except BaseException:
+            self._network.close()
+            raise
+
+    async def run(self) -> None:
+        """Publish until the recording ends, or until this is cancelled.
+
+        Raises:
+            RecordingFileError: The file cannot be read any more.
+        """
+        clock, began = asyncio.get_running_loop(), None
+        try:
+            for message in played(self._content, loop=self._loop):
+                now = clock.time()
+                if isinstance(message, State):
+                    if began is None:
+                        began = now, message.tick
+                    due = began[0] + (message.tick - began[1]) * TICK / self._speed
+                    if due > now:
+                        await asyncio.sleep(due - now)
+                    elif self.states % 50 == 0:
+                        await asyncio.sleep(0)  # it is late, but has to notice that it is cancelled
+                    self.states += 1
+                    self._desk.tick = message.tick
+                self._gateway.publish(TOPICS[type(message)], message, encode(message))
+        finally:
+            self._close()
+
+    def _close(self) -> None:
+        """Close the network; a client that has stopped reading can delay that for ten seconds."""
+        leaving = Thread(target=self._leave, name="tvist-leave", daemon=True)
+        leaving.start()
+        leaving.join(LEAVE)
+
+    def _leave(self) -> None:
+        with suppress(Exception):
+            self._network.close()
+
+
+def played(content: RecordingFile, *, loop: bool = False) -> Iterator[Published]:
+    """Yield the messages of a recording in order; with `loop` without end, with ticks and times that go on."""
+    tick = content.recording["tick"]
+    length = int(tick[-1] - tick[0]) + 1
+    shift = 0
+    while True:
+        for message in content.published():
+            yield _shifted(message, shift) if shift else message
+        if not loop:
+            return
+        shift += length
+
+
+def _shifted(message: Published, ticks: int) -> Published:
+    if isinstance(message, State | Truth):
+        time = message.timestamp + ticks * TICK
+        return msgspec.structs.replace(message, tick=message.tick + ticks, timestamp=time)
+    return msgspec.structs.replace(message, tick=message.tick + ticks)

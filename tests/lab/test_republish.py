@@ -1,0 +1,148 @@
+"""Recordings are published in their order, describe their robot, and take no commands."""
+
+import asyncio
+from itertools import islice
+
+import msgspec
+import pytest
+
+from tvist_cli.commands.replay import replay
+from tvist_cli.failure import Failure
+from tvist_lab import republish
+from tvist_lab.recordings import RecordingError
+from tvist_lab.recordings.mcap_file import read
+from tvist_lab.republish import Playback, PlaybackDesk, played
+from tvist_protocol import Event, Info, Io, State, Truth
+from tvist_protocol.codec import decode_info, encode
+from tvist_protocol.commands import Stop, TakeControl
+from tvist_protocol.generate import FOLDER
+from tvist_protocol.journal import Entry
+from tvist_protocol.recorded import topics
+from tvist_protocol.replies import Refused
+from tvist_server.recording.writer import RecordingWriter, heading
+
+
+def golden(kind):
+    path = FOLDER / "fixtures" / "v1" / f"{kind.__name__.lower()}.json"
+    return msgspec.json.decode(path.read_bytes(), type=kind)
+
+
+INFO, STATE, TRUTH, IO = map(golden, (Info, State, Truth, Io))
+MESSAGES = [
+    msgspec.structs.replace(IO, tick=4),
+    *(msgspec.structs.replace(STATE, tick=tick, timestamp=tick * 0.002) for tick in (4, 5)),
+    Event(tick=6, kind="warning", why="a"),
+    msgspec.structs.replace(STATE, tick=6, timestamp=0.012),
+    msgspec.structs.replace(TRUTH, tick=6, timestamp=0.012),
+]
+
+
+class Listener:
+    """Stands in for the network, and keeps what is published."""
+
+    def __init__(self, *_, **__):
+        self.told = []
+        self.closed = False
+
+    def gateway(self, robot, desk, **_):
+        self.robot, self.desk = robot, desk
+        return self
+
+    def publish(self, topic, message, payload):
+        assert payload == encode(message)
+        self.told.append((topic, message))
+
+    def close(self):
+        self.closed = True
+
+
+@pytest.fixture
+def path(tmp_path):
+    path = tmp_path / "run.mcap"
+    with path.open("wb") as stream:
+        writer = RecordingWriter(stream, topics(INFO.name), heading(INFO, {}))
+        for message in (*MESSAGES, Entry(tick=7, kind="missed", count=1)):
+            writer.write(message)
+        writer.finish({})
+    return path
+
+
+@pytest.fixture
+def network(monkeypatch):
+    made = Listener()
+    monkeypatch.setattr(republish, "Network", lambda *_, **__: made)
+    return made
+
+
+def test_all_that_the_robot_published_is_published_in_its_order(path, network):
+    playback = Playback(read(path), ["tcp/127.0.0.1:1"], speed=100.0)
+    asyncio.run(playback.run())
+    assert [message for _, message in network.told] == MESSAGES
+    assert [topic for topic, _ in network.told] == ["io", "state", "state", "event", "state", "truth"]
+    assert (playback.states, network.robot, network.closed) == (3, INFO.name, True)
+
+
+def test_in_a_loop_ticks_and_times_go_on(path):
+    messages = list(islice(played(read(path), loop=True), 13))
+    assert [message.tick for message in messages] == [4, 4, 5, 6, 6, 6, 7, 7, 8, 9, 9, 9, 10]
+    times = [message.timestamp for message in messages if isinstance(message, State)]
+    assert times == pytest.approx([0.008, 0.010, 0.012, 0.014, 0.016, 0.018])
+
+
+def test_its_time_is_that_of_the_recording(path, network, monkeypatch):
+    waited = []
+
+    async def sleep(seconds):
+        waited.append(seconds)
+
+    monkeypatch.setattr(asyncio, "sleep", sleep)
+
+    async def run():
+        asyncio.get_running_loop().time = lambda: 7.0
+        await Playback(read(path), ["tcp/127.0.0.1:1"], speed=0.01).run()
+
+    asyncio.run(run())
+    assert waited == pytest.approx([0.0, 0.2, 0.4])
+
+
+def test_info_has_the_name_and_the_present_tick(path, network):
+    playback = Playback(read(path), ["tcp/127.0.0.1:1"], name="ghost", speed=100.0)
+    asyncio.run(playback.run())
+    answers = []
+    network.desk.info(answers.append)
+    info = decode_info(answers[0])
+    assert (info.name, info.tick, info.control, info.clock) == ("ghost", 6, None, "realtime")
+    assert info.limits == INFO.limits
+
+
+@pytest.mark.parametrize("data", [encode(TakeControl(client="a")), b"nonsense"])
+def test_commands_are_refused(data):
+    desk, answers = PlaybackDesk(INFO, "ghost"), []
+    desk.request(data, answers.append)
+    desk.command(Stop(token="a"), answers.append)
+    assert all(isinstance(answer, Refused) and answer.code == "wrong_mode" for answer in answers)
+    assert "takes no commands" in answers[1].why
+    assert desk.holder() is None
+
+
+def test_a_recording_that_does_not_describe_its_robot_is_refused(path):
+    content = read(path)
+    object.__setattr__(content, "info", None)
+    with pytest.raises(RecordingError, match=r"run\.mcap does not describe its robot"):
+        Playback(content, ["tcp/127.0.0.1:1"])
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"speed": 2.0}, "--speed needs --publish"),
+        ({"loop": True}, "--loop needs --publish"),
+        ({"publish": True, "speed": 0.0}, "speed is 0: must be 0.01 to 100"),
+        ({"publish": True, "shaper": ["a.py:b"]}, "leave out --shaper"),
+        ({"publish": True, "output": "a.mcap"}, "leave out the output"),
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(path, options, says):
+    with pytest.raises(Failure, match=says) as failure:
+        replay(path, **options)
+    assert failure.value.code == 2
