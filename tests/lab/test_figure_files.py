@@ -16,7 +16,7 @@ from tvist_shaping import SHAPERS
 DOCS = Path(__file__).parents[2] / "docs"
 TICKS = 1500
 UNIT = re.compile(
-    r"\((ms|s|Hz|%|–|°|m|mm|mrad|rad/s|rad/s²|m/s|m/s²|dB|ticks|ticks of 2 ms|damped periods)\)$"
+    r"\((ms|s|Hz|%|–|°|m|mm|mrad|rad/s|rad/s²|m/s²|m/s|dB|ticks|ticks of 2 ms|damped periods)\)$"
 )
 LEAST_POINTS = {1: 5.5, 2: 7.0}
 """Smallest size of text by columns [pt]."""
@@ -43,6 +43,7 @@ def found():
 @pytest.fixture
 def make(drawn, one_motion, ring, found):
     """Make a figure by its name, from small data."""
+    from tvist_lab.figures.compared import compared_figure
 
     def recorded(shaped_ticks, amplitude):
         position = np.zeros((TICKS, 3))
@@ -66,6 +67,13 @@ def make(drawn, one_motion, ring, found):
     def paths():
         way = {"reduction_percent": 90.0, "in_motion_ratio": 0.9, "off_mm": 0.1}
         return [{"unshaped_peak_m_s2": 1.0, "shaped": {"zv": {"along": way, "joints": way}}}] * 3
+
+    def entries():
+        reduction = {"median": 90.0, "p5": 80.0}
+        return [
+            {"shaper": name, "reduction_percent": reduction, "delay_ms": {"median": 50.0}}
+            for name in ("zv", "auto")
+        ] * 2
 
     def leaderboard(name):
         return json.loads((DOCS / "reference" / f"{name}.json").read_text(encoding="utf-8"))["shapers"]
@@ -101,6 +109,8 @@ def make(drawn, one_motion, ring, found):
         "identified": lambda: drawn.identified_figure(calibration, q, f_d, zeta, f_d, zeta),
         "map": lambda: drawn.workspace_map_figure(found, "f_d_hz", "an arm", 1),
         "map over two columns": lambda: drawn.workspace_map_figure(found, "zeta", "an arm", 2),
+        "compared": lambda: compared_figure("motion 1", [("one", pair[0]), ("other", pair[1])]),
+        "sweep": lambda: drawn.sweep_figure(entries(), ["5 kg", "1 kg"] * 2),
         "no move that counts": lambda: drawn.residual_by_move_figure(judged(2, counts=False)),
     }
     return lambda name: makers[name]()
@@ -110,7 +120,7 @@ NAMES = [
     "figure_1", "figure_3", "figure_4", "figure_7", "figure_8", "figure_12", "observed", "figure_15", "figure_16",
     "after_stop", "ring_down", "catalogue", "sensitivity", "settling_against_delay", "elastic", "mean_delay", "pareto",
     "settling", "robustness", "moves", "one_move", "paths", "identified", "map", "map over two columns",
-    "no move that counts",
+    "no move that counts", "compared", "sweep",
 ]  # fmt: skip
 
 

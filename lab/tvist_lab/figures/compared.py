@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tvist_lab.figures.recorded import Recorded
-from tvist_lab.figures.style import FAINT, SERIES, note, panels, title
+from tvist_lab.figures.style import FAINT, LIMIT, SERIES, explain, legend, note, panels, title
 from tvist_lab.metrics.common_clock import STILL
 from tvist_lab.metrics.felt import felt
 from tvist_lab.metrics.vibration import amplitude
@@ -36,11 +36,12 @@ def compared_figure(name: str, recorded: Sequence[tuple[str, Recorded]]) -> Figu
         size = amplitude(alpha)
         panel.plot(time, size, **look.line(label=label))
         highest = max(highest, float(np.max(size[(time > 0.0) & (time < AFTER)], initial=0.0)))
-    panel.axhline(STILL, color=FAINT, linewidth=0.9, linestyle=(0, (4, 3)))
+    panel.axhline(STILL, color=FAINT, linewidth=0.9, linestyle=LIMIT)
     note(panel, f"{STILL:g} m/s²", (AFTER, STILL), xytext=(-2, 2), textcoords="offset points", ha="right")
     panel.set(
         xlim=(-BEFORE, AFTER), ylim=(0.0, 1.25 * highest), xlabel=f"Time after the stop in {recorded[0][0]} (s)",
         ylabel=r"$|\alpha|$ (m/s²)",
     )  # fmt: skip
-    panel.legend(loc="upper right", fontsize=8, frameon=False)
+    legend(figure, panel)
+    explain(figure, {r"$|\alpha|$": "acceleration of the tool, without gravity"})
     return figure

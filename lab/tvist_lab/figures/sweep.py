@@ -45,7 +45,7 @@ def sweep_figure(entries: Sequence[dict[str, Any]], settings: Sequence[str]) -> 
         (less, "Reduction: median, line to 5th percentile"),
         (late, "Delay: median"),
     ):
-        panel.set_yticks(range(len(names)), names, fontsize=7)
+        panel.set_yticks(range(len(names)), names, fontsize=8)
         panel.set_ylim(len(names) - 0.5, -0.5)
         title(panel, words)
     less.set(xlabel="Reduction (%)")

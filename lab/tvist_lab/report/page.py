@@ -9,8 +9,10 @@ from importlib.metadata import version
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
+from tvist_lab.figures.files import fit
+
 DPI = 110
-"""Resolution of pictures [dpi]; a figure's 6.4 inches are 704 pixels."""
+"""Resolution of pictures [dpi]; a figure's 183 mm are 793 pixels."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,7 @@ class Page:
 
 def picture(figure: Figure, caption: str) -> Picture:
     """Put a figure into the page as PNG."""
+    fit(figure, 2)
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=DPI, metadata={"Software": None})
     return Picture("data:image/png;base64," + base64.b64encode(stream.getvalue()).decode(), caption)
