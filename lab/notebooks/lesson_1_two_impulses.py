@@ -14,7 +14,7 @@ with app.setup:
 
     # The colours of tvist_lab.figures, which this lesson does not import: it needs only numpy, matplotlib and
     # tvist_shaping.
-    UNSHAPED, SHAPED, THIRD, INK = "#D55E00", "#0072B2", "#009E73", "#333333"
+    UNSHAPED, SHAPED, THIRD, INK = "#D55E00", "#0B4A85", "#5FBF9A", "#333333"
 
 
 @app.cell(hide_code=True)
