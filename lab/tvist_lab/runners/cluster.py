@@ -169,13 +169,13 @@ class _Run:
         )
         yield from self._hand_out(arriving, batches)
         for future in arriving:
-            yield from self._arrived(future)
+            yield from self._arrived(future, arriving)
             yield from self._hand_out(arriving, batches)
         while self._suspects:
-            alone = as_completed(loop=self._client.loop, raise_errors=False)
-            yield from self._submit(alone, [self._suspects.popleft()])
-            for future in alone:
-                yield from self._arrived(future, alone=True)
+            single = as_completed(loop=self._client.loop, raise_errors=False)
+            yield from self._submit(single, [self._suspects.popleft()])
+            for future in single:
+                yield from self._arrived(future, single, alone=True)
 
     def _threads(self) -> int:
         return sum(self._client.nthreads().values())
@@ -200,12 +200,18 @@ class _Run:
             self._out[str(future.key)] = going
             arriving.add(future)
 
-    def _arrived(self, future: "Future[list[bytes]]", *, alone: bool = False) -> Iterator[Outcome[Result]]:
+    def _arrived(
+        self, future: "Future[list[bytes]]", arriving: as_completed, *, alone: bool = False
+    ) -> Iterator[Outcome[Result]]:
+        status = future.status
+        if status in {"lost", "pending"}:  # the worker that had the result died: the batch is done again
+            arriving.add(future)
+            return
         indices = self._out.pop(str(future.key))
-        if future.status == "finished":
+        if status == "finished":
             yield from zip(indices, map(unpack, future.result()), strict=True)
             return
-        if future.status != "error":
+        if status != "error":
             raise ConnectionError(f"the Dask scheduler at {self._address} has gone")
         error = future.exception()
         if isinstance(error, KilledWorker) and not alone:
