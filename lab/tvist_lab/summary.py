@@ -57,7 +57,7 @@ def summary(path: str | os.PathLike[str]) -> dict[str, Any]:
             }
             for name, values in ordered(recording).items()
         ],
-        "notes": list(recording.notes) + ([content.note] if content and content.note else []),
+        "notes": list(recording.notes) + _note(content),
     }
 
 
@@ -66,3 +66,8 @@ def _motions(recording: Recording) -> int | None:
         return len(motions(recording))
     except RecordingError:
         return None
+
+
+def _note(content: mcap_file.RecordingFile | None) -> list[str]:
+    """What is missing in a recording, without the name of its file."""
+    return [] if content is None or content.note is None else [content.note.removeprefix(f"{content.path} ")]

@@ -29,6 +29,49 @@ Block = dict[str, Cells]
 """Fields of consecutive messages by name."""
 
 
+class _Column:
+    """Values of a field that grow in place: arrays to be joined at the end would take twice the memory."""
+
+    def __init__(self) -> None:
+        self._values: Floats | None = None
+        self._null = np.empty(0, np.bool_)
+
+    def __len__(self) -> int:
+        return len(self._null)
+
+    def add(self, cells: Cells) -> None:
+        """Append cells; rows that are shorter than others end with NaN."""
+        first, past = len(self), len(self) + len(cells.null)
+        self._null.resize(past, refcheck=False)
+        self._null[first:] = cells.null
+        if cells.values is not None:
+            self._widen(cells.values.shape[1:], first)
+        if self._values is None:
+            return
+        self._values.resize((past, *self._values.shape[1:]), refcheck=False)
+        if cells.values is None:
+            self._values[first:] = np.nan
+        elif cells.values.ndim == 1:
+            self._values[first:] = cells.values
+        else:
+            width = cells.values.shape[1]
+            self._values[first:, :width] = cells.values
+            self._values[first:, width:] = np.nan
+
+    def cells(self) -> Cells:
+        """Return all cells."""
+        return Cells(self._values, self._null)
+
+    def _widen(self, shape: tuple[int, ...], rows: int) -> None:
+        """Make room for rows of a shape, after a number of rows."""
+        before = self._values
+        if before is None:
+            self._values = np.full((rows, *shape), np.nan)
+        elif shape and shape[0] > before.shape[1]:
+            self._values = np.full((rows, *shape), np.nan)
+            self._values[:, : before.shape[1]] = before
+
+
 class JsonColumns:
     """Decodes messages to columns, one for each field that is a number or a list of numbers.
 
@@ -44,12 +87,11 @@ class JsonColumns:
             name: found for name, field in fields.items() if (found := _type(field.type)) is not None
         }
         self._fields = {name: fields[name] for name in self._types}
-        self._blocks: list[Block] = []
-        self._length = 0
+        self._columns = {name: _Column() for name in self._fields}
 
     def __len__(self) -> int:
         """Number of messages."""
-        return self._length
+        return len(next(iter(self._columns.values())))
 
     def decode(self, messages: Sequence[bytes]) -> Block:
         """Decode messages, at least one.
@@ -62,13 +104,12 @@ class JsonColumns:
 
     def add(self, block: Block) -> None:
         """Append a block."""
-        self._blocks.append(block)
-        self._length += len(next(iter(block.values())).null)
+        for name, cells in block.items():
+            self._columns[name].add(cells)
 
-    def take(self) -> Block:
-        """Return all messages as one block. Afterwards there are none here."""
-        blocks, self._blocks = self._blocks, []
-        return {name: _joined([block.pop(name) for block in blocks]) for name in self._fields}
+    def all(self) -> Block:
+        """Return all messages as one block."""
+        return {name: column.cells() for name, column in self._columns.items()}
 
     def _at_once(self, messages: Sequence[bytes]) -> Block | None:
         """Decode messages as a table; None if only reading one by one can tell what they hold."""
@@ -146,26 +187,3 @@ def _cells_of_values(values: list[Any]) -> Cells:
         if value is not None:
             row[: len(value)] = value
     return Cells(column, null)
-
-
-def _joined(parts: list[Cells]) -> Cells:
-    """Join blocks; rows that are shorter than others end with NaN."""
-    null = np.concatenate([part.null for part in parts])
-    present = [part.values for part in parts if part.values is not None]
-    if not present:
-        return Cells(None, null)
-    if len(present) == len(parts) and len({values.shape[1:] for values in present}) == 1:
-        return Cells(np.concatenate(present), null)
-    if present[0].ndim == 1:
-        shape: tuple[int, ...] = (len(null),)
-    else:
-        shape = (len(null), max(values.shape[1] for values in present))
-    whole, first = np.full(shape, np.nan), 0
-    for part in parts:
-        past = first + len(part.null)
-        if part.values is not None and part.values.ndim == 1:
-            whole[first:past] = part.values
-        elif part.values is not None:
-            whole[first:past, : part.values.shape[1]] = part.values
-        first = past
-    return Cells(whole, null)

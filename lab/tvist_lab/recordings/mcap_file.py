@@ -216,8 +216,8 @@ class _Content:
         info = None if ours is None else self._json(ours, "info", Info)
         start = None if ours is None else self._json(ours, "start", dict[str, Any])
         events = tuple(self.objects[tag(Event)])
-        states = self.tables[tag(State)].take()
-        truths, io = (self.tables[tag(kind)].take() if counts[tag(kind)] else None for kind in (Truth, Io))
+        states = self.tables[tag(State)].all()
+        truths, io = (self.tables[tag(kind)].all() if counts[tag(kind)] else None for kind in (Truth, Io))
         return RecordingFile(
             path=self.path,
             robot=self.robot,

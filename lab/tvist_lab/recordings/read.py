@@ -73,4 +73,4 @@ def _read_mcap(path: Path) -> Recording:
             raise error from None
         return read_rosbag(path)
     recording = content.recording
-    return recording if content.note is None else recording.noted(content.note)
+    return recording if content.note is None else recording.noted(content.note.removeprefix(f"{path} "))
