@@ -37,6 +37,8 @@ def _read(path: Path) -> Recording:
         head = stream.read(SHOWN)
     if not head:
         raise RecordingError(f"{path} is empty")
+    if path.suffix == ".mcap" and not head.startswith(MCAP):
+        raise RecordingError(f"{path} is no MCAP file")
     if head.startswith(MCAP):
         return _read_mcap(path)
     if path.suffix.lower() in (".parquet", ".npz", ".mat"):
