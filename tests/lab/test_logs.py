@@ -1,5 +1,7 @@
 """Logs of other robots are measured whatever their format, and refused with the cause and the line."""
 
+import contextlib
+
 import numpy as np
 import pytest
 from tests.lab.synthetic_logs import SyntheticLog
@@ -253,3 +255,46 @@ def test_motions_that_correspond_are_compared_and_others_are_said(tmp_path):
 def test_a_log_at_rest_has_no_motion(tmp_path):
     assert motions(read(SyntheticLog(motions=0, rest=2.0).csv(tmp_path / "log.csv"))) == []
     assert motions(read(SyntheticLog(motions=0).without("target_q").csv(tmp_path / "log.csv"))) == []
+
+
+@pytest.mark.parametrize("form", ["commas", "packets of 1116 bytes", "bag"])
+def test_damaged_files_are_measured_or_refused_and_never_end_in_another_error(tmp_path, form):
+    log = SyntheticLog(motions=1, rest=0.8, rate=100.0)
+    good = log.rosbag(tmp_path / "bag") / "bag.mcap" if form == "bag" else FORMATS[form](log, tmp_path)
+    content = good.read_bytes()
+    path = tmp_path / f"damaged{good.suffix}"
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        data = bytearray(content)
+        first, past = sorted(random.integers(0, len(data), 2))
+        if seed % 4 == 0:
+            for place in random.integers(0, len(data), 9):
+                data[place] = random.integers(256)
+        elif seed % 4 == 1:
+            del data[first : min(past, first + 3000)]
+        elif seed % 4 == 2:
+            data = data[first:past]
+        else:
+            data[first:first] = data[first : min(past, first + 3000)]
+        path.write_bytes(bytes(data))
+        with contextlib.suppress(RecordingError):
+            for result in analyze(read(path)):
+                assert all(
+                    value is not None or name in result.notes for name, value in result.as_dict().items()
+                )
+
+
+def test_numbers_that_no_robot_has_are_refused_with_line_and_column(tmp_path):
+    path, lines = lines_of(tmp_path)
+    path.write_text("\n".join(with_cell(lines, "1e300")) + "\n")
+    with pytest.raises(RecordingError, match=r"line 301, column target_q_3: 1e\+300"):
+        read(path)
+
+
+def test_a_packet_that_lost_bytes_is_left_out_and_the_next_ones_are_read(tmp_path):
+    path = SyntheticLog().dump(tmp_path / "dump")
+    data = path.read_bytes()
+    path.write_bytes(data[:600_000] + data[600_037:])
+    recording = read(path)
+    assert len(recording) == len(data) // 1116 - 1
+    assert all(within(result) for result in analyze(recording))

@@ -75,23 +75,7 @@ def _lines(path: Path) -> _Lines:
     raw = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
     ends_whole = raw.endswith(b"\n")
     all_lines = raw.splitlines()
-    top = _top(all_lines)
-    if top is None:
-        raise LogError(f"{path} holds no rows")
-    try:
-        header = all_lines[top].decode("utf-8").strip().lstrip("# ")
-    except UnicodeDecodeError:
-        raise LogError(f"{path} is neither a recording nor a log: its line {top + 1} is no text") from None
-    separator = next((one for one in SEPARATORS if one in header), ",")
-    names = [
-        name.strip().strip('"') for name in (header.split() if separator == " " else header.split(separator))
-    ]
-    if not any(re.match(r"[A-Za-z_]", name) for name in names):
-        raise LogError(
-            f"{path}, line {top + 1}: there must be a header with RTDE's names, as in timestamp,actual_q_0"
-        )
-    if twice := sorted({name for name in names if name and names.count(name) > 1}):
-        raise LogError(f"{path}, line {top + 1}: the column {twice[0]} is there twice")
+    top, names, separator = _header(path, all_lines)
     below = enumerate(all_lines[top + 1 :], top + 2)
     body = [(at, line) for at, line in below if line.strip() and not line.lstrip().startswith(b"#")]
     if separator == " ":
@@ -118,6 +102,8 @@ def _lines(path: Path) -> _Lines:
     if not whole.any():
         raise LogError(f"{path} holds no rows" if not body else f"{path} holds no complete row: {notes[0]}")
     kept = [body[at] for at in np.flatnonzero(whole)]
+    if (strange := next((at for at, line in kept if not line.isascii()), None)) is not None:
+        raise LogError(f"{path}, line {strange}: there is something else than numbers")
     return _Lines(
         names,
         separator,
@@ -125,6 +111,28 @@ def _lines(path: Path) -> _Lines:
         np.array([at for at, _ in kept], dtype=np.float64),
         tuple(notes),
     )
+
+
+def _header(path: Path, lines: list[bytes]) -> tuple[int, list[str], str]:
+    """Index of the header, its names, and what separates them."""
+    top = _top(lines)
+    if top is None:
+        raise LogError(f"{path} holds no rows")
+    try:
+        header = lines[top].decode("utf-8").strip().lstrip("# ")
+    except UnicodeDecodeError:
+        raise LogError(f"{path} is neither a recording nor a log: its line {top + 1} is no text") from None
+    separator = next((one for one in SEPARATORS if one in header), ",")
+    names = [
+        name.strip().strip('"') for name in (header.split() if separator == " " else header.split(separator))
+    ]
+    if not any(re.match(r"[A-Za-z_]", name) for name in names):
+        raise LogError(
+            f"{path}, line {top + 1}: there must be a header with RTDE's names, as in timestamp,actual_q_0"
+        )
+    if twice := sorted({name for name in names if name and names.count(name) > 1}):
+        raise LogError(f"{path}, line {top + 1}: the column {twice[0]} is there twice")
+    return top, names, separator
 
 
 def _top(lines: list[bytes]) -> int | None:

@@ -16,6 +16,8 @@ WIDTHS = {"actual_TCP_pose": 6, "target_TCP_pose": 6, "actual_TCP_speed": 6, "ac
 """Number of entries that a vector needs to be of use; joint angles have as many as the arm has joints."""
 OURS = ("tick", "reference_q", "unshaped_q", "target_q", "actual_TCP_pose")
 """Columns that only recordings of this controller have, all together."""
+LARGEST = 1e6
+"""Largest number that a column with a unit in radians, metres and seconds can hold; more is damage."""
 PERIODS = (1e-4, 0.1)
 """Shortest and longest time between rows [s]; anything else is no time in seconds, or shows no vibration."""
 LONG_GAP = 0.02
@@ -51,8 +53,10 @@ def recording_of(rows: Rows) -> Recording:
     Rows that repeat the time of the row before them, or have no time, are left out; a note counts them.
 
     Raises:
-        LogError: There is no time or no joint angles, fewer than two rows, or time goes back or is not in seconds.
+        LogError: A number is beyond 1e6; there is no time or no joint angles, fewer than two rows, or time goes back
+            or is not in seconds.
     """
+    _check_numbers(rows)
     columns, notes = _vectors(rows)
     if TIME not in columns or columns[TIME].ndim != 1:
         raise LogError(f"{rows.path} has no column {TIME}; {_found(rows)}")
@@ -68,6 +72,20 @@ def recording_of(rows: Rows) -> Recording:
         notes += gaps
         columns = _shaped(columns)
     return Recording(columns, notes=(*rows.notes, *notes), foreign=not ours)
+
+
+def _check_numbers(rows: Rows) -> None:
+    """Refuse a number that no robot has, with its line and column."""
+    measured = [
+        place for place, name in enumerate(rows.names) if name.startswith(("target_", "actual_", "shaped_"))
+    ]
+    strange = np.argwhere(np.abs(rows.values[:, measured]) > LARGEST)
+    if len(strange):
+        row, place = strange[0][0], measured[strange[0][1]]
+        raise LogError(
+            f"{rows.path}, {rows.unit} {int(rows.lines[row])}, column {rows.names[place]}: "
+            f"{rows.values[row, place]:g} is no number of a robot"
+        )
 
 
 def _found(rows: Rows) -> str:

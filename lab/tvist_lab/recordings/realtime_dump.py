@@ -60,16 +60,15 @@ def read_dump(path: Path) -> Recording:
 def _packets(path: Path, data: bytes) -> tuple[list[int], int, int]:
     """First byte of each packet, the packets' length, and the number of bytes that belong to none."""
     first, size = _first(path, data)
+    head = struct.pack(">i", size)
     starts, at = [], first
-    while at + size <= len(data):
-        if _length(data, at) == size:
+    while 0 <= at <= len(data) - size:
+        following = data[at + size : at + size + 4]
+        if data.startswith(head, at) and head.startswith(following):
             starts.append(at)
             at += size
-            continue
-        following = data.find(struct.pack(">i", size), at)
-        if following < 0:
-            break
-        at = following
+        else:  # bytes are missing: this packet is torn
+            at = data.find(head, at + 1)
     return starts, size, len(data) - size * len(starts)
 
 
@@ -90,7 +89,3 @@ def _first(path: Path, data: bytes) -> tuple[int, int]:
         f"{path} is neither a recording nor a log: no MCAP, no text, and no packets of port 30003 of "
         f"{', '.join(map(str, SIZES))} bytes"
     )
-
-
-def _length(data: bytes, at: int) -> int:
-    return int(struct.unpack_from(">i", data, at)[0])

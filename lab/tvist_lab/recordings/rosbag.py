@@ -1,6 +1,8 @@
 """rosbag2 recordings in MCAP: joint states, an accelerometer, and a controller's target, by message type."""
 
+import io
 from collections.abc import Callable
+from contextlib import redirect_stderr
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -118,7 +120,11 @@ def _topics(path: Path) -> tuple[dict[str, _Topic], str | None]:
 def _decoder(
     path: Path, factory: DecoderFactory, channel: Channel, schema: Schema | None
 ) -> Callable[[bytes], Any]:
-    decode = factory.decoder_for(channel.message_encoding, schema)
+    try:
+        with redirect_stderr(io.StringIO()):  # the parser prints what it raises
+            decode = factory.decoder_for(channel.message_encoding, schema)
+    except Exception as error:
+        raise LogError(f"{path}: the schema of {channel.topic} is damaged: {error}") from error
     if decode is None:
         raise LogError(
             f"{path}: {channel.topic} is written as {channel.message_encoding} with a schema in "
