@@ -12,10 +12,12 @@ import signal
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
+from typing import Any
 
 import dask
 from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
@@ -38,6 +40,7 @@ QUIET = {
     "distributed.worker.memory.pause": False,
     "distributed.worker.memory.terminate": False,
     "distributed.admin.tick.limit": "1h",
+    "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical",
 }
 """Configuration of Dask: a task needs little memory, and a busy machine is no reason for a warning."""
 
@@ -67,8 +70,13 @@ class Cluster:
             with _connected(self.scheduler) as client:
                 yield client
             return
-        with _local(self.processes or cores()) as cluster, Client(cluster, set_as_default=False) as client:
+        processes = self.processes or cores()
+        with _local(processes) as cluster, Client(cluster, set_as_default=False) as client:
             yield client
+            with suppress(
+                TimeoutError
+            ):  # a worker that is just replacing another one complains when it is ended
+                client.wait_for_workers(processes, timeout=PATIENCE)
 
 
 @contextmanager
@@ -203,21 +211,23 @@ class _Run:
     def _arrived(
         self, future: "Future[list[bytes]]", arriving: as_completed, *, alone: bool = False
     ) -> Iterator[Outcome[Result]]:
-        status = future.status
-        if status in {"lost", "pending"}:  # the worker that had the result died: the batch is done again
+        if future.status in {
+            "lost",
+            "pending",
+        }:  # the worker that had the result died: the batch is done again
             arriving.add(future)
             return
         indices = self._out.pop(str(future.key))
-        if status == "finished":
-            yield from zip(indices, map(unpack, future.result()), strict=True)
-            return
-        if status != "error":
-            raise ConnectionError(f"the Dask scheduler at {self._address} has gone")
-        error = future.exception()
-        if isinstance(error, KilledWorker) and not alone:
-            self._suspects.extend(indices)
-            return
-        if isinstance(error, KilledWorker):
-            error = TaskError("every worker that did it died")
-        for index in indices:
-            yield index, Failed(error)
+        found: Sequence[Any]
+        try:
+            found = [unpack(one) for one in future.result()]
+        except KilledWorker:
+            if not alone:
+                self._suspects.extend(indices)
+                return
+            found = [Failed(TaskError("every worker that did it died"))]
+        except CancelledError:
+            raise ConnectionError(f"the Dask scheduler at {self._address} has gone") from None
+        except Exception as error:  # noqa: BLE001  a worker that cannot do the work at all
+            found = [Failed(error)] * len(indices)
+        yield from zip(indices, found, strict=True)
