@@ -235,9 +235,10 @@ class _Content:
 
     def _take(self, record: McapRecord) -> None:
         match record:
-            case Message(channel_id=channel, data=data):
-                if channel in self.channels:
-                    self.waiting.append((self.channels[channel], data))
+            case Message():
+                kind = self.channels.get(record.channel_id)
+                if kind is not None:
+                    self.waiting.append((kind, record.data))
                     if len(self.waiting) >= BLOCK:
                         self._decode()
             case Channel():

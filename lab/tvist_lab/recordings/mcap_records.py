@@ -27,9 +27,19 @@ _MESSAGE = struct.Struct("<HIQQ")
 """Beginning of a message: its channel, number and two times."""
 
 
+class _Records(StreamReader):
+    """Reads all records but indexes, which take as long as the messages and are of no use to who reads them all."""
+
+    def _read_record(self, opcode: int, length: int) -> McapRecord | None:
+        if opcode in (Opcode.MESSAGE_INDEX, Opcode.CHUNK_INDEX):
+            self._stream.read(length)
+            return None
+        return super()._read_record(opcode, length)
+
+
 def records(stream: IO[bytes]) -> Iterator[McapRecord]:
     """Yield records in order; those of a chunk only if the whole chunk is intact."""
-    for record in StreamReader(
+    for record in _Records(
         stream, emit_chunks=True, validate_crcs=True, record_size_limit=RECORD_LIMIT
     ).records:
         if isinstance(record, Chunk):

@@ -59,7 +59,7 @@ def _bag(folder: Path) -> Path:
     """Return the one MCAP file of a rosbag2 folder."""
     files = sorted(folder.glob("*.mcap"))
     if len(files) != 1:
-        raise RecordingError(f"{folder} holds {len(files)} files *.mcap: give one of them")
+        raise RecordingError(f"{folder} is a directory with {len(files)} files *.mcap: give one of them")
     return files[0]
 
 
