@@ -9,6 +9,7 @@ import logging
 import math
 import multiprocessing.resource_tracker
 import signal
+import time
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -34,6 +35,8 @@ AHEAD = 3
 """Number of batches handed out for each worker thread, so that none waits for the next one."""
 PATIENCE = 10.0
 """Time within which a scheduler has to answer, and to have a worker [s]."""
+LOOK = 0.01
+"""Time between two looks for results [s]; a batch takes a hundred times as long."""
 QUIET = {
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
@@ -176,14 +179,43 @@ class _Run:
             for first in range(0, len(self._tasks), self._batch)
         )
         yield from self._hand_out(arriving, batches)
-        for future in arriving:
+        for future in self._each(arriving):
             yield from self._arrived(future, arriving)
             yield from self._hand_out(arriving, batches)
         while self._suspects:
             single = as_completed(loop=self._client.loop, raise_errors=False)
             yield from self._submit(single, [self._suspects.popleft()])
-            for future in single:
+            for future in self._each(single):
                 yield from self._arrived(future, single, alone=True)
+
+    def _each(self, arriving: as_completed) -> "Iterator[Future[list[bytes]]]":
+        """Yield futures as they complete, until there are none; look after the workers while nothing comes.
+
+        Raises:
+            ConnectionError: All workers have died, and no other one came.
+        """
+        quiet = 0.0
+        while not arriving.is_empty():
+            batch = arriving.next_batch(block=False)
+            yield from batch
+            if batch:
+                quiet = 0.0
+                continue
+            time.sleep(LOOK)
+            quiet += LOOK
+            if quiet > PATIENCE:
+                quiet = 0.0
+                self._look_after()
+
+    def _look_after(self) -> None:
+        """Wait for a worker where there is none."""
+        if self._threads():
+            return
+        with suppress(TimeoutError):
+            self._client.wait_for_workers(1, timeout=3.0 * PATIENCE)
+        if not self._threads():
+            where = "of this machine" if self._address is None else f"of the Dask scheduler at {self._address}"
+            raise ConnectionError(f"all workers {where} have died, and no other one came")
 
     def _threads(self) -> int:
         return sum(self._client.nthreads().values())
