@@ -91,6 +91,15 @@ def test_what_a_log_lacks_is_null_with_a_reason_and_the_rest_is_measured(tmp_pat
     assert blind.cycle_ms is not None
 
 
+@pytest.mark.parametrize("lag", [0.0, 0.012, 0.025, 0.04])
+@pytest.mark.parametrize("mode", [(9.0, 0.12, 1.0), (7.0, 0.3, 1.5)])
+def test_without_measured_angles_the_lag_shows_in_the_accelerometer(tmp_path, lag, mode):
+    log = SyntheticLog(lag=lag, modes=(mode,)).without("actual_q")
+    results = analyze(read(log.csv(tmp_path / "log.csv")))
+    assert all(within(result, *mode[:2]) for result in results)
+    assert [result.servo_lag_ms for result in results] == pytest.approx([1e3 * lag] * 2, abs=4.0)
+
+
 def test_of_two_modes_the_strongest_at_the_stop_counts(tmp_path):
     log = SyntheticLog(modes=((7.0, 0.06, 0.5), (16.0, 0.05, 1.5)))
     assert all(within(result, 16.0, 0.05) for result in analyze(read(log.csv(tmp_path / "log.csv"))))

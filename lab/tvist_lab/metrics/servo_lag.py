@@ -2,12 +2,21 @@
 
 import numpy as np
 
+from tvist_lab.metrics.vibration import SENSOR, low_pass_at
 from tvist_lab.recordings import Floats, Recording
 
 LONGEST = 0.2
 """Longest lag that is searched [s]."""
 FOLLOWS = 0.05
 """Largest variance of the distance that is left, over that of the target, for an arm that follows it [-]."""
+LONGEST_FELT = 0.08
+"""Longest lag that is searched in the accelerometer [s]."""
+FINE = 0.002
+"""Longest step of that search [s]."""
+SMOOTHED = 40.0
+"""Cut-off frequency of the target before it is differentiated twice [Hz]."""
+EXPLAINED = 0.5
+"""Largest share of what the accelerometer shows that may be left unexplained [-]."""
 FEWEST = 8
 """Smallest number of samples of a motion."""
 
@@ -16,15 +25,18 @@ def servo_lag(recording: Recording, start: int, stop: int) -> float | None:
     """Time by which `actual_q` follows `target_q` in one motion [s], never below zero.
 
     It is the shift of the target with the least squared distance from the measured angles, to a tenth of a sample.
-    None if there is no column of both, or the arm does not follow the target with any lag.
+    Without measured angles it is the shift with which the target's accelerations explain the tool's best. None if there
+    is neither, or the arm does not follow the target with any lag.
 
     Args:
         recording: The recording.
         start: Row in which the target starts.
         stop: Row in which it stops.
     """
-    if "actual_q" not in recording or "target_q" not in recording:
+    if "target_q" not in recording:
         return None
+    if "actual_q" not in recording:
+        return _felt_lag(recording, start, stop)
     time, period = recording.time, recording.period
     past = int(np.searchsorted(time, time[stop] + LONGEST))
     rows = slice(start, min(past + 1, len(time)))
@@ -44,6 +56,36 @@ def servo_lag(recording: Recording, start: int, stop: int) -> float | None:
         return 0.0
     fine = lags[best] + period * np.linspace(-1.0, 1.0, 21)
     return float(min(fine, key=lambda lag: _distance(own, moved, followed, lag)))
+
+
+def _felt_lag(recording: Recording, start: int, stop: int) -> float | None:
+    """Lag [s] with which the target's accelerations explain what the tool's accelerometer shows, or None."""
+    if SENSOR not in recording:
+        return None
+    time, period = recording.time, recording.period
+    past = min(int(np.searchsorted(time, time[stop] + LONGEST)) + 1, len(time))
+    shown = start + np.flatnonzero(np.isfinite(recording[SENSOR][start:past]).all(axis=1))
+    target = recording["target_q"][start:past]
+    if len(shown) < 4 * FEWEST or not np.isfinite(target).all():
+        return None
+    own = time[start:past]
+    moved = low_pass_at(own, target[:, np.ptp(target, axis=0) > 1e-3], period, SMOOTHED)
+    velocity = np.gradient(moved, own, axis=0)
+    acceleration = np.gradient(velocity, own, axis=0)
+    felt = recording[SENSOR][shown]
+    # Gravity turns slowly in the frame of the tool.
+    slow = np.vander((time[shown] - own[0]) / (own[-1] - own[0]), 4)
+    felt = felt - slow @ np.linalg.lstsq(slow, felt)[0]
+
+    def left(lag: float) -> float:
+        late = [np.interp(time[shown] - lag, own, axis) for axis in (*acceleration.T, *(velocity**2).T)]
+        columns = np.column_stack([slow, *late])
+        return float(np.sum((felt - columns @ np.linalg.lstsq(columns, felt)[0]) ** 2))
+
+    fine = np.arange(0.0, LONGEST_FELT, min(period, FINE))
+    remains = np.array([left(lag) for lag in fine])
+    best = int(np.argmin(remains))
+    return float(fine[best]) if remains[best] < EXPLAINED * float(np.sum(felt**2)) else None
 
 
 def _distance(time: Floats, target: Floats, actual: Floats, lag: float) -> float:

@@ -214,7 +214,9 @@ class _Run:
         with suppress(TimeoutError):
             self._client.wait_for_workers(1, timeout=3.0 * PATIENCE)
         if not self._threads():
-            where = "of this machine" if self._address is None else f"of the Dask scheduler at {self._address}"
+            where = (
+                "of this machine" if self._address is None else f"of the Dask scheduler at {self._address}"
+            )
             raise ConnectionError(f"all workers {where} have died, and no other one came")
 
     def _threads(self) -> int:
