@@ -86,6 +86,13 @@ def test_what_was_not_measured_decides_nothing():
     assert shaping_of([replace(unknown, delay_ms=38.0)], "x").shaped is True
 
 
+def test_a_name_that_reads_like_a_formula_is_written_as_it_is(tmp_path):
+    named = [SyntheticLog().csv(tmp_path / name) for name in (r"_$\frac{$.csv", "100% & $x_.csv")]
+    text = render(recordings_page(named, "tvist report"))
+    assert r"_$\frac{$.csv" in text
+    assert "100% &amp; $x_.csv" in text
+
+
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")

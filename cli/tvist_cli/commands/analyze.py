@@ -37,7 +37,7 @@ def analyze(
         json: Print one JSON object.
     """
     look.check(figures)
-    from tvist_lab.metrics import measure, motions
+    from tvist_lab.metrics import grouped_notes, measure, motions
     from tvist_lab.recordings import RecordingError, read
 
     with told(RecordingError):
@@ -65,8 +65,8 @@ def analyze(
         out.print(f"{file} contains no motion.", markup=False)
         return
     table(f"{file}: {len(results)} motions", COLUMNS, [_row(index, r) for index, r in enumerate(results, 1)])
-    for note in _grouped(results):
-        out.print(note)
+    for note in grouped_notes(results):
+        out.print(note, markup=False)
 
 
 def _draw(recording: "Recording", found: "list[MotionRows]", files: "FigureFiles") -> None:
@@ -107,19 +107,3 @@ def _with_interval(value: float | None, interval: tuple[float, float] | None, di
     if value is None or interval is None:
         return "–"
     return f"{value:.{digits}f} ± {max(interval[1] - value, 0.0):.{digits}f}"
-
-
-def _grouped(results: "list[MotionResult]") -> list[str]:
-    """One line for each note, with all motions and figures to which it applies."""
-    places: dict[str, dict[str, list[int]]] = {}
-    for index, result in enumerate(results, 1):
-        for name, note in result.notes.items():
-            places.setdefault(note, {}).setdefault(name, []).append(index)
-    lines = []
-    for note, names in places.items():
-        numbers = sorted({index for indices in names.values() for index in indices})
-        which = (
-            "all motions" if len(numbers) == len(results) > 1 else f"motion {', '.join(map(str, numbers))}"
-        )
-        lines.append(f"{which}, {', '.join(names)}: {note}")
-    return lines

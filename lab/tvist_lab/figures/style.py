@@ -209,6 +209,12 @@ def explain(figure: Figure, symbols: Mapping[str, str]) -> None:
     )
 
 
+def literal(words: str) -> str:
+    """Return words that matplotlib writes as they are, whatever a user called a file."""
+    plain = words.replace("$", r"\$")
+    return f" {plain}" if plain.startswith("_") else plain
+
+
 def note(panel: Axes, words: str, at: tuple[float, float], *, color: str = INK, **how: Any) -> Text:
     """Write small text within a panel, at a point in data coordinates."""
     backing = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8}

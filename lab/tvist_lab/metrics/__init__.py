@@ -14,6 +14,7 @@ from tvist_lab.metrics.common_clock import (
 from tvist_lab.metrics.comparison import ComparedMotion, Comparison, compare
 from tvist_lab.metrics.errors import NotMeasurableError
 from tvist_lab.metrics.motion import MotionRows, motions
+from tvist_lab.metrics.notes import grouped_notes
 from tvist_lab.metrics.residual import ModalResidual, Residual, residual, residual_by_modes
 from tvist_lab.metrics.ring_down import SLOW_POLE, RingDown, fit_ring_down
 from tvist_lab.metrics.settling import Settling, attained_position, distance, settling
@@ -43,6 +44,7 @@ __all__ = [
     "distance",
     "envelope",
     "fit_ring_down",
+    "grouped_notes",
     "in_motion_rms",
     "measure",
     "motions",

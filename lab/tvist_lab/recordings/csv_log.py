@@ -31,7 +31,6 @@ REALTIME = {
 """Names of UR's real-time interface, and RTDE's for the same."""
 
 _COMMA = re.compile(r"[-+]?\d+,\d+(e[-+]?\d+)?", re.IGNORECASE)
-_BLANK = re.compile(rb"[ \t]*\r?\n?")
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ PERIODS = (1e-4, 0.1)
 LONG_GAP = 0.02
 """Shortest time without rows that a note reports [s]."""
 
+_MEASURED = re.compile(r"(actual|target|shaped)_(q|qd|qdd|TCP_pose|TCP_speed|tool_accelerometer)_\d+")
 _INDEXED = re.compile(r"(?P<name>.*\D)_(?P<index>\d+)")
 
 
@@ -76,9 +77,7 @@ def recording_of(rows: Rows) -> Recording:
 
 def _check_numbers(rows: Rows) -> None:
     """Refuse a number that no robot has, with its line and column."""
-    measured = [
-        place for place, name in enumerate(rows.names) if name.startswith(("target_", "actual_", "shaped_"))
-    ]
+    measured = [place for place, name in enumerate(rows.names) if _MEASURED.fullmatch(name)]
     strange = np.argwhere(np.abs(rows.values[:, measured]) > LARGEST)
     if len(strange):
         row, place = strange[0][0], measured[strange[0][1]]

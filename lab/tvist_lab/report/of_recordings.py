@@ -7,12 +7,14 @@ from pathlib import Path
 
 from tvist_lab.figures.compared import compared_figure
 from tvist_lab.figures.ring_down import ring_down_figure
+from tvist_lab.figures.style import literal
 from tvist_lab.metrics import (
     Comparison,
     MotionResult,
     MotionRows,
     NotMeasurableError,
     compare,
+    grouped_notes,
     measure,
     motions,
 )
@@ -169,14 +171,14 @@ def _changes(base: _File, other: _File, comparison: Comparison) -> PageTable:
 
 
 def _pictures(files: Sequence[_File], comparisons: Sequence[Comparison]) -> Iterator[Picture]:
-    """The strongest vibrations first in time: one picture for each motion, then one of how the loudest one rings."""
+    """One picture for each of the first motions, and one for each file of how its loudest motion rings."""
     base = files[0]
     for index, motion in list(enumerate(base.motions, 1))[:PICTURES]:
-        curves = [(base.name, (base.recording, motion))]
+        curves = [(literal(base.name), (base.recording, motion))]
         for file, comparison in zip(files[1:], comparisons, strict=True):
             partner = next((one.b for one in comparison.motions if one.a == index), None)
             if partner is not None:
-                curves.append((file.name, (file.recording, file.motions[partner - 1])))
+                curves.append((literal(file.name), (file.recording, file.motions[partner - 1])))
         try:
             figure = compared_figure(f"Motion {index}", curves[:8])
         except NotMeasurableError:
@@ -189,7 +191,7 @@ def _pictures(files: Sequence[_File], comparisons: Sequence[Comparison]) -> Iter
         index = loudest[0]
         try:
             figure = ring_down_figure(
-                f"{file.name}, motion {index + 1}", (file.recording, file.motions[index])
+                f"{literal(file.name)}, motion {index + 1}", (file.recording, file.motions[index])
             )
         except NotMeasurableError:
             continue
@@ -200,21 +202,10 @@ def _pictures(files: Sequence[_File], comparisons: Sequence[Comparison]) -> Iter
 
 
 def _missing(files: Sequence[_File]) -> list[str]:
-    """One item for each reason, with the figures and motions that it concerns."""
+    """What could not be measured or is not drawn, each with its reason."""
     items = []
     for file in files:
-        places: dict[str, dict[str, list[int]]] = {}
-        for index, result in enumerate(file.results, 1):
-            for name, why in result.notes.items():
-                places.setdefault(why, {}).setdefault(name, []).append(index)
-        for why, names in places.items():
-            numbers = sorted({index for indices in names.values() for index in indices})
-            which = (
-                "all motions"
-                if len(numbers) == len(file.results)
-                else f"motion {', '.join(map(str, numbers))}"
-            )
-            items.append(f"{file.name}, {which}: {', '.join(names)}: {why}")
+        items += [f"{file.name}, {note}" for note in grouped_notes(file.results)]
         if len(file.motions) > PICTURES:
             items.append(f"{file.name}: only the first {PICTURES} of {len(file.motions)} motions are drawn")
     return items
