@@ -2,6 +2,7 @@
 
 import itertools
 import threading
+from pathlib import Path
 
 import pytest
 from tests.lab.runner_work import OddError, die, die_once, function_of, square, square_or_raise
@@ -14,6 +15,7 @@ from tvist_lab.runners.cluster import Cluster
 from tvist_lab.runners.parcels import do, pack, unpack
 from tvist_plant.description import load
 
+ROOT = str(Path(__file__).parents[2])
 LOCAL = [Processes(few=2, chunk=3), Cluster(processes=2)]
 
 
@@ -77,6 +79,11 @@ class TestFew:
 
 @pytest.mark.slow
 class TestOthers:
+    @pytest.fixture(autouse=True)
+    def importable(self, monkeypatch):
+        """Other processes import the work by its name; they inherit this path."""
+        monkeypatch.syspath_prepend(ROOT)
+
     @pytest.mark.parametrize("runner", LOCAL, ids=lambda one: type(one).__name__)
     def test_each_task_gets_its_own_result_or_failure(self, runner):
         tasks = [*range(30), threading.Lock()]

@@ -115,8 +115,6 @@ def measure(recording: Recording, motion: MotionRows) -> MotionResult:
         except NotMeasurableError as error:
             notes.update(dict.fromkeys(fields, str(error)))
         except MissingColumnError as error:
-            if not recording.foreign:
-                raise
             notes.update(dict.fromkeys(fields, f"the log has no {error.column}"))
         return None
 
