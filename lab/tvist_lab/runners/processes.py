@@ -47,14 +47,18 @@ class Processes:
         # Control+C reaches all processes of a terminal; this one ends the others, which ignore it.
         ignored = (signal.SIGINT, signal.SIG_IGN)
         pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), signal.signal, ignored)
+        done = False
         try:
             yield from self._through(pool, work, tasks, AHEAD * processes)
+            done = True
         except BrokenProcessPool:
             raise ChildProcessError("a process died while it did a task; perhaps memory ran out") from None
         finally:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for process in set(multiprocessing.active_children()) - others:
-                process.terminate()
+            if not done:  # what the processes still do is of no use
+                for process in set(multiprocessing.active_children()) - others:
+                    process.terminate()
+            # Without waiting, the pool's thread may meet the end of this process half way.
+            pool.shutdown(cancel_futures=True)
 
     def _through(
         self,
