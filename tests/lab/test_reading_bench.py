@@ -5,7 +5,7 @@ import pytest
 from tvist_lab.benchmark import reading
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 async def test_both_readers_read_all_messages(monkeypatch):
     monkeypatch.setattr(reading, "ROUNDS", 1)
     monkeypatch.setattr(reading, "SIMULATED", 200)

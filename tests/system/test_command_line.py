@@ -521,7 +521,7 @@ def test_a_program_that_is_steered_over_a_socket_reads_what_the_client_sends():
     assert said["timeouts_alone"] <= said["timeouts"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_short_soak_loses_nothing_and_says_what_it_saw():
     said = tvist("bench", "--soak", 0.1, "--json").assert_done().json
     assert said["samples_lost"] == 0

@@ -102,6 +102,7 @@ def test_a_killed_sweep_continues_and_leaves_no_process(spec, whole, tmp_path):
     assert_frame_equal(rows_of(tmp_path / "x"), whole)
 
 
+@pytest.mark.nightly
 def test_control_c_is_a_sentence_keeps_what_is_done_and_leaves_no_process(spec, whole, tmp_path):
     process = begun(spec, tmp_path / "x", "--processes", "2")
     wait_for_part(tmp_path / "x")
