@@ -116,7 +116,9 @@ def test_letting_the_jog_button_go_stops_the_arm(tab, wire):
     tab.mouse.down()
     moving(wire)
     tab.mouse.up()
-    released = wire.received["state"][-1]["tick"]  # by now at the latest: a browser may take its time to be told
+    released = wire.received["state"][-1][
+        "tick"
+    ]  # by now at the latest: a browser may take its time to be told
     stopped = wire.wait("event", lambda event: event["kind"] == "stream_stopped")
     assert (stopped["tick"] - released) * TICK <= 0.35
     tab.get_by_role("button", name="Give back control").click()
