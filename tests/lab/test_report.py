@@ -84,6 +84,10 @@ def test_what_was_not_measured_decides_nothing():
     assert "no vibration could be measured" in verdict_on_one([unknown], "x")[0]
     assert verdict_on_one([], "x") == ["x contains no motion."]
     assert shaping_of([replace(unknown, delay_ms=38.0)], "x").shaped is True
+    mixed = [replace(unknown, delay_ms=delay) for delay in (0.0, 30.0, 40.0)]
+    assert shaping_of(mixed, "x").sentence.startswith(
+        "2 of 3 motions of x were shaped: their targets end 35 ms"
+    )
 
 
 def test_a_name_that_reads_like_a_formula_is_written_as_it_is(tmp_path):
