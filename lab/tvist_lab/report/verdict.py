@@ -35,8 +35,8 @@ def shaping_of(results: Sequence[MotionResult], name: str) -> Shaping:
     if len(shaped) < len(delays):
         return Shaping(
             True,
-            f"{len(shaped)} of {_counted(len(delays), 'motion')} of {name} were shaped: their targets end {late:.0f} ms "
-            "after their references (median).",
+            f"{len(shaped)} of {_counted(len(delays), 'motion')} of {name} were shaped: their targets end "
+            f"{late:.0f} ms after their references (median).",
         )
     return Shaping(True, f"{name} was shaped: its target ends {late:.0f} ms after its reference.")
 
