@@ -11,8 +11,8 @@ if TYPE_CHECKING:
 
 def write_report(path: Path, page: "Page") -> None:
     """Write a page, all of it or nothing, and say where it is."""
-    from tvist_lab.recordings.whole_file import whole_file
     from tvist_lab.report import render
+    from tvist_lab.whole_file import whole_file
 
     with whole_file(path) as stream:
         stream.write(render(page).encode())

@@ -69,5 +69,5 @@ def _motions(recording: Recording) -> int | None:
 
 
 def _note(content: mcap_file.RecordingFile | None) -> list[str]:
-    """What is missing in a recording, without the name of its file."""
+    """Return the note about what is missing in a recording, without the name of its file."""
     return [] if content is None or content.note is None else [content.note.removeprefix(f"{content.path} ")]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.lab.synthetic_logs import SyntheticLog
 
-from tvist_lab.metrics import analyze, compare, motions
+from tvist_lab.metrics import Measured, analyze, compare, motions
 from tvist_lab.recordings import RecordingError, read
 
 MODE = (9.0, 0.12, 1.0)
@@ -247,17 +247,21 @@ def test_missing_files_and_folders_without_a_bag_are_refused(tmp_path):
         read(tmp_path)
 
 
+def compared(first, second):
+    return compare(Measured.of(first), Measured.of(second))
+
+
 def test_motions_that_correspond_are_compared_and_others_are_said(tmp_path):
     loud, quiet = SyntheticLog(), SyntheticLog(modes=((9.0, 0.12, 0.25),), seed=2)
-    both = compare(read(loud.csv(tmp_path / "a.csv")), read(quiet.csv(tmp_path / "b.csv", " ")))
+    both = compared(read(loud.csv(tmp_path / "a.csv")), read(quiet.csv(tmp_path / "b.csv", " ")))
     assert [(motion.a, motion.b) for motion in both.motions] == [(1, 1), (2, 2)]
     for motion in both.motions:
         assert motion.impact_percent["residual_vibration"] == pytest.approx(-75.0, abs=8.0)
     one = SyntheticLog(motions=1)
-    short = compare(read(loud.csv(tmp_path / "a.csv")), read(one.csv(tmp_path / "c.csv")))
+    short = compared(read(loud.csv(tmp_path / "a.csv")), read(one.csv(tmp_path / "c.csv")))
     assert [(motion.a, motion.b) for motion in short.motions] == [(1, 1)]
     assert (short.only_in_a, short.only_in_b) == ((2,), ())
-    seven = compare(read(tmp_path / "a.csv"), read(SyntheticLog(joints=7).csv(tmp_path / "d.csv")))
+    seven = compared(read(tmp_path / "a.csv"), read(SyntheticLog(joints=7).csv(tmp_path / "d.csv")))
     assert (seven.motions, seven.only_in_a, seven.only_in_b) == ((), (1, 2), (1, 2))
 
 

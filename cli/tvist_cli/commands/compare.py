@@ -26,12 +26,13 @@ def compare(a: Path, b: Path, *, json: bool = False) -> None:
         b: Second file; its format may be another one.
         json: Print one JSON object with all figures of each motion.
     """
+    from tvist_lab.metrics import Measured
     from tvist_lab.metrics import compare as compared
     from tvist_lab.recordings import RecordingError, read
 
     with told(RecordingError):
         first, second = read(a), read(b)
-        result = compared(first, second)
+        result = compared(Measured.of(first), Measured.of(second))
     for file, recording in ((a, first), (b, second)):
         for note in recording.notes:
             say(f"{file}: {note}")

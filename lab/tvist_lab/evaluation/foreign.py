@@ -16,6 +16,7 @@ from tvist_lab.evaluation.line import PAPER
 from tvist_lab.evaluation.recipes import Recipe
 from tvist_lab.evaluation.running import ShaperFaultError
 from tvist_lab.recordings import Floats
+from tvist_lab.words import named
 from tvist_plant.plant import PERIOD
 from tvist_protocol.values import Payload
 from tvist_shaping.estimators.base import Estimator
@@ -76,7 +77,7 @@ class FromFile(Candidate):
         except CandidateError:
             raise
         except Exception as error:
-            raise ShaperFaultError(f"raises {_named(error)} when it is made") from error
+            raise ShaperFaultError(f"raises {named(error)} when it is made") from error
         return Foreign(made, info, estimator, np.array(move.start), np.array(description.limits.position))
 
 
@@ -101,7 +102,7 @@ class Foreign:
             try:
                 made.reset(start.copy())
             except Exception as error:
-                raise ShaperFaultError(f"its reset raises {_named(error)}") from error
+                raise ShaperFaultError(f"its reset raises {named(error)}") from error
 
     @property
     def delay(self) -> float | None:
@@ -109,7 +110,7 @@ class Foreign:
         try:
             declared = getattr(self._made, "delay", None)
         except Exception as error:
-            raise ShaperFaultError(f"raises {_named(error)} when asked for its delay") from error
+            raise ShaperFaultError(f"raises {named(error)} when asked for its delay") from error
         return float(declared) if isinstance(declared, int | float | np.floating) else None
 
     def step(self, q: Floats) -> Floats:
@@ -124,7 +125,7 @@ class Foreign:
         try:
             given = self._made.step(q.copy(), info)
         except Exception as error:
-            raise ShaperFaultError(f"raises {_named(error)} {where}") from error
+            raise ShaperFaultError(f"raises {named(error)} {where}") from error
         try:
             q_star = np.array(given, dtype=float)
         except (TypeError, ValueError):
@@ -173,7 +174,7 @@ def _load(file: Path, said: Path) -> Callable[[], Any]:
     try:
         spec.loader.exec_module(module)
     except Exception as error:
-        raise CandidateError(f"shaper {said}: running it raises {_named(error)}") from error
+        raise CandidateError(f"shaper {said}: running it raises {named(error)}") from error
     classes = [
         value
         for value in vars(module).values()
@@ -189,7 +190,7 @@ def _load(file: Path, said: Path) -> Callable[[], Any]:
             classes[0]()
         except Exception as error:
             raise CandidateError(
-                f"shaper {said}: {classes[0].__name__}() raises {_named(error)}; it is made without arguments"
+                f"shaper {said}: {classes[0].__name__}() raises {named(error)}; it is made without arguments"
             ) from error
         return classes[0]
     if inspect.isfunction(getattr(module, "step", None)):
@@ -197,8 +198,3 @@ def _load(file: Path, said: Path) -> Callable[[], Any]:
     raise CandidateError(
         f"shaper {said}: contains neither a class with a method step(q_ref, info) nor a function step"
     )
-
-
-def _named(error: Exception) -> str:
-    words = " ".join(str(error).split())
-    return f"{type(error).__name__}: {words}" if words else type(error).__name__

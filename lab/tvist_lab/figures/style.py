@@ -147,7 +147,7 @@ def _plain(panel: Axes) -> None:
 def decades(panel: Axes, *axes: str) -> None:
     """Label an axis with a logarithmic scale in plain numbers of one size: 1, 2 and 5 of each decade.
 
-    Where an axis is shorter than a decade, every digit is labelled.
+    If an axis is shorter than a decade, every digit is labelled.
 
     Args:
         panel: The panel, with its scale set.

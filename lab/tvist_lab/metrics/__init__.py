@@ -13,6 +13,7 @@ from tvist_lab.metrics.common_clock import (
 )
 from tvist_lab.metrics.comparison import ComparedMotion, Comparison, compare
 from tvist_lab.metrics.errors import NotMeasurableError
+from tvist_lab.metrics.measured import Measured
 from tvist_lab.metrics.motion import MotionRows, motions
 from tvist_lab.metrics.notes import grouped_notes
 from tvist_lab.metrics.residual import ModalResidual, Residual, residual, residual_by_modes
@@ -26,6 +27,7 @@ __all__ = [
     "CommonClock",
     "ComparedMotion",
     "Comparison",
+    "Measured",
     "ModalResidual",
     "MotionResult",
     "MotionRows",

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from tvist_lab.metrics.motion import MotionRows, motions
-from tvist_lab.metrics.table import IMPACTS, MotionResult, impact_percent, measure
+from tvist_lab.metrics.measured import Measured
+from tvist_lab.metrics.motion import MotionRows
+from tvist_lab.metrics.table import IMPACTS, MotionResult, impact_percent
 from tvist_lab.recordings import Floats, Recording
 
 SAME = 0.02
@@ -58,18 +59,15 @@ class Comparison:
     """The same of the second recording."""
 
 
-def compare(first: Recording, second: Recording) -> Comparison:
-    """Measure two recordings and pair their motions.
+def compare(first: Measured, second: Measured) -> Comparison:
+    """Pair the motions of two recordings.
 
     Motions correspond if they start and end at the same joint angles within 0.02 rad; they are paired in order, as
     many as possible.
     """
-    ways = [[_Way.of(recording, motion) for motion in motions(recording)] for recording in (first, second)]
+    ways = [[_Way.of(one.recording, motion) for motion in one.motions] for one in (first, second)]
     pairs = _pairs(*ways)
-    compared = tuple(
-        ComparedMotion(a + 1, b + 1, measure(first, ways[0][a].motion), measure(second, ways[1][b].motion))
-        for a, b in pairs
-    )
+    compared = tuple(ComparedMotion(a + 1, b + 1, first.results[a], second.results[b]) for a, b in pairs)
     taken = [{pair[side] for pair in pairs} for side in (0, 1)]
     alone = [tuple(n + 1 for n in range(len(ways[side])) if n not in taken[side]) for side in (0, 1)]
     return Comparison(compared, *alone)
@@ -77,16 +75,15 @@ def compare(first: Recording, second: Recording) -> Comparison:
 
 @dataclass(frozen=True)
 class _Way:
-    """A motion with its two ends."""
+    """The two ends of a motion."""
 
-    motion: MotionRows
     start: Floats
     end: Floats
 
     @classmethod
     def of(cls, recording: Recording, motion: MotionRows) -> "_Way":
         q = recording["target_q" if "target_q" in recording else "actual_q"]
-        return cls(motion, q[motion.start], q[motion.arm_stop(recording)])
+        return cls(q[motion.start], q[motion.arm_stop(recording)])
 
     def corresponds(self, other: "_Way") -> bool:
         if self.start.shape != other.start.shape:

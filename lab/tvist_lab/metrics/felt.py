@@ -33,8 +33,9 @@ def felt(
         NotMeasurableError: The sensor was not recorded, or there was too little rest to know gravity.
     """
     if not recording.foreign:
-        alpha = best_tool_acceleration(recording) if smooth else tool_acceleration(recording)
-        return recording.time[rows], alpha[rows]
+        if smooth:
+            return recording.time[rows], best_tool_acceleration(recording, rows)
+        return recording.time[rows], tool_acceleration(recording, rows=rows)
     if SENSOR not in recording:
         raise NotMeasurableError(f"the log has no {SENSOR}")
     shown = np.asarray(np.isfinite(recording[SENSOR]).all(axis=1))

@@ -39,14 +39,13 @@ def measured_spans(recording: Recording) -> list[tuple[int, int]]:
     if not rows.size:
         return []
     breaks = np.flatnonzero(np.diff(time[rows]) > PAUSE)
-    firsts = rows[np.concatenate([[0], breaks + 1])]
-    lasts = rows[np.concatenate([breaks, [rows.size - 1]])]
     spans = []
-    for first, last in zip(firsts, lasts, strict=True):
+    for run in np.split(rows, breaks + 1):
+        first, last = int(run[0]), int(run[-1])
         if np.max(np.abs(q[last] - q[first])) < SMALLEST:
             continue
-        first_row = np.searchsorted(time, time[first] - _taper(time, speed, int(first), 1))
-        last_row = np.searchsorted(time, time[last] + _taper(time, speed, int(last), -1))
+        first_row = np.searchsorted(time, time[first] - _taper(time, speed, first, 1))
+        last_row = np.searchsorted(time, time[last] + _taper(time, speed, last, -1))
         spans.append((int(seen[max(first_row, 1)]), int(seen[min(last_row, len(time) - 1)])))
     return spans
 

@@ -43,8 +43,8 @@ class MotionRows:
     """Number of the motion, if events contain it."""
     stopped: bool = False
     """Whether it was stopped before its target."""
-    lag: float = 0.0
-    """Time by which the arm follows its target, in a log of another controller [s]."""
+    lag: float | None = None
+    """Time by which the arm follows its target, in a log of another controller [s]; None if that is not known."""
 
     def arm_stop(self, recording: Recording) -> int:
         """First row from which the arm is not driven any more, so that it only vibrates."""
@@ -101,19 +101,21 @@ def motions(recording: Recording) -> list[MotionRows]:
         end = min([end, *jumps[jumps > motion.start]])
         rows = motion.start + 1 + np.flatnonzero(target_moving[motion.start + 1 : end])
         shaped_stop = int(rows[-1]) if rows.size else motion.reference_stop
-        lag = servo_lag(recording, motion.start, shaped_stop) or 0.0 if recording.foreign else 0.0
+        lag = servo_lag(recording, motion.start, shaped_stop) if recording.foreign else None
         found[index] = replace(motion, shaped_stop=shaped_stop, end=int(end), lag=lag)
     return found
 
 
 def _measured_motions(recording: Recording) -> list[MotionRows]:
     spans = measured_spans(recording)
-    # A start that is found late must not count as vibration of the motion before.
-    starts = [int(np.searchsorted(recording.time, recording.time[first] - EARLY)) for first, _ in spans]
-    return [
-        MotionRows(first, last, last, max(end, last + 1))
-        for (first, last), end in zip(spans, [*starts[1:], len(recording)], strict=bool(spans))
-    ]
+    found = []
+    for (first, last), following in zip_longest(spans, spans[1:]):
+        end = len(recording)
+        if following is not None:
+            # A start that is found late must not count as vibration of the motion before.
+            end = int(np.searchsorted(recording.time, recording.time[following[0]] - EARLY))
+        found.append(MotionRows(first, last, last, max(end, last + 1)))
+    return found
 
 
 def _step_per_tick(recording: Recording, name: str) -> Floats:
@@ -146,6 +148,4 @@ def _spans_of_reference(recording: Recording, moving: NDArray[np.bool_]) -> list
     # Between two moving rows, count the rows at rest rather than the time, since ticks may be missing in a motion.
     at_rest = recording.time[rows[1:] - 1] - recording.time[rows[:-1]]
     breaks = np.flatnonzero(at_rest > REST - 0.5 * recording.period)
-    firsts = rows[np.concatenate([[0], breaks + 1])]
-    lasts = rows[np.concatenate([breaks, [rows.size - 1]])]
-    return [(int(first), int(last) + 1, None, False) for first, last in zip(firsts, lasts, strict=True)]
+    return [(int(run[0]), int(run[-1]) + 1, None, False) for run in np.split(rows, breaks + 1)]

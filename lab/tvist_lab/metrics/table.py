@@ -124,7 +124,7 @@ def measure(recording: Recording, motion: MotionRows) -> MotionResult:
     after = attempt(vibration_after_stop, "peak_m_s2", "envelope_m_s2")
     strongest = attempt(peak_acceleration, "peak_acceleration_rad_s2")
     ringing = attempt(_ring_down, "f_d_hz", "f_d_interval_hz", "zeta", "zeta_interval")
-    lag = servo_lag(recording, motion.start, motion.shaped_stop)
+    lag = motion.lag if recording.foreign else servo_lag(recording, motion.start, motion.shaped_stop)
     if lag is None:
         notes["servo_lag_ms"] = "no measured angles follow a target"
     if vibration is not None and not vibration.fitted:

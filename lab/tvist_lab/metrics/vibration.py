@@ -15,7 +15,11 @@ TRUTH = "truth_tool_acceleration"
 TRUE_POSE = "truth_flange_pose"
 
 
-def tool_acceleration(recording: Recording, *, truth: bool = False) -> Floats:
+ALL = slice(None)
+"""All rows of a recording."""
+
+
+def tool_acceleration(recording: Recording, *, truth: bool = False, rows: slice = ALL) -> Floats:
     """Acceleration of the flange in its own frame, α [m/s²].
 
     The sensor measures the specific force; at rest this is the reaction to gravity, which follows from the
@@ -24,6 +28,7 @@ def tool_acceleration(recording: Recording, *, truth: bool = False) -> Floats:
     Args:
         recording: Recording with the sensor's column and `actual_TCP_pose`.
         truth: Whether to use the truth channel, free of noise, with the flexible arm's orientation if recorded.
+        rows: The rows that are wanted.
 
     Returns:
         Acceleration, shape (T, 3).
@@ -37,20 +42,20 @@ def tool_acceleration(recording: Recording, *, truth: bool = False) -> Floats:
     if not np.isfinite(force).all():
         raise NotMeasurableError(f"{name} is missing at some ticks")
     pose = recording[TRUE_POSE if truth and TRUE_POSE in recording else "actual_TCP_pose"]
-    orientation = Rotation.from_rotvec(pose[:, 3:6])
+    orientation = Rotation.from_rotvec(pose[rows, 3:6])
     up = orientation.inv().apply([0.0, 0.0, GRAVITY])
-    return np.asarray(force - up, dtype=np.float64)
+    return np.asarray(force[rows] - up, dtype=np.float64)
 
 
-def best_tool_acceleration(recording: Recording) -> Floats:
+def best_tool_acceleration(recording: Recording, rows: slice = ALL) -> Floats:
     """α from the truth channel if it was recorded, else from the sensor below 60 Hz [m/s²], shape (T, 3).
 
     White noise of 0.03 m/s² per axis alone exceeds 0.1 m/s² in one tick of a hundred, so the last time above a
     threshold could not be determined from the raw sensor.
     """
     if TRUTH in recording:
-        return tool_acceleration(recording, truth=True)
-    return low_pass(tool_acceleration(recording), recording.period)
+        return tool_acceleration(recording, truth=True, rows=rows)
+    return low_pass(tool_acceleration(recording), recording.period)[rows]
 
 
 def amplitude(alpha: Floats) -> Floats:

@@ -10,6 +10,7 @@ import polars as pl
 
 from tvist_lab.recordings.log_columns import LogError, Rows, recording_of
 from tvist_lab.recordings.recording import Floats, Recording
+from tvist_lab.words import counted
 
 SEPARATORS = (";", "\t", ",", " ")
 """Characters between cells, in the order in which they are looked for in the header."""
@@ -91,7 +92,7 @@ def _lines(path: Path) -> _Lines:
     if torn.size:
         first = body[torn[0]][0]
         notes.append(
-            f"{torn.size} torn line{'' if torn.size == 1 else 's'} left out, the first is line {first} with "
+            f"{counted(torn.size, 'torn line')} left out, the first is line {first} with "
             f"{cells[torn[0]]} cells instead of {len(names)}"
         )
     elif body and not ends_whole and len(body) > 1:

@@ -14,7 +14,7 @@ import polars as pl
 from tvist_lab.recordings.description import KEY, describe, ordered, sidecar
 from tvist_lab.recordings.recording import Floats, Recording, RecordingError
 from tvist_lab.recordings.units import meaning_of
-from tvist_lab.recordings.whole_file import whole_file
+from tvist_lab.whole_file import whole_file
 
 EXACT = 2.0**53
 """Whole numbers up to this one are the same as an integer and as a float."""
@@ -76,7 +76,7 @@ def _entries(name: str, values: Floats) -> list[tuple[str, Floats]]:
 
 
 def _exact(values: Floats) -> bool:
-    """Whether all values are the same as integers; -0.0 is not."""
+    """Return whether all values are the same as integers; -0.0 is not."""
     known = values[~np.isnan(values)]
     return bool(
         np.all((known == np.trunc(known)) & (np.abs(known) < EXACT) & ~((known == 0.0) & np.signbit(known)))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tvist_lab.recordings.recording import Floats, Recording, RecordingError
+from tvist_lab.words import counted
 
 TIME = "timestamp"
 """Name of the column of times, as in RTDE [s]."""
@@ -41,7 +42,7 @@ class Rows:
     values: Floats
     """Shape (T, columns); NaN for an empty cell."""
     lines: Floats
-    """Where each row stands, shape (T,): the number of its line or packet."""
+    """Number of the line or packet in which each row stands, shape (T,)."""
     unit: str = "line"
     """What `lines` counts, for messages."""
     notes: tuple[str, ...] = ()
@@ -138,7 +139,7 @@ def _increasing(rows: Rows, time: Floats) -> tuple[NDArray[np.intp], list[str]]:
     kept = np.delete(timed, again + 1)
     if kept.size < 2:
         raise LogError(
-            f"{rows.path} has {kept.size} row{'' if kept.size == 1 else 's'} with a {TIME} of its own; two are needed"
+            f"{rows.path} has {counted(kept.size, 'row')} with a {TIME} of its own; two are needed"
         )
     return kept, notes
 
@@ -153,7 +154,7 @@ def _check_period(rows: Rows, time: Floats) -> None:
 
 
 def _left_out(rows: Rows, count: int, what: str, first: int) -> str:
-    return f"{count} row{'' if count == 1 else 's'} {what} left out, the first in {rows.unit} {first}"
+    return f"{counted(count, 'row')} {what} left out, the first in {rows.unit} {first}"
 
 
 def _ticks(time: Floats) -> tuple[Floats, list[str]]:
@@ -166,7 +167,7 @@ def _ticks(time: Floats) -> tuple[Floats, list[str]]:
         return ticks, []
     worst = long[np.argmax(step[long])]
     note = (
-        f"rows are missing in {long.size} place{'' if long.size == 1 else 's'}, most of them for {step[worst]:.3f} s "
+        f"rows are missing in {counted(long.size, 'place')}, most of them for {step[worst]:.3f} s "
         f"after {time[worst]:.6g} s"
     )
     return ticks, [note]

@@ -10,17 +10,15 @@ from tvist_lab.figures.ring_down import ring_down_figure
 from tvist_lab.figures.style import literal
 from tvist_lab.metrics import (
     Comparison,
-    MotionResult,
-    MotionRows,
+    Measured,
     NotMeasurableError,
     compare,
     grouped_notes,
-    measure,
-    motions,
 )
-from tvist_lab.recordings import Recording, read
+from tvist_lab.recordings import read
 from tvist_lab.report.page import Page, PageTable, Picture, Section, picture
 from tvist_lab.report.verdict import verdict_on_one, verdict_on_two
+from tvist_lab.words import counted
 
 COLUMNS = {
     "motion": "Number of the motion.",
@@ -45,9 +43,7 @@ PICTURES = 6
 class _File:
     path: Path
     name: str
-    recording: Recording
-    motions: Sequence[MotionRows]
-    results: Sequence[MotionResult]
+    measured: Measured
 
 
 def recordings_page(paths: Sequence[Path], command: str) -> Page:
@@ -62,7 +58,7 @@ def recordings_page(paths: Sequence[Path], command: str) -> Page:
     """
     files = _files(paths)
     base, *others = files
-    compared = [(other, compare(base.recording, other.recording)) for other in others]
+    compared = [(other, compare(base.measured, other.measured)) for other in others]
     sections = [Section("Motions", tables=[_table(file) for file in files])]
     if compared:
         sections.append(Section("Comparison", tables=[_changes(base, *pair) for pair in compared]))
@@ -85,28 +81,23 @@ def recordings_verdict(paths: Sequence[Path]) -> list[str]:
         RecordingError: A file cannot be read, or has no joint angles; the message names it.
     """
     base, *others = _files(paths)
-    return _verdict(base, [(other, compare(base.recording, other.recording)) for other in others])
+    return _verdict(base, [(other, compare(base.measured, other.measured)) for other in others])
 
 
 def _verdict(base: _File, compared: Sequence[tuple[_File, Comparison]]) -> list[str]:
     if not compared:
-        return verdict_on_one(base.results, base.name)
-    sentences = [
-        sentence
-        for other, comparison in compared
-        for sentence in verdict_on_two(comparison, base.results, other.results, (base.name, other.name))
-    ]
+        return verdict_on_one(base.measured.results, base.name)
+    sentences: list[str] = []
+    for other, comparison in compared:
+        names = (base.name, other.name)
+        sentences += verdict_on_two(comparison, base.measured.results, other.measured.results, names)
     return list(dict.fromkeys(sentences))
 
 
 def _files(paths: Sequence[Path]) -> list[_File]:
-    return [_file(path, name) for path, name in zip(paths, _names(paths), strict=True)]
-
-
-def _file(path: Path, name: str) -> _File:
-    recording = read(path)
-    found = motions(recording)
-    return _File(path, name, recording, found, [measure(recording, motion) for motion in found])
+    return [
+        _File(path, name, Measured.of(read(path))) for path, name in zip(paths, _names(paths), strict=True)
+    ]
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
@@ -131,7 +122,7 @@ def _table(file: _File) -> PageTable:
             _text(result.f_d_hz, 2, result.f_d_interval_hz),
             _text(result.zeta, 3, result.zeta_interval),
         )
-        for index, result in enumerate(file.results, 1)
+        for index, result in enumerate(file.measured.results, 1)
     ]
     return PageTable(tuple(COLUMNS), rows, file.name)
 
@@ -173,25 +164,28 @@ def _changes(base: _File, other: _File, comparison: Comparison) -> PageTable:
 def _pictures(files: Sequence[_File], comparisons: Sequence[Comparison]) -> Iterator[Picture]:
     """One picture for each of the first motions, and one for each file of how its loudest motion rings."""
     base = files[0]
-    for index, motion in list(enumerate(base.motions, 1))[:PICTURES]:
-        curves = [(literal(base.name), (base.recording, motion))]
+    for index, motion in list(enumerate(base.measured.motions, 1))[:PICTURES]:
+        curves = [(literal(base.name), (base.measured.recording, motion))]
         for file, comparison in zip(files[1:], comparisons, strict=True):
             partner = next((one.b for one in comparison.motions if one.a == index), None)
             if partner is not None:
-                curves.append((literal(file.name), (file.recording, file.motions[partner - 1])))
+                curves.append(
+                    (literal(file.name), (file.measured.recording, file.measured.motions[partner - 1]))
+                )
         try:
             figure = compared_figure(f"Motion {index}", curves[:8])
         except NotMeasurableError:
             continue
         yield picture(figure, f"Acceleration of the tool around the stop of motion {index}, without gravity.")
     for file in files:
-        loudest = max(enumerate(file.results), key=lambda one: one[1].peak_m_s2 or 0.0, default=None)
+        loudest = max(enumerate(file.measured.results), key=lambda one: one[1].peak_m_s2 or 0.0, default=None)
         if loudest is None or loudest[1].peak_m_s2 is None:
             continue
         index = loudest[0]
         try:
             figure = ring_down_figure(
-                f"{literal(file.name)}, motion {index + 1}", (file.recording, file.motions[index])
+                f"{literal(file.name)}, motion {index + 1}",
+                (file.measured.recording, file.measured.motions[index]),
             )
         except NotMeasurableError:
             continue
@@ -205,14 +199,16 @@ def _missing(files: Sequence[_File]) -> list[str]:
     """What could not be measured or is not drawn, each with its reason."""
     items = []
     for file in files:
-        items += [f"{file.name}, {note}" for note in grouped_notes(file.results)]
-        if len(file.motions) > PICTURES:
-            items.append(f"{file.name}: only the first {PICTURES} of {len(file.motions)} motions are drawn")
+        items += [f"{file.name}, {note}" for note in grouped_notes(file.measured.results)]
+        if len(file.measured.motions) > PICTURES:
+            items.append(
+                f"{file.name}: only the first {PICTURES} of {len(file.measured.motions)} motions are drawn"
+            )
     return items
 
 
 def _provenance(file: _File) -> Mapping[str, str]:
-    recording = file.recording
+    recording = file.measured.recording
     facts = {"File": str(file.path)}
     if file.path.is_file():
         with file.path.open("rb") as stream:
@@ -227,7 +223,7 @@ def _provenance(file: _File) -> Mapping[str, str]:
         payload = info.payload
         facts |= {
             "Robot": f"{info.name}, model {info.model}, tvist {info.version}",
-            "Shaper when the recording began": f"{info.shaper}, {info.modes} mode{'' if info.modes == 1 else 's'}",
+            "Shaper when the recording began": f"{info.shaper}, {counted(info.modes, 'mode')}",
             "Declared payload": f"{payload.mass:g} kg",
         }
     if recording.foreign:

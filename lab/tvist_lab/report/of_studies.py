@@ -6,6 +6,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from tvist_lab.report.page import Page, PageTable, Section, picture
+from tvist_lab.words import counted
 
 LISTED = 200
 """Largest number of moves that are listed one by one."""
@@ -67,7 +68,7 @@ def _verdict_on_evaluation(result: Mapping[str, Any]) -> list[str]:
     name, less, delay = result["shaper"], result["reduction_percent"], result["delay_ms"]["median"]
     if less["median"] is None:
         return [f"No move vibrates enough unshaped to show what {name} does."]
-    moves = f"{result['counted']} move{'' if result['counted'] == 1 else 's'}"
+    moves = counted(result["counted"], "move")
     if less["median"] <= 0.0:
         lead = f"{name} does not reduce the vibration of {moves}: the median is {-less['median']:.0f} % more."
     else:

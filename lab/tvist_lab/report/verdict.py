@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from tvist_lab.metrics import Comparison, MotionResult
+from tvist_lab.words import counted
 
 TICK_MS = 2.0
 """Shortest delay of a shaped reference [ms]: one tick."""
@@ -35,7 +36,7 @@ def shaping_of(results: Sequence[MotionResult], name: str) -> Shaping:
     if len(shaped) < len(delays):
         return Shaping(
             True,
-            f"{len(shaped)} of {_counted(len(delays), 'motion')} of {name} were shaped: their targets end "
+            f"{len(shaped)} of {counted(len(delays), 'motion')} of {name} were shaped: their targets end "
             f"{late:.0f} ms after their references (median).",
         )
     return Shaping(True, f"{name} was shaped: its target ends {late:.0f} ms after its reference.")
@@ -47,17 +48,17 @@ def verdict_on_one(results: Sequence[MotionResult], name: str) -> list[str]:
         return [f"{name} contains no motion."]
     peaks = [result.peak_m_s2 for result in results if result.peak_m_s2 is not None]
     still = [result.still_after_ms for result in results if result.still_after_ms is not None]
-    counted = _counted(len(results), "motion")
+    many = counted(len(results), "motion")
     if not peaks:
         return [
-            f"{name} contains {counted}, but no vibration could be measured.",
+            f"{name} contains {many}, but no vibration could be measured.",
             shaping_of(results, name).sentence,
         ]
     loud = sum(peak > NOTICEABLE for peak in peaks)
     what = (
-        f"the tool vibrates noticeably after {loud} of {_counted(len(peaks), 'stop')}, by up to {max(peaks):.2f} m/s²"
+        f"the tool vibrates noticeably after {loud} of {counted(len(peaks), 'stop')}, by up to {max(peaks):.2f} m/s²"
         if loud
-        else f"the tool does not vibrate noticeably after any of {_counted(len(peaks), 'stop')} "
+        else f"the tool does not vibrate noticeably after any of {counted(len(peaks), 'stop')} "
         f"(at most {max(peaks):.2f} m/s²)"
     )
     first = f"{name}: {what}"
@@ -72,7 +73,7 @@ def verdict_on_two(
     second: Sequence[MotionResult],
     names: tuple[str, str],
 ) -> list[str]:
-    """Whether the second recording vibrates less than the first, and whether shaping can be the reason."""
+    """Judge whether the second recording vibrates less than the first, and whether shaping can be the reason."""
     a, b = names
     evidence = [shaping_of(first, a), shaping_of(second, b)]
     said = [one.sentence for one in evidence]
@@ -83,12 +84,12 @@ def verdict_on_two(
         for one in comparison.motions
         if one.first.peak_m_s2 is not None and one.second.peak_m_s2 is not None
     ]
-    counted = _counted(len(peaks), "motion")
+    many = counted(len(peaks), "motion")
     if not peaks:
         return [f"The vibration of {a} and {b} could not be measured, so nothing is compared.", *said]
     before, after = median(peak for peak, _ in peaks), median(peak for _, peak in peaks)
     change = median(100.0 * (second_peak / first_peak - 1.0) for first_peak, second_peak in peaks)
-    numbers = f"median of {counted}: {before:.2f} and {after:.2f} m/s²"
+    numbers = f"median of {many}: {before:.2f} and {after:.2f} m/s²"
     if max(before, after) < NOTICEABLE:
         lead = f"Neither {a} nor {b} vibrates noticeably after its stops ({numbers})."
     elif change <= -CLEAR:
@@ -101,7 +102,7 @@ def verdict_on_two(
         said.append(f"So shaping is not the reason why {b} vibrates less.")
     against = sum(second_peak > first_peak for first_peak, second_peak in peaks)
     if 0 < against < len(peaks) and change <= -CLEAR:
-        said.append(f"In {against} of {counted} it vibrates more.")
+        said.append(f"In {against} of {many} it vibrates more.")
     return [lead, *said]
 
 
@@ -116,7 +117,3 @@ def _sooner(comparison: Comparison) -> str:
         return ""
     by = median(gained)
     return f" and is still {abs(by):.0f} ms {'earlier' if by >= 0.0 else 'later'}"
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"

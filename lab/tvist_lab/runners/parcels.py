@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from tvist_lab.runners.interface import Failed, Result, Task, TaskError
+from tvist_lab.words import named
 
 UNPICKLABLE = (pickle.PicklingError, TypeError, AttributeError, ValueError, RecursionError)
 """What `pickle.dumps` raises for what it cannot pickle."""
@@ -16,7 +17,7 @@ def pack(task: object) -> bytes | Failed:
     try:
         return pickle.dumps(task)
     except UNPICKLABLE as error:
-        return Failed(TaskError(f"it cannot be pickled: {_words(error)}"))
+        return Failed(TaskError(f"it cannot be pickled: {named(error)}"))
 
 
 def attempt(work: Callable[[Task], Result], task: Task) -> Result | Failed:
@@ -45,7 +46,7 @@ def _do(work: Callable[[Any], Any], packed: bytes) -> bytes:
     try:
         return pickle.dumps(outcome)
     except UNPICKLABLE as error:
-        return pickle.dumps(Failed(TaskError(f"its result cannot be pickled: {_words(error)}")))
+        return pickle.dumps(Failed(TaskError(f"its result cannot be pickled: {named(error)}")))
 
 
 def _portable(error: Exception) -> Exception:
@@ -54,11 +55,6 @@ def _portable(error: Exception) -> Exception:
     try:
         pickle.loads(pickle.dumps(error))  # noqa: S301  these bytes are our own
     except Exception:  # noqa: BLE001  a constructor may raise anything
-        error = TaskError(_words(error))
+        error = TaskError(named(error))
     error.add_note(f"In the process that did the task:\n{lines}")
     return error
-
-
-def _words(error: Exception) -> str:
-    said = " ".join(str(error).split())
-    return f"{type(error).__name__}: {said}" if said else type(error).__name__

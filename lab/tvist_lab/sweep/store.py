@@ -16,6 +16,7 @@ import msgspec
 import polars as pl
 
 from tvist_lab.sweep.columns import FAILED, SCHEMA, Row, frame
+from tvist_lab.whole_file import UNFINISHED, whole_file
 
 MANIFEST = "sweep.json"
 """What the folder is a sweep of."""
@@ -66,11 +67,9 @@ class Store:
             _check_same(self.folder, manifest, identity)
         else:
             content = msgspec.json.format(msgspec.json.encode(identity), indent=1) + b"\n"
-            try:
-                _write(manifest, content)
-            except OSError as error:
-                raise _told(error, self.folder) from error
-        for forgotten in (*self.folder.glob(".*.tmp"), *self._parts.glob(".*.tmp")):
+            _write(manifest, content, self.folder)
+        unfinished = f".*{UNFINISHED}"
+        for forgotten in (*self.folder.glob(unfinished), *self._parts.glob(unfinished)):
             forgotten.unlink()
         self._next = 1 + max((int(part.stem) for part in self._parts.glob("*.parquet")), default=0)
 
@@ -151,24 +150,15 @@ def _read(file: Path) -> pl.DataFrame:
 def _write_frame(file: Path, rows: pl.DataFrame, folder: Path) -> None:
     content = io.BytesIO()
     rows.write_parquet(content)
+    _write(file, content.getvalue(), folder)
+
+
+def _write(file: Path, content: bytes, folder: Path) -> None:
     try:
-        _write(file, content.getvalue())
+        with whole_file(file) as stream:
+            stream.write(content)
     except OSError as error:
         raise _told(error, folder) from error
-
-
-def _write(file: Path, content: bytes) -> None:
-    """Write a file whole or not at all."""
-    unfinished = file.with_name(f".{file.name}.tmp")
-    try:
-        with unfinished.open("wb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        unfinished.replace(file)
-    except BaseException:
-        unfinished.unlink(missing_ok=True)
-        raise
 
 
 def _remove(files: Iterable[Path]) -> None:

@@ -15,6 +15,7 @@ from tvist_lab.recordings import Recording
 from tvist_lab.runners import TaskError
 from tvist_lab.sweep.columns import FAILED, MEASURED, TOO_WEAK, Row
 from tvist_lab.sweep.tasks import SweepTask
+from tvist_lab.words import named
 
 
 @dataclass(frozen=True)
@@ -44,10 +45,7 @@ def failed(task: SweepTask, status: str, why: str) -> list[Row]:
 
 def why(error: Exception) -> str:
     """Return an error in one line."""
-    said = " ".join(str(error).split())
-    if isinstance(error, TaskError):
-        return said
-    return f"{type(error).__name__}: {said}" if said else type(error).__name__
+    return str(error) if isinstance(error, TaskError) else named(error)
 
 
 def _measured(task: SweepTask) -> list[Row]:
