@@ -8,17 +8,19 @@ WORKERS ?= auto
 # How many examples Hypothesis tries in `make test-all`: full, half or quick.
 PROFILE ?= full
 READY := .venv/.ready
+# The folders of the distributions: tvist-protocol, tvist-shaping, tvist-urscript and tvist.
+DISTRIBUTIONS := ./protocol ./shaping ./urscript .
 
-.PHONY: setup demo notebooks test test-all lint bench soak format lock schemas clean
+.PHONY: setup demo notebooks test test-all lint bench soak dist format lock schemas clean
 
 setup: $(READY)
 
-$(READY): requirements.lock pyproject.toml
+$(READY): requirements.lock pyproject.toml protocol/pyproject.toml shaping/pyproject.toml urscript/pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "tvist needs Python 3.11 or newer: make setup PYTHON=python3.12")'
 	@echo "installing into .venv: about a minute"
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation $(addprefix --editable ,$(DISTRIBUTIONS))
 	@touch $@
 
 demo: setup
@@ -38,10 +40,15 @@ test-all: setup
 	$(BESIDE) --hypothesis-profile $(PROFILE) -m "not (nightly or realtime)" --durations 20
 	$(BIN)/pytest --hypothesis-profile $(PROFILE) -m "realtime and not nightly" --durations 20
 
+# What a client needs also runs on Windows; all runs on macOS.
+ON_WINDOWS := tvist_client tvist_protocol tvist_shaping tvist_urscript
+
 lint: setup
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(BIN)/mypy --platform darwin
+	$(BIN)/mypy --platform win32 $(addprefix --package ,$(ON_WINDOWS))
 	$(BIN)/lint-imports
 
 bench: setup
@@ -57,13 +64,22 @@ format: setup
 	$(BIN)/ruff format
 
 COMPILE := uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
-  --no-emit-index-url --no-annotate --no-header
+  --no-emit-index-url --no-annotate --no-header \
+  --no-emit-package tvist-protocol --no-emit-package tvist-shaping --no-emit-package tvist-urscript
 
 # The locks name versions and hashes, never where they come from.
 lock:
 	$(COMPILE) --extra dev -o requirements.lock pyproject.toml
 	$(COMPILE) --extra server -c requirements.lock -o docker/requirements.lock pyproject.toml
 	echo hatchling | $(COMPILE) -c requirements.lock -o docker/build.lock -
+	printf '%s\n' cmake nanobind ninja scikit-build-core | $(COMPILE) -o docker/ruckig-build.lock -
+
+# Equal commits give equal files: what is in them is dated by the commit.
+dist: setup
+	rm -rf dist
+	for each in $(DISTRIBUTIONS); do \
+	  (cd $$each && SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) $(CURDIR)/$(BIN)/hatchling build -d $(CURDIR)/dist) || exit 1; \
+	done
 
 schemas: setup
 	$(BIN)/python -m tvist_protocol.generate

@@ -7,6 +7,7 @@ import contextlib
 import ctypes
 import logging
 import os
+import sys
 import threading
 import time
 from abc import ABC, abstractmethod
@@ -199,6 +200,9 @@ def _wake_sharply() -> None:
 
 def _ask_for_priority() -> None:
     """Give the calling thread real-time priority; if that is not permitted, log it and continue."""
+    if sys.platform != "linux":
+        log.warning("real-time priority is only for Linux, so the control loop runs at normal priority")
+        return
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     except OSError as error:

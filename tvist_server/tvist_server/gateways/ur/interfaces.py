@@ -5,6 +5,7 @@ import contextlib
 import errno
 import logging
 import socket
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -293,9 +294,8 @@ def _listen(address: str, port: int, interface: InterfaceName) -> socket.socket:
         # Accepted sockets inherit these options.
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        for option, value in zip(
-            (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT), PROBES, strict=True
-        ):
+        idle = socket.TCP_KEEPALIVE if sys.platform == "darwin" else socket.TCP_KEEPIDLE
+        for option, value in zip((idle, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT), PROBES, strict=True):
             bound.setsockopt(socket.IPPROTO_TCP, option, value)
         bound.bind((address, port))
         bound.listen(32)

@@ -1,0 +1,159 @@
+"""The distributions: what is in each, and that one command installs it where nothing else is, with its README's first example."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+from tests.conformance.served import PATIENCE, Served
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = {"tvist-protocol": "protocol", "tvist-shaping": "shaping", "tvist-urscript": "urscript", "tvist": "."}
+PYTHONS = [version for version in ("3.11", "3.12", "3.13") if shutil.which(f"python{version}")]
+CLIENT_KIB = 45 * 1000**2 // 1024
+FENCE = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
+
+
+def project(folder):
+    return tomllib.loads((ROOT / folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+
+def run(*words, cwd=None):
+    ended = subprocess.run(
+        [*map(str, words)],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+        cwd=cwd,
+        env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
+    )
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    return ended.stdout
+
+
+@pytest.fixture(scope="module")
+def wheels(tmp_path_factory):
+    """The folder that `make dist` would fill."""
+    made = tmp_path_factory.mktemp("dist")
+    for folder in FOLDERS.values():
+        run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", made, cwd=ROOT / folder)
+    return made
+
+
+@pytest.fixture
+def fresh(tmp_path, wheels):
+    """Install what a line names into an environment of its own, for a Python of this machine; its python."""
+
+    def install(what, version=None):
+        base = sys.executable if version is None else f"python{version}"
+        run(base, "-m", "venv", tmp_path / "venv")
+        python = tmp_path / "venv" / "bin" / "python"
+        run(python, "-m", "pip", "install", "--quiet", "--find-links", wheels, what)
+        return python
+
+    return install
+
+
+def imports(python, name):
+    return subprocess.run([python, "-c", f"import {name}"], capture_output=True, check=False).returncode == 0
+
+
+class TestContents:
+    def test_each_package_is_in_one_wheel(self, wheels):
+        found = [
+            name.split("/")[0]
+            for wheel in wheels.glob("*.whl")
+            for name in zipfile.ZipFile(wheel).namelist()
+            if name.count("/") == 1 and name.endswith("/__init__.py")
+        ]
+        assert len(found) == len(set(found))
+        assert set(found) == {folder.name for folder in ROOT.glob("*/tvist_*") if folder.is_dir()}
+
+    def test_no_wheel_holds_what_is_made_or_is_for_the_checkout(self, wheels):
+        for wheel in wheels.glob("*.whl"):
+            names = zipfile.ZipFile(wheel).namelist()
+            assert not [name for name in names if re.search(r"__pycache__|\.(nbc|nbi|mcap)$|^tests/", name)]
+            assert [name for name in names if name.endswith("licenses/NOTICE")]
+            assert [name for name in names if name.endswith("py.typed")]
+
+    @pytest.mark.parametrize("name", FOLDERS)
+    def test_each_has_its_name_the_common_version_and_licence(self, name):
+        own, common = project(FOLDERS[name]), project(".")
+        assert own["name"] == name
+        for key in ("version", "license", "requires-python"):
+            assert own[key] == common[key]
+        for file in ("LICENSE", "NOTICE"):
+            assert (ROOT / FOLDERS[name] / file).read_text() == (ROOT / file).read_text()
+
+    def test_our_own_are_asked_for_in_the_same_version(self):
+        common = project(".")
+        asked = [common["dependencies"], *common["optional-dependencies"].values()]
+        ours = [line for lines in asked for line in lines if line.startswith("tvist-")]
+        assert len(ours) == 3
+        assert all(line.endswith(f"=={common['version']}") for line in ours)
+
+
+@pytest.mark.slow
+class TestFresh:
+    @pytest.mark.parametrize("name", ["tvist-protocol", "tvist-shaping", "tvist-urscript"])
+    def test_the_readmes_first_examples_run(self, fresh, name):
+        python = fresh(name)
+        readme = (ROOT / FOLDERS[name] / "README.md").read_text(encoding="utf-8")
+        examples = [text for kind, text in FENCE.findall(readme) if kind == "pycon"]
+        first = python.parents[2] / "first.txt"
+        first.write_text(examples[0], encoding="utf-8")
+        run(python, "-m", "doctest", first)
+        assert not imports(python, "zenoh")
+        assert imports(python, "numpy") == (name == "tvist-shaping")
+
+    def test_the_client_is_light_and_moves_a_robot(self, fresh):
+        python = fresh("tvist")
+        assert not imports(python, "numpy")
+        site = Path(run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))").strip())
+        tools = {"pip", "setuptools", "pkg_resources", "_distutils_hack"}
+        files = [path for path in site.rglob("*") if path.is_file()]
+        ours = [path for path in files if path.relative_to(site).parts[0].split("-")[0] not in tools]
+        assert sum(path.stat().st_size for path in ours) / 1024 < CLIENT_KIB
+        readme = (ROOT / "clients" / "README.md").read_text(encoding="utf-8")
+        blocking = next(text for kind, text in FENCE.findall(readme) if "tvist_client.blocking" in text)
+        with Served("--clock", "lockstep") as served:
+            assert "ok" in run(python, "-m", "tvist_client", "check", served.endpoint)
+            program = blocking.replace("tcp/127.0.0.1:7447", served.endpoint)
+            assert re.fullmatch(r"\d+ \d+\n", run(python, "-c", program))
+
+    def test_the_program_says_what_to_install(self, fresh):
+        ended = subprocess.run(
+            [fresh("tvist").parent / "tvist", "serve"], capture_output=True, text=True, check=False
+        )
+        assert ended.returncode == 1
+        assert ended.stderr.count("\n") == 1
+        assert "tvist[server]" in ended.stderr
+
+
+@pytest.mark.nightly
+class TestExtras:
+    """Each with all that it brings, hundreds of megabytes, in every Python that this machine has."""
+
+    @pytest.mark.parametrize("version", PYTHONS)
+    def test_the_server_serves(self, fresh, version):
+        python = fresh("tvist[server]", version)
+        assert not imports(python, "scipy")
+        assert not imports(python, "matplotlib")
+        run(python, "-m", "tvist_cli", "run", ROOT / "clients" / "examples" / "wave.script", "--lockstep")
+
+    @pytest.mark.parametrize("version", PYTHONS)
+    def test_the_laboratory_measures(self, fresh, version, tmp_path):
+        python = fresh("tvist[lab]", version)
+        run(python, "-m", "tvist_cli", "paper", "--runs", "1", "--no-baselines", cwd=tmp_path)
+
+    @pytest.mark.parametrize("version", PYTHONS)
+    def test_the_view_draws(self, fresh, version):
+        python = fresh("tvist[view]", version)
+        assert "--magnify" in run(python, "-m", "tvist_cli", "view", "--help")
+        run(python, "-c", "import tvist_view.app")
