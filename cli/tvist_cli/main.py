@@ -109,7 +109,9 @@ def _run() -> None:
     try:
         import cyclopts
     except ImportError:
-        sys.exit("tvist: the command line needs more than the client: pip install 'tvist[server]', for studies 'tvist[lab]'")
+        sys.exit(
+            "tvist: the command line needs more than the client: pip install 'tvist[server]', for studies 'tvist[lab]'"
+        )
     from tvist_cli.failure import Failure, told
     from tvist_cli.misuse import readable, sentence
 

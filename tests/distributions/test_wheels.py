@@ -13,7 +13,12 @@ import pytest
 from tests.conformance.served import PATIENCE, Served
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = {"tvist-protocol": "protocol", "tvist-shaping": "shaping", "tvist-urscript": "urscript", "tvist": "."}
+FOLDERS = {
+    "tvist-protocol": "protocol",
+    "tvist-shaping": "shaping",
+    "tvist-urscript": "urscript",
+    "tvist": ".",
+}
 PYTHONS = [version for version in ("3.11", "3.12", "3.13") if shutil.which(f"python{version}")]
 CLIENT_KIB = 45 * 1000**2 // 1024
 FENCE = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
