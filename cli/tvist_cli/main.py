@@ -110,7 +110,7 @@ def _run() -> None:
         import cyclopts
     except ImportError:
         sys.exit(
-            "tvist: the command line needs more than the client: pip install 'tvist[server]', for studies 'tvist[lab]'"
+            "tvist: more than the client is needed: pip install 'tvist[server]', for studies 'tvist[lab]'"
         )
     from tvist_cli.failure import Failure, told
     from tvist_cli.misuse import readable, sentence

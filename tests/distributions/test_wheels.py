@@ -1,4 +1,4 @@
-"""The distributions: what is in each, and that one command installs it where nothing else is, with its README's first example."""
+"""The distributions: what is in each, and that one command installs it where nothing else is."""
 
 import os
 import re
