@@ -14,7 +14,11 @@ from tvist_shaping._types import Floats
 from tvist_shaping.impulses import Impulses, check_mode
 
 NODES = 32
-"""Number of nodes, which is the degree of the polynomials in ζ plus 1."""
+"""Number of nodes, which is the degree of the polynomials in ζ plus 1; twice as many where the equations end at a
+branch point just beyond the highest damping, since the polynomials converge slowly there."""
+SMALL = 1e-7
+"""Largest of the last coefficients that says that the polynomials have converged [-]."""
+MOST_NODES = 256
 
 
 class Tabulated:
@@ -47,8 +51,21 @@ class Tabulated:
             ConvergenceError: There is no solution up to zeta_max.
         """
         self.zeta_max, self._instead = zeta_max, instead
-        k = np.arange(NODES)
-        nodes = np.cos((k + 0.5) * math.pi / NODES)[::-1]
+        nodes = NODES
+        last = self._tabulate(follow, start, nodes)
+        while np.abs(self._coefficients[-3:]).max() > SMALL and nodes < MOST_NODES:
+            nodes *= 2
+            last = self._tabulate(follow, start, nodes)
+        ends = [float(follow(end, x)[2][-1]) for end, x in ((0.0, start), (zeta_max, last))]
+        between = [float(self._at(zeta)[1][-1]) for zeta in np.linspace(0.0, zeta_max, 33)[1:-1]]
+        self.duration_periods = round(max(*ends, *between), 9)
+
+    def _tabulate(
+        self, follow: Callable[[float, Floats], tuple[Floats, Floats, Floats]], start: Floats, number: int
+    ) -> Floats:
+        """Compute the polynomials from the solutions at a number of nodes; the unknowns at the last."""
+        k, zeta_max = np.arange(number), self.zeta_max
+        nodes = np.cos((k + 0.5) * math.pi / number)[::-1]
         values, last, x, zeta = [], start, start, 0.0
         slope = np.zeros(start.size)
         for node in nodes:
@@ -57,11 +74,9 @@ class Tabulated:
             slope, last = (x - last) / step, x
             values.append(np.concatenate([A, periods]))
         terms = np.cos(np.outer(np.arccos(nodes), k))  # T_k at the nodes, which are orthogonal
-        self._coefficients = (terms.T @ np.array(values)) * np.where(k == 0, 1.0, 2.0)[:, None] / NODES
+        self._coefficients = (terms.T @ np.array(values)) * np.where(k == 0, 1.0, 2.0)[:, None] / number
         self._k, self._N = k, values[0].size // 2
-        ends = [float(follow(end, x)[2][-1]) for end, x in ((0.0, start), (zeta_max, last))]
-        between = [float(self._at(zeta)[1][-1]) for zeta in np.linspace(0.0, zeta_max, 33)[1:-1]]
-        self.duration_periods = round(max(*ends, *between), 9)
+        return last
 
     def __call__(self, f_d: float, zeta: float) -> Impulses:
         """Evaluate the impulses.

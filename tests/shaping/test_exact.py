@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 from tests.examples import examples
@@ -117,8 +117,18 @@ def test_the_validity_in_the_catalogue_is_where_the_highest_zero_is_at_its_limit
     assert SHAPERS[name].zeta_max == HumpShaper(humps, 0.05).limit()
 
 
+@pytest.mark.parametrize("V", [0.2, 0.2245, 0.225, 0.22509])
+def test_the_hump_has_its_height_where_the_equations_end_just_beyond_the_highest_damping(V):
+    made = ei_of(1, V, exact=True)
+    for part in np.linspace(0.0, 0.999, 41):
+        assert residual(1.0, part * made.zeta_max, made.function(1.0, part * made.zeta_max)) == pytest.approx(
+            V, rel=1e-6
+        )
+
+
 @examples(10)
 @given(st.integers(1, 4), st.floats(0.005, 0.3))
+@example(1, 0.225)
 def test_any_number_of_humps_of_any_height_can_be_had(humps, V):
     made = ei_of(humps, V, exact=True)
     zeta = 0.7 * made.zeta_max

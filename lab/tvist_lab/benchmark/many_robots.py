@@ -51,7 +51,9 @@ async def robots_at_500_hz(seconds: float, tell: Callable[[str], None]) -> int:
 
 async def worst_share(number: int, seconds: float) -> float:
     """Return the largest share of missed ticks of any robot in a process bound to one core."""
-    core = max(os.sched_getaffinity(0)) if sys.platform == "linux" else None
+    core = None
+    if sys.platform == "linux":  # elsewhere nothing binds a process to a core
+        core = max(os.sched_getaffinity(0))
     name = "ur5e" if number == 1 else "ur5e-1"
     heard: dict[str, list[Telemetry]] = defaultdict(list)
     loop, enough = asyncio.get_running_loop(), asyncio.Event()

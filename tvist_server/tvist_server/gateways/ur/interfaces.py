@@ -286,6 +286,14 @@ def _session(interface: InterfaceName, robot: UrRobot, control: ConnectionContro
             )
 
 
+def _probe(bound: socket.socket) -> None:
+    """Have silent peers probed as `PROBES` says, where the system lets it be chosen."""
+    if sys.platform == "linux":
+        options = (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT)
+        for option, value in zip(options, PROBES, strict=True):
+            bound.setsockopt(socket.IPPROTO_TCP, option, value)
+
+
 def _listen(address: str, port: int, interface: InterfaceName) -> socket.socket:
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     bound = socket.socket(family, socket.SOCK_STREAM)
@@ -294,9 +302,9 @@ def _listen(address: str, port: int, interface: InterfaceName) -> socket.socket:
         # Accepted sockets inherit these options.
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        idle = socket.TCP_KEEPALIVE if sys.platform == "darwin" else socket.TCP_KEEPIDLE
-        for option, value in zip((idle, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT), PROBES, strict=True):
-            bound.setsockopt(socket.IPPROTO_TCP, option, value)
+        idle = (
+            0x10 if sys.platform == "darwin" else socket.TCP_KEEPIDLE
+        )  # TCP_KEEPALIVE, of which Python 3.11 types nothing
         bound.bind((address, port))
         bound.listen(32)
     except OSError as error:
