@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvist_controller._compiled import compiled
+from tvist_controller.elimination import eliminate
 from tvist_controller.control.differentiator import Floats
 
 Integers = npt.NDArray[np.int64]
@@ -63,7 +64,7 @@ def wanted_lead(
             for column in range(3):
                 for j in range(n):
                     square[row, column] += jacobian[row, joints[j]] * jacobian[column, joints[j]]
-        moved[:] = np.linalg.solve(square, moved)
+        eliminate(square, moved)
     for j in range(n):
         c = joints[j]
         own = load[c] / stiffness[c]

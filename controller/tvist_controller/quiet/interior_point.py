@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tvist_controller._compiled import compiled
+from tvist_controller.elimination import eliminate
 from tvist_controller.trajectory.limits import Floats
 
 STEPS = 60
@@ -161,7 +162,7 @@ def optimize(  # noqa: C901, PLR0912, PLR0915  a kernel: its branches are loops
     band, Q = np.zeros((3, K)), np.zeros((R, K))
     y, dy, miss = np.zeros(R), np.zeros(R), np.zeros(R)
     r, dc = np.zeros(K), np.zeros(K)
-    S = np.zeros((R, R))
+    S, rest = np.zeros((R, R)), np.zeros((R, R))
     differences(c, value)
     for k in range(3):
         for i in range(counts[k]):
@@ -189,8 +190,11 @@ def optimize(  # noqa: C901, PLR0912, PLR0915  a kernel: its branches are loops
         for m in range(R):
             Q[m] = E[m]
             _solve(band, Q[m])
-        S[:] = E @ Q.T
         for m in range(R):
+            for j in range(R):
+                S[m, j] = 0.0
+                for i in range(K):
+                    S[m, j] += E[m, i] * Q[j, i]
             S[m, m] *= 1.0 + TINY
             S[m, m] += price[m] + 1e-300
         centre = 0.0
@@ -213,7 +217,8 @@ def optimize(  # noqa: C901, PLR0912, PLR0915  a kernel: its branches are loops
                     dy[m] = -miss[m]
                     for i in range(K):
                         dy[m] += E[m, i] * dc[i]
-                dy[:] = np.linalg.solve(S, dy)
+                rest[:] = S
+                eliminate(rest, dy)
                 for m in range(R):
                     for i in range(K):
                         dc[i] -= Q[m, i] * dy[m]

@@ -302,9 +302,7 @@ def _listen(address: str, port: int, interface: InterfaceName) -> socket.socket:
         # Accepted sockets inherit these options.
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        idle = (
-            0x10 if sys.platform == "darwin" else socket.TCP_KEEPIDLE
-        )  # TCP_KEEPALIVE, of which Python 3.11 types nothing
+        _probe(bound)
         bound.bind((address, port))
         bound.listen(32)
     except OSError as error:
