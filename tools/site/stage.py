@@ -45,7 +45,13 @@ def stage(folder: Path) -> Path:
         "nav": navigation(modules),
         "plugins": {
             "mkdocstrings": {
-                "handlers": {"python": {"paths": sorted({str(module.source) for module in modules})}}
+                "handlers": {
+                    "python": {
+                        "paths": sorted({str(module.source) for module in modules}),
+                        # A package may export what another one defines.
+                        "options": {"preload_modules": sorted({m.name.partition(".")[0] for m in modules})},
+                    }
+                }
             }
         },
     }
