@@ -11,7 +11,7 @@ READY := .venv/.ready
 # The folders of the distributions: tvist-protocol, tvist-shaping, tvist-urscript and tvist.
 DISTRIBUTIONS := ./protocol ./shaping ./urscript .
 
-.PHONY: setup demo notebooks test test-all lint bench soak dist format lock schemas clean
+.PHONY: docs docs-serve setup demo notebooks test test-all lint bench soak dist format lock schemas clean
 
 setup: $(READY)
 
@@ -63,6 +63,21 @@ format: setup
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
+# The site needs no package of tvist: it is made from the files. So its environment is a small one of its own.
+DOCS_READY := .venv-docs/.ready
+SITE := NO_MKDOCS_2_WARNING=1 .venv-docs/bin/python -m tools.site
+
+$(DOCS_READY): docs/requirements.lock
+	$(PYTHON) -m venv .venv-docs
+	.venv-docs/bin/pip install --quiet --disable-pip-version-check --require-hashes -r docs/requirements.lock
+	@touch $@
+
+docs: $(DOCS_READY)
+	$(SITE)
+
+docs-serve: $(DOCS_READY)
+	$(SITE) --serve
+
 COMPILE := uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
   --no-emit-index-url --no-annotate --no-header \
   --no-emit-package tvist-protocol --no-emit-package tvist-shaping --no-emit-package tvist-urscript
@@ -71,6 +86,7 @@ COMPILE := uv pip compile --quiet --universal --python-version 3.11 --generate-h
 lock:
 	$(COMPILE) --extra dev -o requirements.lock pyproject.toml
 	$(COMPILE) --extra server -c requirements.lock -o docker/requirements.lock pyproject.toml
+	$(COMPILE) -o docs/requirements.lock docs/requirements.in
 	echo hatchling | $(COMPILE) -c requirements.lock -o docker/build.lock -
 	printf '%s\n' cmake nanobind ninja scikit-build-core | $(COMPILE) -o docker/ruckig-build.lock -
 
@@ -86,4 +102,4 @@ schemas: setup
 	$(BIN)/python -m tvist_shaping.reference
 
 clean:
-	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache
+	rm -rf .venv .venv-docs build dist .mypy_cache .ruff_cache .pytest_cache

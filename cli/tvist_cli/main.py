@@ -44,7 +44,7 @@ COMMANDS = {
     "search": "Search for cases in which a robot breaks its promises.",
     "bench": "Measure how fast tvist runs on this machine.",
     "keys": "Create TLS certificates for a robot and its clients.",
-    "completion": "Print the script by which a shell completes commands and options.",
+    "completion": "Print the script by which a shell completes commands, options and their values.",
 }
 """The commands with their one-line help, in the order in which a new user meets them."""
 

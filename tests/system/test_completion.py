@@ -1,8 +1,10 @@
-"""What `tvist completion` prints lets a shell complete commands, options and files."""
+"""What `tvist completion` prints lets each shell complete commands, options, their values and files."""
 
+import re
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -10,43 +12,75 @@ from tvist_cli.main import COMMANDS
 
 pytestmark = pytest.mark.quick
 
+ASKING_ZSH = Path(__file__).with_name("completion")
+CASES = {
+    "tvist che": {"check-script", "check"},
+    "tvist run --lo": {"--lockstep"},
+    "tvist run wave.script --input digital_input_1=1 --prof": {"--profile"},
+    "tvist serve --no-f": {"--no-floor"},
+    "tvist completion f": {"fish"},
+    "tvist run wav": {"wave.script"},
+    "tvist check-script one.script wav": {"wave.script"},
+    "tvist serve --shaper zvd": {"zvd", "zvdd", "zvddd"},
+    "tvist serve --shaper ow": {"own.py"},
+    "tvist serve --robot u": {"ur5e"},
+    "tvist serve --robot a": {"arm.toml"},
+    "tvist serve --profile u": {"ursim"},
+    "tvist move Q": {"Q1", "Q2", "Q3"},
+    "tvist move Q1 --shaper el": {"elastic", "elastic-auto", "elastic-position"},
+}
+"""Typed lines with what completes their last word."""
+
 
 @pytest.fixture(scope="module")
-def script():
-    """The script for a shell."""
-
-    def script(shell):
+def folder(tmp_path_factory):
+    """A folder with files, and the script of each shell under the name that the shell expects."""
+    folder = tmp_path_factory.mktemp("completed")
+    for name in ("wave.script", "own.py", "arm.toml"):
+        (folder / name).touch()
+    for shell, file in {"bash": "bash-script", "zsh": "_tvist", "fish": "fish-script"}.items():
         words = [sys.executable, "-m", "tvist_cli", "completion", shell]
-        return subprocess.run(words, capture_output=True, text=True, check=True).stdout
-
-    return script
-
-
-@pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
-@pytest.mark.parametrize(
-    ("typed", "completed"),
-    [
-        (("tvist", "che"), ["check-script", "check"]),
-        (("tvist", "run", "--lo"), ["--lockstep"]),
-        (("tvist", "run", "wave.script", "--input", "digital_input_1=1", "--prof"), ["--profile"]),
-        (("tvist", "serve", "--no-f"), ["--no-floor"]),
-        (("tvist", "completion", "f"), ["fish"]),
-        (("tvist", "run", "wav"), ["wave.script"]),
-        (("tvist", "check-script", "one.script", "wav"), ["wave.script"]),
-    ],
-    ids=lambda value: value[-1] if isinstance(value, tuple) else "",
-)
-def test_bash_completes(script, tmp_path, typed, completed):
-    (tmp_path / "completion").write_text(script("bash"), encoding="utf-8")
-    (tmp_path / "wave.script").touch()
-    asks = 'source completion; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _tvist; printf "%s\\n" "${COMPREPLY[@]}"'
-    ended = subprocess.run(
-        ["bash", "-c", asks, "-", *typed], capture_output=True, text=True, check=True, cwd=tmp_path
-    )
-    assert sorted(ended.stdout.split()) == sorted(completed)
+        script = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+        (folder / file).write_text(script, encoding="utf-8")
+    shutil.copy(ASKING_ZSH / "capture.zsh", folder)
+    return folder
 
 
+def candidates(shell, folder, typed):
+    """What a shell offers for the last word of a line."""
+    match shell:
+        case "bash":
+            asks = (
+                'source bash-script; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); '
+                "function=$(complete -p tvist | sed 's/.*-F \\([^ ]*\\) .*/\\1/'); "
+                '"$function"; printf "%s\\n" "${COMPREPLY[@]}"'
+            )
+            words = ["bash", "-c", asks, "-", *typed.split(" ")]
+        case "fish":
+            words = ["fish", "--no-config", "-c", 'source fish-script; complete -C "$argv"', typed]
+        case "zsh":
+            words = ["zsh", "-f", ASKING_ZSH / "ask.zsh", typed]
+    ended = subprocess.run(words, capture_output=True, text=True, check=True, cwd=folder, timeout=60)
+    return {line.partition("\t")[0] for line in ended.stdout.splitlines() if line}
+
+
+@pytest.mark.parametrize("typed", CASES)
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_every_command_is_in_the_script(script, shell):
-    text = script(shell)
+def test_the_last_word_is_completed(shell, typed, folder):
+    if shutil.which(shell) is None:
+        pytest.skip(f"there is no {shell}")
+    assert candidates(shell, folder, typed) == CASES[typed]
+
+
+@pytest.mark.parametrize("file", ["bash-script", "_tvist", "fish-script"])
+def test_every_command_is_in_the_script(folder, file):
+    text = (folder / file).read_text(encoding="utf-8")
     assert [name for name in COMMANDS if name not in text] == []
+
+
+@pytest.mark.parametrize("file", ["bash-script", "_tvist", "fish-script"])
+def test_every_shaper_is_in_the_script(folder, file):
+    from tvist_shaping import BUILT_IN
+
+    words = set(re.findall(r"[\w-]+", (folder / file).read_text(encoding="utf-8")))
+    assert set(BUILT_IN.names()) <= words

@@ -4,7 +4,9 @@ from typing import Literal
 
 
 def completion(shell: Literal["bash", "zsh", "fish"]) -> None:
-    """Print the script by which a shell completes the commands and options of tvist.
+    """Print the script by which a shell completes the commands, options and values of tvist.
+
+    It completes the names of shapers, robots, poses and profiles that come with the package, and files.
 
     For bash, add this line to ~/.bashrc: eval "$(tvist completion bash)"
 
@@ -15,6 +17,13 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> None:
     Args:
         shell: Shell that will read the script.
     """
+    from tvist_cli import completed_values
     from tvist_cli.main import application
 
-    print(application().generate_completion(prog_name="tvist", shell=shell), end="")
+    script = application().generate_completion(prog_name="tvist", shell=shell)
+    print(
+        {"bash": completed_values.bash, "zsh": completed_values.zsh, "fish": completed_values.fish}[shell](
+            script
+        ),
+        end="",
+    )

@@ -1,0 +1,137 @@
+"""The documentation as a site: every page is in its navigation, and it is built without a warning."""
+
+import json
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from markdown_it import MarkdownIt
+from tools.site import navigation, reference, sources, stage, tree
+
+ROOT = Path(__file__).parents[2]
+BUILDER = ROOT / ".venv-docs" / "bin" / "python"
+LOADED = re.compile(
+    r"<(?:script|img|iframe|source)[^>]*\ssrc=[\"']?([^\"'\s>]+)|<link[^>]*\shref=[\"']?([^\"'\s>]+)"
+)
+
+EMPTY_ROW = re.compile(r"<tr>\s*(?:<td></td>\s*)+</tr>")
+"""What MkDocs gives a table that has only a head."""
+
+
+@pytest.fixture(scope="module")
+def collected():
+    return tree.collect()
+
+
+def listed(section):
+    """Paths of the pages of a navigation."""
+    for item in section:
+        for value in item.values():
+            yield from ([value] if isinstance(value, str) else listed(value))
+
+
+def test_the_navigation_names_every_page_once(collected):
+    pages, _ = collected
+    nav = list(listed(navigation.navigation([])))
+    assert len(nav) == len(set(nav))
+    named = {path.relative_to(ROOT).as_posix() for path in pages}
+    assert named - set(nav) <= {
+        "tests/acceptance/README.md",
+        "tests/journals/README.md",
+    }  # reached from the page about tests
+
+
+def test_the_navigation_has_the_kinds_of_documents():
+    titles = [title for item in navigation.navigation([]) for title in item]
+    kinds = ["Tutorials", "How-to guides", "Explanations", "Reference", "Decisions", "Packages", "Project"]
+    assert titles == ["Home", *kinds, "API"]
+
+
+def test_every_package_that_is_imported_has_a_page():
+    packages = {path.parent.name for path in ROOT.glob("*/tvist_*/__init__.py")}
+    modules = reference.modules()
+    assert {module.name.partition(".")[0] for module in modules} == packages - reference.PROGRAMS
+    assert not [module.name for module in modules if not module.about]
+
+
+def test_a_link_to_a_source_file_leads_to_its_page(collected):
+    _, others = collected
+    sink = ROOT / "controller" / "tvist_controller" / "sink.py"
+    assert sink in others
+    assert sources.page_of(sink).as_posix() == "controller/tvist_controller/sink.py.md"
+    assert sink.read_text(encoding="utf-8").rstrip() in sources.shown(sink)
+
+
+@pytest.mark.parametrize(
+    ("text", "targets"),
+    [
+        ("see [a](b.md) and ![c](d.png)", ["b.md", "d.png"]),
+        ("`[a](b.md)` is code", []),
+        ("```md\n[a](b.md)\n```\n[`x`](y.md#z)", ["y.md#z"]),
+        ("[out](https://example.org)", []),
+    ],
+)
+def test_links_are_found_outside_code(text, targets):
+    assert [match["target"] for match in tree.links(text)] == targets
+
+
+@pytest.mark.parametrize("target", ["../../../etc/passwd", "missing.md"])
+def test_a_link_that_leads_nowhere_is_refused_by_name(target):
+    with pytest.raises(tree.LinkError, match=f"docs/README.md links to {re.escape(target)}"):
+        tree.linked(tree.INDEX, target)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The site, built strictly: a warning of MkDocs is an error."""
+    if not BUILDER.exists():
+        pytest.skip("make docs installs what builds the site")
+    folder = tmp_path_factory.mktemp("site")
+    ended = subprocess.run(
+        [BUILDER, "-m", "tools.site", "--folder", folder],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=ROOT,
+    )
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    return folder
+
+
+@pytest.mark.slow
+class TestBuilt:
+    def test_nothing_is_loaded_from_outside(self, site):
+        for page in (site / "html").rglob("*.html"):
+            for match in LOADED.finditer(page.read_text(encoding="utf-8")):
+                assert not (match[1] or match[2]).startswith(("http:", "https:", "//")), page
+
+    def test_pages_have_the_items_and_tables_that_a_forge_shows(self, site, collected):
+        """MkDocs' dialect of Markdown differs from CommonMark in how lists are nested and interrupted."""
+        forge = MarkdownIt("commonmark").enable("table")
+        for page in collected[0]:
+            inside = page.relative_to(ROOT)
+            name = "index.html" if inside.name == "README.md" else f"{inside.stem}.html"
+            html = (site / "html" / inside.with_name(name)).read_text(encoding="utf-8")
+            article = EMPTY_ROW.sub("", html.partition("<article")[2].partition("</article>")[0])
+            shown = forge.render(page.read_text(encoding="utf-8"))
+            for tag in ("li", "tr"):
+                assert article.count(f"<{tag}>") == shown.count(f"<{tag}>"), f"{inside}: {tag}"
+
+    def test_what_a_package_exports_is_on_its_page(self, site):
+        page = (site / "html" / "api" / "tvist_client.html").read_text(encoding="utf-8")
+        for name in ("Robot", "Arm", "Motion", "RefusedError"):
+            assert f'id="tvist_client.{name}"' in page
+
+    def test_the_search_knows_the_pages(self, site):
+        text = (site / "html" / "search" / "search_index.js").read_text(encoding="utf-8")
+        found = json.loads(text.removeprefix("var __index = "))
+        assert {"docs/tutorials/first-motion.html", "api/tvist_shaping.html"} <= {
+            entry["location"].partition("#")[0] for entry in found["docs"]
+        }
+
+
+def test_the_folder_is_emptied_first(tmp_path):
+    (tmp_path / "old").mkdir()
+    assert json.loads(stage.stage(tmp_path).read_text(encoding="utf-8"))["nav"]
+    assert not (tmp_path / "old").exists()

@@ -1,0 +1,1 @@
+"""What maintains the project and is part of no distribution: the documentation's site, releases."""

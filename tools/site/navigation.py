@@ -1,0 +1,41 @@
+"""The navigation is the index of the documentation, read: its headings are sections, its links are pages."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+from tools.site.reference import FOLDER, Module
+from tools.site.tree import HOME, INDEX, ROOT, linked
+
+HEADING = re.compile(r"^(?P<level>##+) (?P<title>.+)$")
+ENTRY = re.compile(r"^(?:- |\d+\. )\[(?P<title>[^\]]+)\]\((?P<target>[^)#\s]+\.md)\)")
+
+Section = list[dict[str, Any]]
+
+
+def navigation(modules: list[Module]) -> Section:
+    """Return MkDocs' `nav`: the front page, the index with its sections, and the API.
+
+    A page that the index names twice is in the section that names it last: what begins the index leads a newcomer
+    to pages that have their places below.
+    """
+    sections: Section = []
+    places: dict[str, Section] = {}
+    stack: list[tuple[int, Section]] = [(1, sections)]
+    for line in INDEX.read_text(encoding="utf-8").splitlines():
+        if heading := HEADING.match(line):
+            level, inside = len(heading["level"]), Section()
+            while stack[-1][0] >= level:
+                stack.pop()
+            stack[-1][1].append({heading["title"]: inside})
+            stack.append((level, inside))
+        elif entry := ENTRY.match(line):
+            path = linked(INDEX, entry["target"]).relative_to(ROOT).as_posix()
+            if before := places.get(path):
+                before[:] = [item for item in before if path not in item.values()]
+            places[path] = stack[-1][1]
+            stack[-1][1].append({entry["title"].replace("`", ""): path})
+    api = [{"Overview": f"{FOLDER}/README.md"}]
+    api += [{module.name: module.page.as_posix()} for module in modules]
+    home = [{"Start": HOME.name}, {"Contents": str(Path(INDEX).relative_to(ROOT))}]
+    return [{"Home": home}, *(section for section in sections if all(section.values())), {"API": api}]
