@@ -84,11 +84,12 @@ def readiness(info: Info, state: State | None, unlock: str = "tvist unlock") -> 
     )
 
 
-def unlock_command(endpoint: str, name: str, security: Folder | None) -> str:
+def unlock_command(endpoint: str, name: str, security: Folder | None, namespace: str = "") -> str:
     """Return the command line that unlocks a robot, without options that have their default values."""
     words = ["tvist unlock"]
     words += [endpoint] if endpoint != ENDPOINT else []
     words += ["--name", name] if name != NAME else []
+    words += ["--namespace", namespace] if namespace else []
     words += ["--security", str(security)] if security is not None else []
     return " ".join(words)
 

@@ -24,6 +24,7 @@ def watch(
     *,
     name: str = "ur5e",
     security: Path | None = None,
+    namespace: str = "",
     seconds: float | None = None,
     json: bool = False,
 ) -> None:
@@ -34,6 +35,7 @@ def watch(
     Args:
         endpoint: Zenoh endpoint of the robot.
         name: Name of the robot.
+        namespace: Namespace of the robot, if it is served in one.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         seconds: Stop after this many seconds.
         json: Print each event, and the state ten times a second, as one JSON object per line.
@@ -43,10 +45,10 @@ def watch(
     from tvist_client.readiness import unlock_command
     from tvist_client.robot import Robot
 
-    command = unlock_command(endpoint, name, security)
+    command = unlock_command(endpoint, name, security, namespace)
 
     async def run() -> None:
-        async with await Robot.connect(endpoint, name, security=security) as robot:
+        async with await Robot.connect(endpoint, name, security=security, namespace=namespace) as robot:
             events: list[Event] = []
             robot.on_event(events.append)
             standing = _Standing(robot, command)
