@@ -71,7 +71,7 @@ def readiness(info: Info, state: State | None, unlock: str = "tvist unlock") -> 
     safety = info.safety_mode if info.safety_mode is not None or state is None else state.safety_mode
     if robot is None or safety is None:
         return Readiness(True, None, None, None, "", "")
-    robot_mode, safety_mode = _name(RobotMode, robot), _name(SafetyMode, safety)
+    robot_mode, safety_mode = mode_name(RobotMode, robot), mode_name(SafetyMode, safety)
     if safety not in _MAY_MOVE:
         stands, then = f"safety_mode is {safety_mode}", _NEXT.get(safety, "")
     elif robot != RobotMode.RUNNING:
@@ -94,5 +94,6 @@ def unlock_command(endpoint: str, name: str, security: Folder | None, namespace:
     return " ".join(words)
 
 
-def _name(kind: type[IntEnum], number: int) -> str:
+def mode_name(kind: type[IntEnum], number: int) -> str:
+    """Return the RTDE name of a mode, or its number if it has none."""
     return kind(number).name if number in {member.value for member in kind} else str(number)

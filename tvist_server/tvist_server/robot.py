@@ -201,7 +201,7 @@ class ServedRobot:
         gateways = self._gateways
         late, lost, limited = controller.motion.streams.counters()
         refused = reception.setpoints_refused + sum(gateway.setpoints_refused for gateway in gateways)
-        on_time = punctuality or Punctuality(0, 1.0, 0.0, 0.0, 0.0)
+        on_time = punctuality or Punctuality(0, 1.0, 0.0, 0.0, 0.0, 0.0)
         return Telemetry(
             tick=controller.tick_number,
             ticks_per_second=on_time.ticks / on_time.seconds,
@@ -218,6 +218,7 @@ class ServedRobot:
             setpoints_limited=limited,
             commands=counters.commands + reception.commands_refused,
             refused=counters.refused + reception.commands_refused,
+            load=None if punctuality is None else punctuality.load,
         )
 
     def close_recording(self) -> None:

@@ -3,6 +3,7 @@
 It acts as a router to which clients connect, or connects to a router of a fleet as a client, or both.
 """
 
+import contextlib
 import json
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -158,6 +159,35 @@ def _connected(
             f"no router answers within {CONNECT_S} s: check that it is running and listens there (`tvist router`)",
         )
         raise GatewayError(f"no connection to {where}: {refused}") from error
+
+
+def open_router(
+    listen: Sequence[str], connect: Sequence[str], settings: Mapping[str, Any], security: str | None
+) -> zenoh.Session:
+    """Open the session of a router; other routers may appear later.
+
+    Args:
+        listen: Endpoints to listen on.
+        connect: Other routers to connect to.
+        settings: Further settings, by path.
+        security: Folder with a certificate for other routers.
+
+    Raises:
+        GatewayError: The router cannot listen on an endpoint, or the certificate is missing.
+    """
+    shown: dict[str, Any] = {"connect/endpoints": list(connect), "connect/retry": CONNECT["connect/retry"]}
+    try:
+        for endpoint in connect:
+            shown |= certificate_for(endpoint, security)
+    except NotConnectedError as error:
+        raise GatewayError(str(error)) from error
+    return _open(listen, {**settings, **shown})
+
+
+def close_session(session: zenoh.Session) -> None:
+    """Close a session; one that breaks meanwhile is closed, too."""
+    with contextlib.suppress(zenoh.ZError):
+        session.close()  # type: ignore[no-untyped-call]
 
 
 def _session(settings: Mapping[str, Any]) -> zenoh.Session:
