@@ -28,7 +28,7 @@ from tvist_server.gateways.access import Role, access_control, open_access, rout
 from tvist_server.gateways.endpoints import is_endpoint, is_local, options, protocol
 
 AUTHORITY, CERTIFICATE, KEY, CLIENTS = "authority.pem", "robot.pem", "robot.key", "clients.toml"
-_LINE = 'a line is "NAME" = "operator" or "NAME" = "viewer"'
+_LINE = 'a line is "NAME" = "operator", "viewer", "robot" or "router"'
 
 HANDSHAKE_MS = 60_000
 """Longest time for a TLS handshake [ms]. Zenoh accepts no client for 100 ms after each failed handshake (its issue

@@ -5,6 +5,7 @@ import resource
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Self
 
+from tvist_client.fleet import Place, place_of
 from tvist_protocol import keys
 from tvist_server.gateways.exposure import check_endpoints, guarded_router
 from tvist_server.gateways.network import REALTIME, close_session, open_router
@@ -12,6 +13,8 @@ from tvist_server.gateways.network import REALTIME, close_session, open_router
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 SESSIONS = 4096
 """Largest number of robots, clients and routers that are connected at once."""
+MOST = 10_000
+"""Largest count of robots in one word: each has rules of its own."""
 FASTEST = 500.0
 """Largest rate of states to pass on [1/s]: a robot publishes no more."""
 REDUCED = ("state", "truth")
@@ -49,6 +52,7 @@ class Router:
         listen: Endpoints to listen on.
         connect: Routers to connect to, now or when they appear.
         rates: Limits on the states that leave; an interface that is named has its own.
+        robots: Robots that each limit holds for, one by one; all others share one.
         security: Folder with certificates and roles.
         insecure: Whether other machines may connect without certificates.
 
@@ -62,6 +66,7 @@ class Router:
         listen: Sequence[str],
         connect: Sequence[str],
         rates: Sequence[Rate],
+        robots: Sequence[Place],
         *,
         security: str | None,
         insecure: bool,
@@ -73,7 +78,7 @@ class Router:
             **REALTIME,
             "transport/unicast/max_sessions": SESSIONS,
             **guard,
-            **({"downsampling": downsampling(rates)} if rates else {}),
+            **({"downsampling": downsampling(rates, robots)} if rates else {}),
         }
         self._session = open_router(endpoints, connect, settings, security)
 
@@ -82,19 +87,45 @@ class Router:
         close_session(self._session)
 
 
-def downsampling(rates: Sequence[Rate]) -> list[dict[str, Any]]:
+def robots_of(text: str) -> list[Place]:
+    """Read `[NAMESPACE/]NAME`, or `[NAMESPACE/]NAME*COUNT` for NAME-1 to NAME-COUNT, as `tvist serve` names them.
+
+    Raises:
+        ProtocolError: A namespace or a name is none.
+        ValueError: The count is not from 1 to `MOST`.
+    """
+    first, star, count = text.partition("*")
+    if not star:
+        return [place_of(first)]
+    number = int(count) if count.isascii() and count.isdigit() and len(count) < 9 else 0
+    if not 1 <= number <= MOST:
+        raise ValueError(f"robot is {text!r}: the count after * must be a whole number from 1 to {MOST}")
+    return [place_of(f"{first}-{each}") for each in range(1, number + 1)]
+
+
+def downsampling(rates: Sequence[Rate], robots: Sequence[Place]) -> list[dict[str, Any]]:
     """Return Zenoh's `downsampling` settings for what leaves the router.
+
+    Zenoh counts by rule, not by key: a rule with a wildcard lets one robot's states use up what is meant for all. So
+    each robot has rules of its own, and only robots that are not listed share one. The first rule that fits is taken.
 
     Args:
         rates: Limits.
+        robots: Robots that have rules of their own.
     """
+    places = [
+        *(keys.within(place.namespace, f"{keys.PREFIX}/{place.robot}") for place in robots),
+        keys.ANYWHERE,
+    ]
     return [
         {
             "id": f"rate {number}",
             **({"interfaces": [rate.interface]} if rate.interface else {}),
             "messages": ["put"],
             "flows": ["egress"],
-            "rules": [{"key_expr": f"{keys.ANYWHERE}/{leaf}", "freq": rate.hz} for leaf in REDUCED],
+            "rules": [
+                {"key_expr": f"{place}/{leaf}", "freq": rate.hz} for place in places for leaf in REDUCED
+            ],
         }
         for number, rate in enumerate(rates)
     ]
