@@ -20,6 +20,8 @@ COMMANDS = {
     "unlock": "Make a stopped robot ready to be moved again; exit code 0 if it is.",
     "move": "Move a served robot to a pose.",
     "watch": "Show live what a served robot is doing.",
+    "fleet": "Show the robots that a router reaches and how they are, or stop them all.",
+    "router": "Run a router, through which the robots and clients of a fleet reach each other.",
     "view": "Show a robot on a web page, its vibration magnified.",
     "record": "Record a served robot as MCAP.",
     "analyze": "Measure the motions of a recording, or of another robot's log.",

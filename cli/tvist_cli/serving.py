@@ -54,7 +54,7 @@ def say_who_can_reach(server: "Server", config: "ServeConfig") -> None:
         listed = ", ".join(f"{interface} {port}" for interface, port in ports.items())
         say(f"UR's interfaces are open on {address}: {listed}")
     whom = "this robot" if len(server.robots) == 1 else "these robots"
-    for endpoint in config.listen if config.insecure else ():
+    for endpoint in config.endpoints if config.insecure else ():
         say(f"anyone who can reach {endpoint} can move {whom}")
 
 

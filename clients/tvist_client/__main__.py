@@ -23,6 +23,7 @@ def main(arguments: list[str] | None = None) -> int:
     checking.add_argument(
         "--name", help=f"name of the robot ({NAME}, or else the first robot at the endpoint)"
     )
+    checking.add_argument("--namespace", default="", help="namespace of the robot")
     checking.add_argument(
         "--security", metavar="DIR", help="folder with this client's certificate, for tls/HOST:PORT"
     )
@@ -33,7 +34,13 @@ def main(arguments: list[str] | None = None) -> int:
     )
     checking.add_argument("--json", action="store_true", help="print one JSON object")
     chosen = parser.parse_args(arguments)
-    report = check(chosen.endpoint, chosen.name, alive=chosen.alive, security=chosen.security)
+    report = check(
+        chosen.endpoint,
+        chosen.name,
+        alive=chosen.alive,
+        security=chosen.security,
+        namespace=chosen.namespace,
+    )
     text = msgspec.json.encode(report).decode() if chosen.json else describe(report)
     sys.stdout.write(text + "\n")
     return 0 if report.ok else 1

@@ -58,11 +58,22 @@ class Robot:
         self._robot = robot
 
     @classmethod
-    def connect(cls, endpoint: str = ENDPOINT, name: str = NAME, *, security: Folder | None = None) -> Self:
+    def connect(
+        cls,
+        endpoint: str = ENDPOINT,
+        name: str = NAME,
+        *,
+        security: Folder | None = None,
+        namespace: str = "",
+    ) -> Self:
         """Connect over Zenoh and check that the robot answers."""
         portal = Portal()
         try:
-            robot = portal.call(lambda: asynchronous_robot.Robot.connect(endpoint, name, security=security))
+            robot = portal.call(
+                lambda: asynchronous_robot.Robot.connect(
+                    endpoint, name, security=security, namespace=namespace
+                )
+            )
         except BaseException:
             portal.close()
             raise

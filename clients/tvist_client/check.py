@@ -66,6 +66,7 @@ def check(
     *,
     alive: bool = False,
     security: Folder | None = None,
+    namespace: str = "",
 ) -> CheckReport:
     """Connect to a robot, receive a state, have a command refused, and ask whether the robot may be moved.
 
@@ -77,12 +78,16 @@ def check(
         alive: Check only that the server answers and, in real time, ticks. An orchestrator that uses this does not
             kill a robot that has stopped and is about to be unlocked.
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
+        namespace: Namespace of the robot.
     """
-    return asyncio.run(_Check(endpoint, name, security, alive=alive).run())
+    return asyncio.run(_Check(endpoint, name, security, namespace, alive=alive).run())
 
 
 class _Check:
-    def __init__(self, endpoint: str, name: str | None, security: Folder | None, *, alive: bool) -> None:
+    def __init__(
+        self, endpoint: str, name: str | None, security: Folder | None, namespace: str, *, alive: bool
+    ) -> None:
+        self.namespace = namespace
         self.endpoint, self.name, self.security, self.alive = endpoint, name, security, alive
         self.readiness: Readiness | None = None
         self.robots: list[str] = []
@@ -95,9 +100,11 @@ class _Check:
         try:
             if self.name is not None:
                 check_robot_name(self.name)
-            self.robots = await robots_at(self.endpoint, self.security)
+            self.robots = await robots_at(self.endpoint, self.security, self.namespace)
             self.name = self.name or (self.robots[0] if self.robots and NAME not in self.robots else NAME)
-            async with await Robot.connect(self.endpoint, self.name, security=self.security) as robot:
+            async with await Robot.connect(
+                self.endpoint, self.name, security=self.security, namespace=self.namespace
+            ) as robot:
                 self.passed(step, f"{self.name} at {self.endpoint}{self.beside()}")
                 steps = [("info", self.info), ("state", self.state)]
                 if not self.alive:
@@ -169,7 +176,7 @@ class _Check:
         raise ClientError("a command with an invalid token was accepted: the server does not check control")
 
     async def ready(self, robot: Robot) -> str:
-        command = unlock_command(self.endpoint, str(self.name), self.security)
+        command = unlock_command(self.endpoint, str(self.name), self.security, self.namespace)
         found = self.readiness = await look(robot, command)
         if not found.ready:
             raise ClientError(found.sentence)

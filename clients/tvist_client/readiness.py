@@ -71,7 +71,7 @@ def readiness(info: Info, state: State | None, unlock: str = "tvist unlock") -> 
     safety = info.safety_mode if info.safety_mode is not None or state is None else state.safety_mode
     if robot is None or safety is None:
         return Readiness(True, None, None, None, "", "")
-    robot_mode, safety_mode = _name(RobotMode, robot), _name(SafetyMode, safety)
+    robot_mode, safety_mode = mode_name(RobotMode, robot), mode_name(SafetyMode, safety)
     if safety not in _MAY_MOVE:
         stands, then = f"safety_mode is {safety_mode}", _NEXT.get(safety, "")
     elif robot != RobotMode.RUNNING:
@@ -84,14 +84,16 @@ def readiness(info: Info, state: State | None, unlock: str = "tvist unlock") -> 
     )
 
 
-def unlock_command(endpoint: str, name: str, security: Folder | None) -> str:
+def unlock_command(endpoint: str, name: str, security: Folder | None, namespace: str = "") -> str:
     """Return the command line that unlocks a robot, without options that have their default values."""
     words = ["tvist unlock"]
     words += [endpoint] if endpoint != ENDPOINT else []
     words += ["--name", name] if name != NAME else []
+    words += ["--namespace", namespace] if namespace else []
     words += ["--security", str(security)] if security is not None else []
     return " ".join(words)
 
 
-def _name(kind: type[IntEnum], number: int) -> str:
+def mode_name(kind: type[IntEnum], number: int) -> str:
+    """Return the RTDE name of a mode, or its number if it has none."""
     return kind(number).name if number in {member.value for member in kind} else str(number)

@@ -55,21 +55,27 @@ class Robot(Published, Kinematics):
 
     @classmethod
     async def connect(
-        cls, endpoint: str = ENDPOINT, name: str = NAME, *, security: Folder | None = None
+        cls,
+        endpoint: str = ENDPOINT,
+        name: str = NAME,
+        *,
+        security: Folder | None = None,
+        namespace: str = "",
     ) -> Self:
         """Connect over Zenoh and check that the robot answers.
 
         Args:
-            endpoint: Endpoint of the server, `tcp/<host>:<port>`.
+            endpoint: Endpoint of the server, or of a router it is connected to, `tcp/<host>:<port>`.
             name: Name of the robot.
             security: Folder with this client's certificate, made by `tvist keys`; the endpoint is then
                 `tls/<host>:<port>`.
+            namespace: Namespace of the robot, if it is served in one.
 
         Raises:
             NotConnectedError: No server listens there, the certificate is rejected, or no robot of that name is there
                 or visible.
         """
-        robot = cls(await ZenohTransport.open(endpoint, name, security))
+        robot = cls(await ZenohTransport.open(endpoint, name, security, namespace))
         try:
             await robot.info()
         except BaseException:

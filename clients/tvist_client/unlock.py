@@ -50,6 +50,7 @@ def unlock(
     *,
     power_on: bool = False,
     security: Folder | None = None,
+    namespace: str = "",
 ) -> UnlockReport:
     """Take control, release what a client can release, and check that the robot does not stop again.
 
@@ -60,12 +61,13 @@ def unlock(
         name: Name of the robot; None: the only one at the endpoint, or `ur5e`.
         power_on: Whether to power on the arm and release its brakes if it is off.
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
+        namespace: Namespace of the robot.
 
     Raises:
         NotConnectedError: No server listens there, there is no such robot, or there are several and no name was given.
         RefusedError: Another client has control.
     """
-    return asyncio.run(_unlock(endpoint, name, security, power_on=power_on))
+    return asyncio.run(_unlock(endpoint, name, security, namespace, power_on=power_on))
 
 
 async def make_ready(robot: Robot, arm: Arm, *, power_on: bool = False) -> list[str]:
@@ -113,11 +115,11 @@ async def _rest(robot: Robot) -> None:
 
 
 async def _unlock(
-    endpoint: str, name: str | None, security: Folder | None, *, power_on: bool
+    endpoint: str, name: str | None, security: Folder | None, namespace: str, *, power_on: bool
 ) -> UnlockReport:
-    name = name or await only_robot(endpoint, NAME, security)
-    command = unlock_command(endpoint, name, security)
-    async with await Robot.connect(endpoint, name, security=security) as robot:
+    name = name or await only_robot(endpoint, NAME, security, namespace)
+    command = unlock_command(endpoint, name, security, namespace)
+    async with await Robot.connect(endpoint, name, security=security, namespace=namespace) as robot:
         found, done = await look(robot, command), list[str]()
         if not found.ready:
             async with robot.control(CLIENT) as arm:

@@ -81,7 +81,7 @@ class Controller:
         self._wrench = ToolWrench(setup.description)
         collisions = CollisionModel(setup.description, body(setup.payload))
         self.motion = MotionControl(self.cycle, collisions, self._emit, setup.mode)
-        self.session = Session(timeouts=setup.clock == "realtime")
+        self.session = Session(timeouts=setup.clock == "realtime", instance=setup.instance)
         self._authority = Authority(
             self.session, self._interrupt, self._emit, steppable=setup.clock != "realtime"
         )

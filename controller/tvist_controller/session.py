@@ -69,10 +69,13 @@ class Session:
 
     Args:
         timeouts: Whether a lease ends by itself; in lockstep nothing times out.
+        instance: Part of every token, different after each restart, so that no token of before is valid again; empty
+            where equal runs have to give equal tokens.
     """
 
-    def __init__(self, *, timeouts: bool) -> None:
+    def __init__(self, *, timeouts: bool, instance: str = "") -> None:
         self._timeouts = timeouts
+        self._prefix = f"{instance}." if instance else ""
         self._granted = 0
         self.lease: Lease | None = None
 
@@ -127,4 +130,4 @@ class Session:
 
     def _grant(self, client: str, seconds: float, now: float, session: str | None) -> Lease:
         self._granted += 1
-        return Lease(client, f"{client}#{self._granted}", seconds, now + seconds, session)
+        return Lease(client, f"{client}#{self._prefix}{self._granted}", seconds, now + seconds, session)

@@ -52,6 +52,8 @@ class Setup:
     """Whether the drives lead by the twist of the gears under gravity, so that the arm rests on its target."""
     shape_servo: bool = False
     """Whether `servoj`, `speedj` and `speedl` of programs are shaped where they begin at rest."""
+    instance: str = ""
+    """Part of every lease's token that tells this run from earlier ones; empty where equal runs must be equal."""
 
     @cached_property
     def registry(self) -> Registry:
@@ -105,6 +107,7 @@ class Setup:
             "own_shapers": [msgspec.to_builtins(own.recorded) for own in self.own_shapers],
             "compensate_sag": self.compensate_sag,
             "shape_servo": self.shape_servo,
+            **({"instance": self.instance} if self.instance else {}),
         }
 
     @classmethod
@@ -132,7 +135,11 @@ class Setup:
                 ),
                 **{key: content[key] for key in ("name", "shaper", "seed", "clock", "truth")},
                 # Recordings from before these options existed do not have them.
-                **{key: content[key] for key in ("compensate_sag", "shape_servo") if key in content},
+                **{
+                    key: content[key]
+                    for key in ("compensate_sag", "shape_servo", "instance")
+                    if key in content
+                },
             )
         except KeyError as error:
             raise ValueError(f"initial setup in the recording: {error.args[0]} is missing") from error

@@ -9,6 +9,7 @@ import re
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.values import (
     CLIENT_NAME_PATTERN,
+    NAMESPACE_PATTERN,
     PATTERN_MEANINGS,
     ROBOT_NAME_PATTERN,
     SESSION_PATTERN,
@@ -18,6 +19,12 @@ PREFIX = "tvist"
 ANY_ALIVE = f"{PREFIX}/*/alive"
 """Selects the liveliness tokens of all robots: how a client finds them."""
 
+ANYWHERE_ALIVE = f"**/{ANY_ALIVE}"
+"""Selects the liveliness tokens of all robots of all namespaces, for a session without a namespace."""
+ANYWHERE = f"**/{PREFIX}/*"
+"""Selects all robots of all namespaces; a leaf such as `/state` follows."""
+
+_NAMESPACE = re.compile(NAMESPACE_PATTERN)
 _ROBOT = re.compile(ROBOT_NAME_PATTERN)
 _CLIENT = re.compile(CLIENT_NAME_PATTERN)
 _SESSION = re.compile(SESSION_PATTERN)
@@ -30,6 +37,29 @@ def check_robot_name(name: str) -> str:
         ProtocolError: The name is not `[a-z0-9][a-z0-9_-]{0,63}`; code `out_of_range`, where `robot`.
     """
     return _checked("robot", name, _ROBOT)
+
+
+def check_namespace(name: str) -> str:
+    """Give back a namespace if it may precede a key.
+
+    Raises:
+        ProtocolError: It is not 1 to 8 chunks like a robot's name, separated by `/`; code `out_of_range`, where
+            `namespace`.
+    """
+    return _checked("namespace", name, _NAMESPACE)
+
+
+def within(namespace: str, key: str) -> str:
+    """Key as the network carries it: behind its namespace; an empty one changes nothing."""
+    return f"{namespace}/{key}" if namespace else key
+
+
+def place(key: str) -> tuple[str, str] | None:
+    """Namespace (empty if there is none) and name of the robot that a key belongs to; None if it is no robot's."""
+    above, prefix, rest = f"/{key}".rpartition(f"/{PREFIX}/")
+    robot, slash, leaf = rest.partition("/")
+    sound = prefix and slash and leaf and _ROBOT.match(robot)
+    return (above.removeprefix("/"), robot) if sound else None
 
 
 def check_client_name(name: str) -> str:

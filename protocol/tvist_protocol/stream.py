@@ -211,3 +211,5 @@ class Telemetry(Struct, frozen=True, kw_only=True, tag_field="type", tag="teleme
     """Number of commands received."""
     refused: int
     """Number of commands refused."""
+    load: float | None = None
+    """Share of the last second in which the thread that ticks worked for this robot [-]; null: a client steps time."""

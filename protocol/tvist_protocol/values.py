@@ -14,6 +14,9 @@ PROTOCOL_VERSION = 1
 ROBOT_NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$(?!\n)"
 """Pattern of a robot's name, which is one chunk of a key. `$` alone would allow a final line feed."""
 
+NAMESPACE_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}(/[a-z0-9][a-z0-9_-]{0,63}){0,7}$(?!\n)"
+"""Pattern of a namespace: chunks that precede a robot's keys, such as `hall-3/line-1`."""
+
 CLIENT_NAME_PATTERN = r"^(?!@)(?!.*[/*?#$])[ -~]{1,64}$(?!\n)"
 """Pattern of a client's name, which is one chunk of a key, `client/<client>`: printable ASCII without `/ * ? # $`. No
 wildcard matches a chunk that begins with `@`, so the server would not notice when such a client leaves."""
@@ -26,6 +29,7 @@ PROGRAM_NAME_PATTERN = r"^[^\x00-\x1f\x7f]{1,256}$(?!\n)"
 
 PATTERN_MEANINGS: dict[str, str] = {
     PROGRAM_NAME_PATTERN: "1 to 256 characters other than control characters",
+    NAMESPACE_PATTERN: "1 to 8 words separated by /, each 1 to 64 of a-z 0-9 _ -, the first a letter or a digit",
     ROBOT_NAME_PATTERN: "1 to 64 of a-z 0-9 _ -, the first a letter or a digit",
     SESSION_PATTERN: "1 to 32 of 0-9 a-f, Zenoh's id of a session",
     CLIENT_NAME_PATTERN: "1 to 64 printable ASCII characters other than / * ? # $, the first not @",
@@ -107,6 +111,7 @@ Token = Annotated[str, Meta(max_length=128)]
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
 """Name of a shaper, an estimator, a calibration or a fault; the server checks that it exists."""
 RobotName = Annotated[str, Meta(pattern=ROBOT_NAME_PATTERN)]
+Namespace = Annotated[str, Meta(pattern=NAMESPACE_PATTERN)]
 ClientName = Annotated[str, Meta(pattern=CLIENT_NAME_PATTERN)]
 
 ResetMode = Literal["RUNNING", "IDLE", "POWER_OFF"]

@@ -31,22 +31,31 @@ def refused_to_start(*options, endpoint=None):
 
 
 class Served:
-    """A robot in a process of its own; several where there is no name but the option --robots."""
+    """A robot in a process of its own; several where there is no name but the option --robots.
+
+    Args:
+        options: Further options.
+        name: Name of the robot.
+        endpoint: Where it listens.
+        router: Where it connects to instead.
+        around: Words before the command line, such as `ip netns exec`.
+    """
 
     program = ("-m", "tvist_cli", "serve")
     """What Python runs."""
 
-    def __init__(self, *options, name="ur5e", endpoint=None):
-        beside_others = "PYTEST_XDIST_WORKER" in os.environ and "lockstep" not in options
+    def __init__(self, *options, name="ur5e", endpoint=None, router=None, around=()):
+        beside_others = "PYTEST_XDIST_WORKER" in os.environ and self.needs_the_machine(options)
         assert not beside_others, (
             "a robot in real time needs the machine: mark the test `realtime`, run it without -n"
         )
-        self.name, self.endpoint = name, endpoint or free_endpoint()
+        self.name, self.endpoint = name, router or endpoint or free_endpoint()
         self.lines = []
+        where = "--listen" if router is None else "--connect"
         named = () if name is None else ("--name", name)
         self._news = threading.Condition()
         self.process = subprocess.Popen(
-            [sys.executable, *self.program, "--listen", self.endpoint, *named, *options],
+            [*around, sys.executable, *self.program, where, self.endpoint, *named, *options],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
@@ -55,14 +64,18 @@ class Served:
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
+    def needs_the_machine(self, options):
+        """Whether time passes by itself in this process."""
+        return "lockstep" not in options
+
     def wait_until_ready(self):
         """Wait until it says that it listens."""
 
         def said():
-            return any("listens on" in line for line in self.lines) or not self._reader.is_alive()
+            return any("listens " in line for line in self.lines) or not self._reader.is_alive()
 
         with self._news:
-            listens = self._news.wait_for(said, PATIENCE) and "listens on" in self.said
+            listens = self._news.wait_for(said, PATIENCE) and "listens " in self.said
         if not listens:
             self.kill()
             raise AssertionError(f"tvist serve did not come up: {self.said}")

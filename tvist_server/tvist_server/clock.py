@@ -184,6 +184,7 @@ class Realtime(Clock):
                 robot.host.missed(missed)
             robot.jobs.do_waiting()
             robot.host.tick()
+            robot.lateness.worked(now() - begun)
             if alone or begun - handed_on >= HAND_ON_EVERY:
                 handed_on = begun
                 self._hand_on()

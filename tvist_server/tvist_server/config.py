@@ -18,7 +18,7 @@ from tvist_protocol.calibration import Calibration
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Clock
-from tvist_protocol.values import RobotName, Seed
+from tvist_protocol.values import Namespace, RobotName, Seed
 from tvist_server.durations import ticks_of
 from tvist_server.fleet import members
 from tvist_server.initial import read_state, shaped_by
@@ -49,10 +49,15 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Name of a robot that comes with the package, or path of a robot file."""
     robots: str | None = None
     """Several robots, ROBOT[*COUNT] separated by commas and named after their files; replaces `name` and `robot`."""
-    listen: tuple[str, ...] = (DEFAULT_ENDPOINT,)
-    """Zenoh endpoints to listen on."""
+    listen: tuple[str, ...] | None = None
+    """Zenoh endpoints to listen on; default: `DEFAULT_ENDPOINT`, and none with `connect`."""
+    connect: tuple[str, ...] = ()
+    """Zenoh endpoints of routers to connect to; the robot uses the first that answers."""
+    namespace: Namespace | None = None
+    """Chunks that precede the robot's keys, so that robots of several places can share a network."""
     security: str | None = None
-    """Folder with certificates and roles, made by `tvist keys`; endpoints are then tls/…"""
+    """Folder with certificates and roles, made by `tvist keys`; endpoints are then tls/… With `connect`, the folder of
+    a client with the role robot."""
     insecure: bool = False
     """Accept remote connections without TLS and do not authenticate clients; anyone can move the robot."""
     profile: ProfileName | None = None
@@ -188,6 +193,29 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             raise ConfigError(f"ur_address is {self.ur_address}: several robots need one address each")
         return str(address), self.ur_ports.open()
 
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Endpoints to listen on."""
+        return (() if self.connect else (DEFAULT_ENDPOINT,)) if self.listen is None else self.listen
+
+    @property
+    def place(self) -> str:
+        """Where clients reach the robots, for people."""
+        places = [f"on {', '.join(self.endpoints)}"] if self.endpoints else []
+        places += [f"through the router at {', '.join(self.connect)}"] if self.connect else []
+        return " and ".join(places) + (f" in namespace {self.namespace}" if self.namespace else "")
+
+    def check_network(self) -> None:
+        """Check what the options of the network ask of each other.
+
+        Raises:
+            ConfigError: They exclude each other.
+        """
+        if self.connect and self.endpoints and self.security is not None:
+            raise ConfigError(
+                "connect, listen and security exclude each other: the router checks certificates, so leave listen out"
+            )
+
     def command_line(self, command: str, name: str) -> str:
         """Return the command line that reaches a robot from this machine.
 
@@ -196,10 +224,12 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             name: Name of the robot.
         """
         words = ["tvist", command]
-        if self.listen and self.listen[0] != DEFAULT_ENDPOINT:
-            here = self.listen[0].replace("0.0.0.0", "127.0.0.1").replace("[::]", "[::1]")  # noqa: S104  only said
+        first = (*self.endpoints, *self.connect)[0]
+        if first != DEFAULT_ENDPOINT:
+            here = first.replace("0.0.0.0", "127.0.0.1").replace("[::]", "[::1]")  # noqa: S104  only said
             words.append(here)
         words += ["--name", name] if name != DEFAULT_NAME else []
+        words += ["--namespace", self.namespace] if self.namespace else []
         return " ".join([*words, "--security", "FOLDER"] if self.security is not None else words)
 
     def setup(self) -> Setup:

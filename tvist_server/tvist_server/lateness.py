@@ -18,6 +18,8 @@ class Punctuality:
     p50_us: float
     p99_us: float
     max_us: float
+    load: float
+    """Share of the time in which ticks and the jobs between them were carried out [-]."""
 
 
 class Lateness:
@@ -26,6 +28,7 @@ class Lateness:
     def __init__(self) -> None:
         self._late = np.zeros(KEPT)
         self._count = 0
+        self._worked = 0.0
         self._looked, self._looked_at = 0, time.monotonic()
 
     def note(self, late: float) -> None:
@@ -33,13 +36,19 @@ class Lateness:
         self._late[self._count % KEPT] = late
         self._count += 1
 
+    def worked(self, seconds: float) -> None:
+        """Add the time that a tick and the jobs before it took [s]."""
+        self._worked += seconds
+
     def look(self) -> Punctuality:
         """Return the lateness since the last call."""
         count, now = self._count, time.monotonic()
         late = self._late[np.arange(max(self._looked, count - KEPT), count) % KEPT] * 1e6
         seconds, ticks = now - self._looked_at, count - self._looked
         self._looked, self._looked_at = count, now
+        worked, self._worked = self._worked, 0.0  # a tick that ends between the two is not counted
+        load = worked / seconds if seconds > 0.0 else 0.0
         if not len(late):
-            return Punctuality(0, seconds, 0.0, 0.0, 0.0)
+            return Punctuality(0, seconds, 0.0, 0.0, 0.0, load)
         p50, p99 = np.percentile(late, (50, 99))
-        return Punctuality(ticks, seconds, float(p50), float(p99), float(late.max()))
+        return Punctuality(ticks, seconds, float(p50), float(p99), float(late.max()), load)

@@ -76,14 +76,14 @@ class ServedRobot:
                 setup.to_builtins(),
                 keep=keep,
                 wait=lockstep,
-                on_error=self._warn,
-                on_moved=self._warn,
+                on_error=self.warn,
+                on_moved=self.warn,
             )
         black_box = BlackBox(dump, lambda: info_of(self.controller), setup.to_builtins())
         self._publisher = Publisher(lossless=lockstep)
         sinks: list[Sink] = [] if self.recorder is None else [self.recorder]
         sinks += [] if observe is None else [observe(self.controller)]
-        self.sockets = ProgramSockets(self._hear, self._warn, hosts)
+        self.sockets = ProgramSockets(self._hear, self.warn, hosts)
         """Gateway for the sockets of programs."""
         self._host = Host(self.controller, *sinks, black_box, self._publisher, ports=self.sockets)
         self.driven = Mailbox(self._host, self.sockets.patience)
@@ -201,7 +201,7 @@ class ServedRobot:
         gateways = self._gateways
         late, lost, limited = controller.motion.streams.counters()
         refused = reception.setpoints_refused + sum(gateway.setpoints_refused for gateway in gateways)
-        on_time = punctuality or Punctuality(0, 1.0, 0.0, 0.0, 0.0)
+        on_time = punctuality or Punctuality(0, 1.0, 0.0, 0.0, 0.0, 0.0)
         return Telemetry(
             tick=controller.tick_number,
             ticks_per_second=on_time.ticks / on_time.seconds,
@@ -218,6 +218,7 @@ class ServedRobot:
             setpoints_limited=limited,
             commands=counters.commands + reception.commands_refused,
             refused=counters.refused + reception.commands_refused,
+            load=None if punctuality is None else punctuality.load,
         )
 
     def close_recording(self) -> None:
@@ -240,7 +241,7 @@ class ServedRobot:
 
         self.driven.post(hear)
 
-    def _warn(self, why: str) -> None:
+    def warn(self, why: str) -> None:
         """Publish a warning to clients and the console."""
         self.driven.post(lambda: self._host.warn(why))
 

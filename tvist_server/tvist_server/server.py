@@ -3,8 +3,10 @@
 import asyncio
 import contextlib
 import gc
+import secrets
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from threading import Thread
@@ -20,7 +22,7 @@ from tvist_server.ending import Ending
 from tvist_server.fleet import recording_of
 from tvist_server.gateways.base import Gateway
 from tvist_server.gateways.console import Console, ConsoleGateway
-from tvist_server.gateways.exposure import ExposureError, guarded, guarded_interfaces
+from tvist_server.gateways.exposure import ExposureError, check_endpoints, guarded, guarded_interfaces
 from tvist_server.gateways.network import Network
 from tvist_server.gateways.ur.interfaces import UrInterfaces
 from tvist_server.robot import ServedRobot
@@ -28,6 +30,10 @@ from tvist_server.ur_ports import InterfaceName
 
 LEAVE = 0.6
 """Longest time that clients have at shutdown to read pending messages [s]."""
+
+
+INSTANCE_BYTES = 4
+"""Random bytes that tell the tokens of this run from those of earlier ones."""
 
 
 class Server:
@@ -44,14 +50,20 @@ class Server:
     """
 
     def __init__(self, config: ServeConfig, observe: Callable[[Controller], Sink] | None = None) -> None:
+        config.check_network()
         setups = config.setups()
+        if config.clock == "realtime":  # equal runs in lockstep are equal, tokens included
+            setups = [replace(setup, instance=secrets.token_hex(INSTANCE_BYTES)) for setup in setups]
         self._observed = observe is not None
         try:
+            check_endpoints("connect", config.connect)
+            # A router checks the certificates of those who reach the robot through it.
             listen, guard = guarded(
-                config.listen,
+                config.endpoints,
                 [setup.name for setup in setups],
-                security=config.security,
+                security=None if config.connect else config.security,
                 insecure=config.insecure,
+                namespace=config.namespace or "",
             )
         except ExposureError as error:
             raise ConfigError(str(error)) from error
@@ -64,7 +76,15 @@ class Server:
                 self.robots.append(_robot(setup, config, observe, several=len(setups) > 1))
             self._couriers, self._clocks = _drivers(config, self.robots)
             lockstep = config.clock != "realtime"
-            self._network = Network(listen, guard, lockstep=lockstep)
+            self._network = Network(
+                listen,
+                guard,
+                lockstep=lockstep,
+                connect=config.connect,
+                security=config.security,
+                namespace=config.namespace or "",
+                on_router=partial(self._tell_router, ", ".join(config.connect)),
+            )
             self._console = Console()
             self._interfaces: list[UrInterfaces] = []
             self.ur: list[tuple[str, dict[InterfaceName, int]]] = []
@@ -87,6 +107,16 @@ class Server:
         """
         for interfaces in self._interfaces:
             interfaces.adopt(host, token)
+
+    def _tell_router(self, where: str, there: bool) -> None:
+        """Tell clients, console and recording that the router was lost or is back."""
+        why = (
+            "is back"
+            if there
+            else "was lost; the robot tries to reach it again, and keeps leases by their time"
+        )
+        for robot in self.robots:
+            robot.warn(f"the connection to the router at {where} {why}")
 
     def discard(self) -> None:
         """Close the robots of a server that has not started, and remove their recordings."""

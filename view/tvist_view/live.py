@@ -40,7 +40,13 @@ NO_TRUTH = (
 
 
 async def show_robot(
-    server: ViserServer, endpoint: str, name: str, security: Path | None, *, factor: float = 1.0
+    server: ViserServer,
+    endpoint: str,
+    name: str,
+    security: Path | None,
+    namespace: str = "",
+    *,
+    factor: float = 1.0,
 ) -> None:
     """Show a robot until cancelled; while there is none the page says so, and waits for it.
 
@@ -49,6 +55,7 @@ async def show_robot(
         endpoint: Zenoh endpoint of the robot.
         name: Name of the robot.
         security: Folder with a certificate for the robot's server.
+        namespace: Namespace of the robot.
         factor: Magnification to begin with.
     """
     notice = _Notice(server, f"Looking for robot {name} at {endpoint} …")
@@ -68,7 +75,7 @@ async def show_robot(
     while True:
         lead = "No robot"
         try:
-            async with await Robot.connect(endpoint, name, security=security) as robot:
+            async with await Robot.connect(endpoint, name, security=security, namespace=namespace) as robot:
                 lead = "The robot cannot be drawn"
                 page = LivePage(server, robot, await robot.info(), factor=factor)
                 lead = "The robot has gone"

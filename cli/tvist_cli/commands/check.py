@@ -12,6 +12,7 @@ def check(
     name: str | None = None,
     alive: bool = False,
     security: Path | None = None,
+    namespace: str = "",
     json: bool = False,
 ) -> None:
     """Check that a served robot answers and is ready to be moved, without changing anything.
@@ -24,12 +25,13 @@ def check(
         name: Name of the robot [ur5e; if there is none, the first robot at the endpoint, and all of them are listed].
         alive: Check only that the server answers and, in real time, ticks. A robot that has stopped passes, too, so
             that an orchestrator does not kill one that somebody is about to unlock.
+        namespace: Namespace of the robot, if it is served in one.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         json: Print one JSON object.
     """
     from tvist_client.check import check as run
 
-    report = run(endpoint, name, alive=alive, security=security)
+    report = run(endpoint, name, alive=alive, security=security, namespace=namespace)
     if json:
         print_json(report)
     else:

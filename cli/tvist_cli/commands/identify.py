@@ -36,6 +36,7 @@ def identify(
     robot: str = ROBOT,
     description: str | None = None,
     security: Path | None = None,
+    namespace: str = "",
     model: Literal["polynomial", "modal"] = "polynomial",
     payload: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     configurations: int = 160,
@@ -65,6 +66,7 @@ def identify(
         name: Name of the calibration; default: the name of the file.
         robot: Name of the served robot; in this process, the robot file.
         description: Robot file with the link masses of a served robot; default: the UR5e's.
+        namespace: Namespace of the robot, if it is served in one.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         model: Model to fit.
         payload: Mass of the disc that the robot simulated in this process carries in kg. Without a mass: identify the
@@ -100,7 +102,7 @@ def identify(
 
     with told(DescriptionError, code=2):
         arm = load(description or (robot if endpoint is None else ROBOT))
-    place = _Place(endpoint, robot, security, mass, seed)
+    place = _Place(endpoint, robot, security, namespace, mass, seed)
     called = name or output.stem
     if payload is not None and mass is None:
         _payload(place, arm, poses, declare=declare, json=json)
@@ -117,13 +119,20 @@ class _Place:
     """The robot to identify: a served one, or one in this process."""
 
     def __init__(
-        self, endpoint: str | None, robot: str, security: Path | None, mass: float | None, seed: int
+        self,
+        endpoint: str | None,
+        robot: str,
+        security: Path | None,
+        namespace: str,
+        mass: float | None,
+        seed: int,
     ) -> None:
         from tvist_controller.setup import check_rating
         from tvist_lab.in_process import free_setup
         from tvist_server.config import ConfigError, from_mapping
 
-        self.endpoint, self.robot, self.security, self.mass, self.seed = endpoint, robot, security, mass, seed
+        self.endpoint, self.robot, self.mass, self.seed = endpoint, robot, mass, seed
+        self.security, self.namespace = security, namespace
         self._setup = None
         if endpoint is None:
             content = {
@@ -172,7 +181,9 @@ class _Place:
             if self._setup is not None:
                 client = await stack.enter_async_context(robot_in_process(self._setup))
             else:
-                connected = await Robot.connect(str(self.endpoint), self.robot, security=self.security)
+                connected = await Robot.connect(
+                    str(self.endpoint), self.robot, security=self.security, namespace=self.namespace
+                )
                 client = await stack.enter_async_context(connected)
             yield client, await stack.enter_async_context(client.control("identify"))
 

@@ -18,6 +18,7 @@ NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 AUTHORITY_KEY = "authority.key"
 HEAD = """\
 # Role of each client, by the common name of its certificate: an "operator" may move the robot, a "viewer" may watch it.
+# A router knows two more: a "robot" of that name or namespace, and another "router", which may do everything.
 # A client that is not listed has no access: delete its line and restart the robot to revoke its rights.
 """
 
@@ -29,6 +30,8 @@ def keys(
     host: list[str] | None = None,
     operator: list[str] | None = None,
     viewer: list[str] | None = None,
+    member: list[str] | None = None,
+    uplink: list[str] | None = None,
     days: int = 365,
     json: bool = False,
 ) -> None:
@@ -42,6 +45,8 @@ def keys(
         host: Host name or IP address under which clients reach the robot, repeatable; required the first time.
         operator: Name of a client that may move the robot, repeatable.
         viewer: Name of a client that may only watch the robot, repeatable.
+        member: Name of a robot, or of a namespace of robots, that connects to the router of this folder, repeatable.
+        uplink: Name of another router that connects to the router of this folder, repeatable.
         days: Number of days that the new certificates are valid.
         json: Print one JSON object.
     """
@@ -58,7 +63,14 @@ def keys(
     with told(ValueError, code=2):
         if robot is not None:
             check_robot_name(robot)
-        asked = _roles(operator or [], viewer or [])
+        asked = _roles(
+            {
+                "operator": operator or [],
+                "viewer": viewer or [],
+                "robot": member or [],
+                "router": uplink or [],
+            }
+        )
         hosts = _hosts(host or [])
     with told(CertificateError, ExposureError, OSError):
         ring = _KeyRing(folder, days)
@@ -183,15 +195,19 @@ class _KeyRing:
         self.roles[name] = role
 
 
-def _roles(operators: Sequence[str], viewers: Sequence[str]) -> "dict[str, Role]":
-    for name in (*operators, *viewers):
-        if not NAME.fullmatch(name):
-            raise ValueError(
-                f"client is {name!r:.80}: must be 1 to 64 of A-Z a-z 0-9 _ -, beginning with a letter or digit"
-            )
-        if name in operators and name in viewers:
-            raise ValueError(f"{name} cannot be both operator and viewer: an operator may watch, too")
-    return {**dict.fromkeys(operators, "operator"), **dict.fromkeys(viewers, "viewer")}
+def _roles(names: "dict[Role, list[str]]") -> "dict[str, Role]":
+    asked: dict[str, Role] = {}
+    for role, several in names.items():
+        for name in several:
+            if not NAME.fullmatch(name):
+                raise ValueError(
+                    f"client is {name!r:.80}: must be 1 to 64 of A-Z a-z 0-9 _ -, beginning with a letter or digit"
+                )
+            if asked.get(name, role) != role:
+                more = ": an operator may watch, too" if {role, asked[name]} == {"operator", "viewer"} else ""
+                raise ValueError(f"{name} cannot be both {asked[name]} and {role}{more}")
+            asked[name] = role
+    return asked
 
 
 def _hosts(names: Sequence[str]) -> "tuple[Host, ...]":

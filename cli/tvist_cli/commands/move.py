@@ -25,6 +25,7 @@ def move(
     endpoint: str = "tcp/127.0.0.1:7447",
     name: str | None = None,
     security: Path | None = None,
+    namespace: str = "",
     degrees: bool = False,
     velocity: float | None = None,
     acceleration: float | None = None,
@@ -44,6 +45,7 @@ def move(
             --line --by 0,0,-0.1 moves the tool 0.1 m down.
         endpoint: Zenoh endpoint of the robot.
         name: Name of the robot [ur5e; if there is none, the only robot at the endpoint].
+        namespace: Namespace of the robot, if it is served in one.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         degrees: Read the target's angles in degrees; the limits stay in rad.
         velocity: Velocity limit of every joint in rad/s [1.5], or of the tool in m/s with --line [0.25].
@@ -64,11 +66,11 @@ def move(
 
     async def run() -> tuple[int, int]:
         nonlocal held
-        found = name if name is not None else await only_robot(endpoint, NAME, security)
-        async with await Robot.connect(endpoint, found, security=security) as robot:
+        found = name if name is not None else await only_robot(endpoint, NAME, security, namespace)
+        async with await Robot.connect(endpoint, found, security=security, namespace=namespace) as robot:
             info = await robot.info()
             q = () if line else pose(target, info.poses, "target", degrees=degrees)
-            standing = await look(robot, unlock_command(endpoint, found, security))
+            standing = await look(robot, unlock_command(endpoint, found, security, namespace))
             if not standing.ready:
                 raise Failure(f"{found} is not ready: {standing.sentence}")
             async with robot.control("tvist move") as arm:

@@ -13,6 +13,7 @@ def record(
     endpoint: str = "tcp/127.0.0.1:7447",
     name: str = "ur5e",
     security: Path | None = None,
+    namespace: str = "",
     seconds: float | None = None,
     keep: str | None = None,
     json: bool = False,
@@ -25,6 +26,7 @@ def record(
         file: MCAP file to write.
         endpoint: Zenoh endpoint of the robot.
         name: Name of the robot.
+        namespace: Namespace of the robot, if it is served in one.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         seconds: Stop this many seconds after the first state.
         keep: Keep the last 90s, 10min or 2h, and at most twice as much, and forget what was before [keep all].
@@ -45,7 +47,7 @@ def record(
         ticks: list[int] = []
         ended, loop = asyncio.Event(), asyncio.get_running_loop()
         ending.hear(lambda: loop.call_soon_threadsafe(ended.set))
-        async with await Robot.connect(endpoint, name, security=security) as robot:
+        async with await Robot.connect(endpoint, name, security=security, namespace=namespace) as robot:
             with Recorder(file, await robot.info(), {}, keep=kept, on_error=say, on_moved=say) as recorder:
                 robot.on_state(recorder.state)
                 robot.on_state(lambda state: ticks.append(state.tick))

@@ -204,7 +204,7 @@ class _Job:
         def ready() -> None:
             setups = [robot.setup for robot in server.robots]
             told_of = introduction(setups, config.profile_in_force)
-            say(f"{told_of} on {', '.join(config.listen)} while {named(self.file)} runs")
+            say(f"{told_of} {config.place} while {named(self.file)} runs")
 
         say_who_can_reach(server, config)
         asyncio.run(served.run(ready, self.tell))

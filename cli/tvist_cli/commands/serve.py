@@ -25,6 +25,8 @@ def serve(
     robot: str | None = None,
     robots: str | None = None,
     listen: list[str] | None = None,
+    connect: list[str] | None = None,
+    namespace: str | None = None,
     security: str | None = None,
     insecure: bool = False,
     profile: str | None = None,
@@ -60,9 +62,13 @@ def serve(
         robot: Name of a robot that comes with the package, or path of a robot file [ur5e].
         robots: Serve several robots, given as `ROBOT[*COUNT]` separated by commas: `ur5e*2,other.toml` serves
             ur5e-1, ur5e-2 and other. Replaces --name and --robot.
-        listen: Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447].
+        listen: Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447; none with --connect].
+        connect: Endpoint of a router through which clients reach the robot, repeatable: the robot uses the first that
+            answers. If none does within 10 s, the command fails; a router that is lost later is looked for again.
+        namespace: Words separated by / that precede the robot's keys, such as hall-3, so that robots of one name can
+            share a network. Clients give the same --namespace.
         security: Folder made by tvist keys. The endpoint is then tls/ADDRESS:PORT, and clients without a role have no
-            access.
+            access. With --connect, the folder of a robot, made by tvist keys --member; the router checks clients.
         insecure: Accept remote connections without TLS and do not authenticate clients; anyone can move the robot.
         profile: Set of defaults. ursim is like UR's simulator: it starts an arm of UR's kind in URSim's posture, with a
             payload of 0 kg, shaper none, --quiet, --no-floor and --compensate-sag. real starts in the same posture and
@@ -109,7 +115,8 @@ def serve(
         config: TOML file with any of these options; options on the command line take precedence.
     """
     given: dict[str, Any] = {
-        "name": name, "robot": robot, "robots": robots, "listen": listen, "security": security,
+        "name": name, "robot": robot, "robots": robots, "listen": listen, "connect": connect,
+        "namespace": namespace, "security": security,
         "insecure": insecure or None, "profile": lower(profile), "payload": payload,
         "overload": overload or None, "shaper": lower(shaper), "shape_servo": shape_servo or None,
         "calibration": calibration, "clock": lower(clock), "speed": speed,
@@ -140,7 +147,7 @@ def serve(
         took = time.monotonic() - began
         say(
             f"{introduction([robot.setup for robot in server.robots], checked.profile_in_force)} "
-            f"on {', '.join(checked.listen)}, "
+            f"{checked.place}, "
             f"clock {checked.clock}; ready after {took:.1f} s. Press Control+C to stop."
         )
 

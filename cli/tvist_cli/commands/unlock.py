@@ -12,6 +12,7 @@ def unlock(
     name: str | None = None,
     power_on: bool = False,
     security: Path | None = None,
+    namespace: str = "",
     json: bool = False,
 ) -> None:
     """Take control of a served robot and clear what keeps it from moving.
@@ -24,13 +25,14 @@ def unlock(
         endpoint: Zenoh endpoint of the robot.
         name: Name of the robot [the only robot at the endpoint, or ur5e].
         power_on: If the arm has no power, switch it on and release the brakes.
+        namespace: Namespace of the robot, if it is served in one.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         json: Print one JSON object.
     """
     from tvist_client.unlock import unlock as run
 
     with told():
-        report = run(endpoint, name, power_on=power_on, security=security)
+        report = run(endpoint, name, power_on=power_on, security=security, namespace=namespace)
     if json:
         print_json(report)
     else:

@@ -26,6 +26,7 @@ def view(
     *,
     name: str = "ur5e",
     security: Path | None = None,
+    namespace: str = "",
     compare: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
     robot: str = "ur5e",
     magnify: float | None = None,
@@ -43,6 +44,7 @@ def view(
     Args:
         what: Zenoh endpoint of a served robot, or MCAP file.
         name: Name of the served robot.
+        namespace: Namespace of the robot, if it is served in one.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         compare: Two or three shapers to simulate and to show beside each other: --compare none auto.
         robot: Name of the robot to simulate with --compare, or path of a robot file.
@@ -60,7 +62,7 @@ def view(
     if tracks is None:
         if gif is not None or html is not None:
             raise Failure("--gif and --html need a recording or --compare", code=2)
-        _live(what, name, security, factor, (address, port), insecure=insecure)
+        _live(what, name, security, namespace, factor, (address, port), insecure=insecure)
         return
     lasts = max(track.end for track in tracks) - min(track.start for track in tracks)
     if (gif or html) and lasts > LONGEST_S:
@@ -80,12 +82,19 @@ def _is_file(what: str) -> bool:
 
 
 def _live(
-    endpoint: str, name: str, security: Path | None, factor: float, place: tuple[str, int], *, insecure: bool
+    endpoint: str,
+    name: str,
+    security: Path | None,
+    namespace: str,
+    factor: float,
+    place: tuple[str, int],
+    *,
+    insecure: bool,
 ) -> None:
     from tvist_view.live import show_robot
 
     serve_page(
-        lambda server: show_robot(server, endpoint, name, security, factor=factor),
+        lambda server: show_robot(server, endpoint, name, security, namespace, factor=factor),
         place,
         f"tvist {name}",
         insecure=insecure,

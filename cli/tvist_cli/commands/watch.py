@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 
 def watch(
-    endpoint: str = "tcp/127.0.0.1:7447",
-    *,
+    *where: str,
     name: str = "ur5e",
     security: Path | None = None,
+    namespace: str = "",
     seconds: float | None = None,
     json: bool = False,
 ) -> None:
@@ -31,9 +31,14 @@ def watch(
 
     If the robot is not ready to move, the second line says why, even if it stopped before the command started.
 
+    Given a key with wildcards such as `tvist/*/state`, show the newest states of all robots that it selects, one line
+    each.
+
     Args:
-        endpoint: Zenoh endpoint of the robot.
+        where: Zenoh endpoint of the robot or router [tcp/127.0.0.1:7447], and a key of states if it is about many
+            robots.
         name: Name of the robot.
+        namespace: Namespace of the robot, if it is served in one.
         security: Folder with this client's certificate, made by tvist keys; the endpoint is then tls/HOST:PORT.
         seconds: Stop after this many seconds.
         json: Print each event, and the state ten times a second, as one JSON object per line.
@@ -41,12 +46,18 @@ def watch(
     if seconds is not None and seconds <= 0.0:
         raise Failure(f"seconds is {seconds:g}: must be more than 0", code=2)
     from tvist_client.readiness import unlock_command
-    from tvist_client.robot import Robot
+    from tvist_client.robot import ENDPOINT, Robot
 
-    command = unlock_command(endpoint, name, security)
+    selector, endpoint = _places(where, ENDPOINT)
+    if selector is not None:
+        from tvist_cli.many import watch_many
+
+        watch_many(selector, endpoint, namespace, security, seconds, json=json)
+        return
+    command = unlock_command(endpoint, name, security, namespace)
 
     async def run() -> None:
-        async with await Robot.connect(endpoint, name, security=security) as robot:
+        async with await Robot.connect(endpoint, name, security=security, namespace=namespace) as robot:
             events: list[Event] = []
             robot.on_event(events.append)
             standing = _Standing(robot, command)
@@ -68,6 +79,15 @@ def watch(
             raise interrupted(
                 f"watched for {time.monotonic() - began:.1f} s; the robot keeps running"
             ) from None
+
+
+def _places(where: tuple[str, ...], default: str) -> tuple[str | None, str]:
+    """Tell a key of states, if one is given, from an endpoint."""
+    selectors = [word for word in where if "*" in word or word.endswith("/state")]
+    endpoints = [word for word in where if word not in selectors]
+    if len(selectors) > 1 or len(endpoints) > 1:
+        raise Failure("watch takes one endpoint and one key of states: leave the others out", code=2)
+    return selectors[0] if selectors else None, endpoints[0] if endpoints else default
 
 
 class _Standing:

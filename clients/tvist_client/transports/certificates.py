@@ -61,10 +61,15 @@ def settings(endpoint: str, security: Folder | None) -> dict[str, Any]:
     }
 
 
-def why_refused(endpoint: str, security: Folder) -> str | None:
+def why_refused(endpoint: str, security: Folder, whose: str = "robot") -> str | None:
     """Return why no session could be opened, judged by a handshake of our own, since Zenoh does not report it.
 
     This blocks for at most twice `PROBE_S`.
+
+    Args:
+        endpoint: Endpoint of the server.
+        security: The client's folder.
+        whose: What listens there, for the sentence.
 
     Returns:
         A reason; None if the handshake succeeds or no server listens.
@@ -85,9 +90,11 @@ def why_refused(endpoint: str, security: Folder) -> str | None:
             # In TLS 1.3 a server judges the client's certificate after the handshake, so its verdict has to be read.
             encrypted.recv(1)
     except ssl.SSLCertVerificationError as error:
-        return f"the robot's certificate is not trusted: {error.verify_message.rstrip('.')}"
+        return f"the {whose}'s certificate is not trusted: {error.verify_message.rstrip('.')}"
     except ssl.SSLError as error:
-        return f"the robot rejects this certificate: {(error.reason or str(error)).replace('_', ' ').lower()}"
+        return (
+            f"the {whose} rejects this certificate: {(error.reason or str(error)).replace('_', ' ').lower()}"
+        )
     except (OSError, ValueError):
         return None
     return None

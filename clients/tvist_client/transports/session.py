@@ -12,6 +12,7 @@ import zenoh
 from tvist_client.errors import NotConnectedError
 from tvist_client.transports.certificates import Folder, settings, why_refused
 from tvist_protocol.errors import quoted
+from tvist_protocol.keys import check_namespace
 
 _PORT = "[1-9]\\d{0,3}|[1-5]\\d{4}|6[0-4]\\d{3}|65[0-4]\\d{2}|655[0-2]\\d|6553[0-5]"
 _ENDPOINT = re.compile(rf"(?!(tcp|tls|udp|quic|ws)/)[a-z]+[/-].*|[a-z]+/\S+:({_PORT})([?#].*)?")
@@ -25,20 +26,24 @@ CONFIG: Mapping[str, Any] = {
 """Zenoh settings of a session, by path."""
 
 
-def open_session(endpoint: str, security: Folder | None = None) -> zenoh.Session:
+def open_session(endpoint: str, security: Folder | None = None, namespace: str = "") -> zenoh.Session:
     """Open a session. Blocks while it connects.
 
     Args:
         endpoint: Endpoint of the server.
         security: Folder with the client's certificate, if the server requires one.
+        namespace: Namespace of the robots; the session's keys are those without it.
 
     Raises:
+        ProtocolError: The namespace is none.
         NotConnectedError: No server listens there, or the certificate is rejected.
     """
     if not isinstance(endpoint, str) or not _ENDPOINT.fullmatch(endpoint):
         raise NotConnectedError(_no_endpoint(endpoint))
     config = zenoh.Config()
     shown = settings(endpoint, security)
+    if namespace:
+        shown["namespace"] = check_namespace(namespace)
     try:
         for path, value in {**CONFIG, **shown, "connect/endpoints": [endpoint]}.items():
             config.insert_json5(path, json.dumps(value))

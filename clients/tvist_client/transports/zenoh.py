@@ -63,20 +63,24 @@ class ZenohTransport(Transport):
         )
 
     @classmethod
-    async def open(cls, endpoint: str, robot: str, security: Folder | None = None) -> "ZenohTransport":
+    async def open(
+        cls, endpoint: str, robot: str, security: Folder | None = None, namespace: str = ""
+    ) -> "ZenohTransport":
         """Connect to an endpoint and find the robot there.
 
         Args:
             endpoint: Endpoint of the server, `tcp/127.0.0.1:7447`.
             robot: Name of the robot.
             security: Folder with this client's certificate, for `tls/<host>:<port>`.
+            namespace: Namespace of the robot.
 
         Raises:
             NotConnectedError: No server listens there, or there is no visible robot of that name.
-            ProtocolError: `robot` is not a valid robot name.
+            ProtocolError: `robot` is not a valid robot name, or `namespace` no namespace.
         """
         keys.check_robot_name(robot)
-        transport = cls(await asyncio.to_thread(open_session, endpoint, security), endpoint, robot)
+        session = await asyncio.to_thread(open_session, endpoint, security, namespace)
+        transport = cls(session, endpoint, robot)
         try:
             await transport._find()
         except BaseException:
@@ -241,35 +245,37 @@ class ZenohTransport(Transport):
             raise NotConnectedError(why) from None
 
 
-async def robots_at(endpoint: str, security: Folder | None = None) -> list[str]:
+async def robots_at(endpoint: str, security: Folder | None = None, namespace: str = "") -> list[str]:
     """Return the names of the robots at an endpoint, sorted.
 
     Args:
         endpoint: Endpoint of the server, `tcp/127.0.0.1:7447`.
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
+        namespace: Namespace of the robots.
 
     Raises:
         NotConnectedError: No server listens there.
     """
-    session = await asyncio.to_thread(open_session, endpoint, security)
+    session = await asyncio.to_thread(open_session, endpoint, security, namespace)
     try:
         return await _robots(session)
     finally:
         await asyncio.to_thread(close_session, session)
 
 
-async def only_robot(endpoint: str, wanted: str, security: Folder | None = None) -> str:
+async def only_robot(endpoint: str, wanted: str, security: Folder | None = None, namespace: str = "") -> str:
     """Choose a robot if no name is given: the preferred one, or if that is absent, the only one.
 
     Args:
         endpoint: Endpoint of the server, `tcp/127.0.0.1:7447`.
         wanted: Name of the preferred robot.
         security: Folder with this client's certificate, for `tls/<host>:<port>`.
+        namespace: Namespace of the robots.
 
     Raises:
         NotConnectedError: No server listens there, there is no robot, or there are several others.
     """
-    robots = await robots_at(endpoint, security)
+    robots = await robots_at(endpoint, security, namespace)
     if wanted in robots or not robots:
         return wanted
     if len(robots) > 1:

@@ -7,29 +7,37 @@ through its declaration, so declarations need permission on egress; without it, 
 or query.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 from tvist_protocol import keys
 
-Role = Literal["operator", "viewer"]
-"""An operator moves the robot and sees what it does; a viewer only sees."""
+Role = Literal["operator", "viewer", "robot", "router"]
+"""An operator moves the robot and sees what it does; a viewer only sees. A router knows two more roles: a robot, whose
+name or namespace is that of its certificate, and another router, which it trusts."""
 
-ROBOT_PUTS = (keys.state, keys.event, keys.telemetry, keys.truth, keys.io)
+STREAMS = ("state", "event", "telemetry", "truth", "io")
 """Topics that everyone with a role may read and only the robot may publish."""
+MESSAGES = (
+    "put", "delete", "declare_subscriber", "query", "declare_queryable", "reply", "liveliness_token",
+    "declare_liveliness_subscriber", "liveliness_query",
+)  # fmt: skip
+"""Everything that Zenoh's access control knows."""
 
 
-def access_control(robots: Sequence[str], roles: Mapping[str, Role]) -> dict[str, Any]:
+def access_control(robots: Sequence[str], roles: Mapping[str, Role], namespace: str = "") -> dict[str, Any]:
     """Return Zenoh's `access_control` settings for a server with certificates.
 
     Args:
         robots: Names of the robots it serves.
         roles: Role by common name of a client's certificate; at least one.
+        namespace: Namespace of the robots.
 
     Returns:
         Rules and the clients they apply to. Everything else is denied: to names without a role, and to clients without
         a certificate.
     """
+    robots = [_at(namespace, robot) for robot in robots]
     viewing, operating = _viewing(robots), _operating(robots)
     rules_of: dict[Role, list[dict[str, Any]]] = {"viewer": viewing, "operator": [*viewing, *operating]}
     named = {role: [name for name, its in roles.items() if its == role] for role in rules_of}
@@ -47,7 +55,7 @@ def access_control(robots: Sequence[str], roles: Mapping[str, Role]) -> dict[str
     }
 
 
-def open_access(robots: Sequence[str]) -> dict[str, Any]:
+def open_access(robots: Sequence[str], namespace: str = "") -> dict[str, Any]:
     """Return Zenoh's `access_control` settings for a server without certificates: every client is an operator.
 
     Only the server may answer commands or publish the robot's topics. Otherwise another session could swallow a stop
@@ -55,7 +63,9 @@ def open_access(robots: Sequence[str]) -> dict[str, Any]:
 
     Args:
         robots: Names of the robots it serves.
+        namespace: Namespace of the robots.
     """
+    robots = [_at(namespace, robot) for robot in robots]
     # Keys with wildcards are allowed too: egress is restricted below, and only the server answers queries.
     asking = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query", "query"]
     rules = [*_viewing(robots), *_operating(robots), _rule("ask for anything", "ingress", asking, ["**"])]
@@ -68,11 +78,52 @@ def open_access(robots: Sequence[str]) -> dict[str, Any]:
     }
 
 
+def router_access(roles: Mapping[str, Role]) -> dict[str, Any]:
+    """Return Zenoh's `access_control` settings for a router with certificates.
+
+    Operators and viewers have their rights on all robots. A robot may publish and answer as the robot of its
+    certificate's name, and as all robots of the namespace of that name. Another router may do everything.
+
+    Args:
+        roles: Role by common name of a certificate; at least one.
+    """
+    everywhere = [keys.ANYWHERE]
+    viewing, operating = _viewing(everywhere), _operating(everywhere)
+    rules, policies = [*viewing, *operating], list[dict[str, Any]]()
+    subjects = [{"id": name, "cert_common_names": [name]} for name in roles]
+    for name, role in roles.items():
+        own: list[dict[str, Any]] = []
+        if role == "robot":
+            places = [f"**/{keys.PREFIX}/{name}", f"**/{name}/{keys.PREFIX}/*"]
+            # What reaches a client of its robot leaves the robot, and the reverse.
+            own = [_turned(rule, name) for rule in (*_viewing(places), *_operating(places))]
+            own[0]["key_exprs"] = [f"{keys.ANYWHERE}/{leaf}" for leaf in STREAMS]
+        elif role == "router":
+            own = [{**_rule(f"all {name}", "ingress", MESSAGES, ["**"]), "flows": ["ingress", "egress"]}]
+        rules += own
+        allowed = own or [*viewing, *(operating if role == "operator" else [])]
+        policies.append({"id": name, "rules": [rule["id"] for rule in allowed], "subjects": [name]})
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": subjects,
+        "policies": policies,
+    }
+
+
+def _turned(rule: dict[str, Any], name: str) -> dict[str, Any]:
+    """Return a rule for the other end of a link."""
+    flow = "egress" if rule["flows"] == ["ingress"] else "ingress"
+    return {**rule, "id": f"{rule['id']} of {name}", "flows": [flow]}
+
+
 def _viewing(robots: Sequence[str]) -> list[dict[str, Any]]:
-    streams = _keys(robots, *ROBOT_PUTS)
-    info, alive = _keys(robots, keys.info), _keys(robots, keys.alive)
+    streams = _keys(robots, *STREAMS)
+    info, alive = _keys(robots, "info"), _keys(robots, "alive")
     return [
-        _rule("read", "ingress", ["declare_subscriber"], streams),
+        # Subscribers may ask for the streams of all robots; `streams` decides which ones they get.
+        _rule("read", "ingress", ["declare_subscriber"], _keys([keys.ANYWHERE], *STREAMS)),
         _rule("streams", "egress", ["put"], streams),
         _rule("ask info", "ingress", ["query"], info),
         _rule("answer info", "egress", ["declare_queryable", "reply"], info),
@@ -80,15 +131,18 @@ def _viewing(robots: Sequence[str]) -> list[dict[str, Any]]:
             "look for robots",
             "ingress",
             ["declare_liveliness_subscriber", "liveliness_query"],
-            [*alive, keys.ANY_ALIVE],
+            [*alive, keys.ANY_ALIVE, keys.ANYWHERE_ALIVE],
         ),
         _rule("alive", "egress", ["liveliness_token"], alive),
     ]
 
 
 def _operating(robots: Sequence[str]) -> list[dict[str, Any]]:
-    command, setpoint = _keys(robots, keys.command), _keys(robots, keys.setpoint)
-    clients = _keys(robots, keys.any_client)
+    command, setpoint, clients = (
+        _keys(robots, "command"),
+        _keys(robots, "setpoint"),
+        _keys(robots, "client/**"),
+    )
     return [
         _rule("command", "ingress", ["query"], command),
         _rule("answer command", "egress", ["declare_queryable", "reply"], command),
@@ -101,8 +155,13 @@ def _operating(robots: Sequence[str]) -> list[dict[str, Any]]:
     ]
 
 
-def _keys(robots: Sequence[str], *of: Callable[[str], str]) -> list[str]:
-    return [key(robot) for robot in robots for key in of]
+def _at(namespace: str, robot: str) -> str:
+    """Place of a robot: what its keys begin with."""
+    return keys.within(namespace, keys.state(robot).rpartition("/")[0])
+
+
+def _keys(places: Sequence[str], *leaves: str) -> list[str]:
+    return [f"{place}/{leaf}" for place in places for leaf in leaves]
 
 
 def _rule(

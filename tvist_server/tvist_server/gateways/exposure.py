@@ -7,6 +7,8 @@
     robot.key        its private key
     clients.toml     role by name: "anna" = "operator"; a client that is not listed has no access
 
+A router's folder is the same; its roles may also be "robot" and "router".
+
 Both sides show a certificate (mutual TLS); the common name in the client's certificate determines its role.
 """
 
@@ -22,11 +24,11 @@ from tvist_plant.user_file import read_bytes, read_toml
 from tvist_protocol.codec import MAX_BYTES
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError
-from tvist_server.gateways.access import Role, access_control, open_access
+from tvist_server.gateways.access import Role, access_control, open_access, router_access
 from tvist_server.gateways.endpoints import is_endpoint, is_local, options, protocol
 
 AUTHORITY, CERTIFICATE, KEY, CLIENTS = "authority.pem", "robot.pem", "robot.key", "clients.toml"
-_LINE = 'a line is "NAME" = "operator" or "NAME" = "viewer"'
+_LINE = 'a line is "NAME" = "operator", "viewer", "robot" or "router"'
 
 HANDSHAKE_MS = 60_000
 """Longest time for a TLS handshake [ms]. Zenoh accepts no client for 100 ms after each failed handshake (its issue
@@ -45,7 +47,12 @@ class ExposureError(ValueError):
 
 
 def guarded(
-    listen: Sequence[str], robots: Sequence[str], *, security: str | None, insecure: bool
+    listen: Sequence[str],
+    robots: Sequence[str],
+    *,
+    security: str | None,
+    insecure: bool,
+    namespace: str = "",
 ) -> tuple[list[str], dict[str, Any]]:
     """Return the endpoints to listen on and the settings that protect them.
 
@@ -54,19 +61,60 @@ def guarded(
         robots: Names of the robots served there.
         security: Folder with certificates and roles.
         insecure: Whether clients need no authentication.
+        namespace: Namespace of the robots.
 
     Raises:
         ExposureError: An endpoint is none, other machines could reach an unprotected one, or the folder is incomplete.
     """
-    for endpoint in listen:
+    secured, tls = _protected(listen, security, insecure=insecure)
+    if security is not None:
+        return secured, {**tls, "access_control": access_control(robots, _roles(security), namespace)}
+    return secured, {**tls, "access_control": open_access(robots, namespace)}
+
+
+def guarded_router(
+    listen: Sequence[str], *, security: str | None, insecure: bool
+) -> tuple[list[str], dict[str, Any]]:
+    """Return the same for a router; without certificates, everyone may connect as a robot or a client.
+
+    Args:
+        listen: Requested endpoints.
+        security: Folder with certificates and roles.
+        insecure: Whether nobody needs authentication.
+
+    Raises:
+        ExposureError: See `guarded`.
+    """
+    secured, tls = _protected(listen, security, insecure=insecure)
+    return secured, tls if security is None else {**tls, "access_control": router_access(_roles(security))}
+
+
+def check_endpoints(what: str, endpoints: Sequence[str]) -> None:
+    """Check the form of endpoints.
+
+    Args:
+        what: Name of the option.
+        endpoints: Endpoints.
+
+    Raises:
+        ExposureError: One has another form.
+    """
+    for endpoint in endpoints:
         if not is_endpoint(endpoint):
             raise ExposureError(
-                f"listen is {endpoint!r}: must have the form tcp/ADDRESS:PORT, such as tcp/127.0.0.1:7447"
+                f"{what} is {endpoint!r}: must have the form tcp/ADDRESS:PORT, such as tcp/127.0.0.1:7447"
             )
+
+
+def _protected(
+    listen: Sequence[str], security: str | None, *, insecure: bool
+) -> tuple[list[str], dict[str, Any]]:
+    """Return endpoints and the settings of their transport."""
+    check_endpoints("listen", listen)
     if security is not None:
         if insecure:
             raise ExposureError("security and insecure exclude each other: leave one out")
-        return [_secured(endpoint) for endpoint in listen], {**LIMITS, **_settings(security, robots)}
+        return [_secured(endpoint) for endpoint in listen], {**LIMITS, **_settings(security)}
     for endpoint in listen:
         if protocol(endpoint) in {"tls", "quic"} and not options(endpoint):
             raise ExposureError(
@@ -78,7 +126,7 @@ def guarded(
             f"listen is {exposed[0]}, which other machines can reach: add --security DIR (made by `tvist keys`) and "
             "listen on tls/…, or add --insecure to let anyone move the robot"
         )
-    return list(listen), {**(LIMITS if exposed else {}), "access_control": open_access(robots)}
+    return list(listen), dict(LIMITS) if exposed else {}
 
 
 def guarded_interfaces(address: str, *, insecure: bool) -> None:
@@ -134,13 +182,19 @@ def _secured(endpoint: str) -> str:
     return f"{endpoint}#tls_handshake_timeout_ms={HANDSHAKE_MS}"
 
 
-def _settings(security: str, robots: Sequence[str]) -> dict[str, Any]:
+def _roles(security: str) -> dict[str, Role]:
     folder = Path(security).absolute()
     roles = roles_in(folder)
     if not roles:
         raise ExposureError(
             f"{folder / CLIENTS} lists no clients: add one with `tvist keys {security} --operator NAME`"
         )
+    return roles
+
+
+def _settings(security: str) -> dict[str, Any]:
+    folder = Path(security).absolute()
+    _roles(security)
     _check_pair(folder)
     return {
         "transport/link/tls/enable_mtls": True,
@@ -148,7 +202,6 @@ def _settings(security: str, robots: Sequence[str]) -> dict[str, Any]:
         "transport/link/tls/listen_certificate": str(folder / CERTIFICATE),
         "transport/link/tls/listen_private_key": str(folder / KEY),
         "transport/link/tls/close_link_on_expiration": True,
-        "access_control": access_control(robots, roles),
     }
 
 

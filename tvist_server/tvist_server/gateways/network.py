@@ -1,5 +1,9 @@
-"""The network: one Zenoh session for all robots of the server; it acts as a router to which clients connect."""
+"""The network: one Zenoh session for all robots of the server.
 
+It acts as a router to which clients connect, or connects to a router of a fleet as a client, or both.
+"""
+
+import contextlib
 import json
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -9,6 +13,9 @@ from typing import Any
 import zenoh
 from zenoh.handlers import Callback
 
+from tvist_client.errors import NotConnectedError
+from tvist_client.transports.certificates import settings as certificate_for
+from tvist_client.transports.certificates import why_refused
 from tvist_server.gateways.base import Desk, GatewayError
 from tvist_server.gateways.zenoh import ZenohGateway
 
@@ -37,6 +44,14 @@ REALTIME: Mapping[str, Any] = {
     "transport/link/tx/queue/congestion_control/block/wait_before_close": 1_000_000,
 }
 """Additional settings for a clock that does not wait for clients."""
+CONNECT_S = 10
+"""Longest time to reach a router at the start [s]; a router that is lost later is looked for until the end."""
+CONNECT: Mapping[str, Any] = {
+    "connect/timeout_ms": 1000 * CONNECT_S,
+    "connect/exit_on_failure": True,
+    "connect/retry": {"period_init_ms": 500, "period_max_ms": 4000, "period_increase_factor": 2},
+}
+"""Additional settings of a session that connects to a router."""
 
 
 class Network:
@@ -46,9 +61,14 @@ class Network:
         endpoints: Endpoints to listen on, such as `tcp/127.0.0.1:7447`.
         guard: Session settings that restrict access, by path.
         lockstep: Whether a client advances time, so that the server waits for slow clients.
+        connect: Routers to connect to; the first that answers is taken.
+        security: Folder with this robot's certificate for the router, as a client has one.
+        namespace: Chunks that precede all keys on the network.
+        on_router: Called with False when the connection to a router is lost, and with True when it is back; in
+            Zenoh's threads.
 
     Raises:
-        GatewayError: The server cannot listen on an endpoint.
+        GatewayError: The server cannot listen on an endpoint, or reaches no router within `CONNECT_S`.
     """
 
     def __init__(
@@ -57,10 +77,20 @@ class Network:
         guard: Mapping[str, Any] = MappingProxyType({}),
         *,
         lockstep: bool = True,
+        connect: Sequence[str] = (),
+        security: str | None = None,
+        namespace: str = "",
+        on_router: Callable[[bool], None] | None = None,
     ) -> None:
-        self._session = _open(endpoints, guard if lockstep else {**REALTIME, **guard})
+        settings = guard if lockstep else {**REALTIME, **guard}
+        if namespace:
+            settings = {**settings, "namespace": namespace}
+        self._session = (
+            _connected(connect, endpoints, settings, security) if connect else _open(endpoints, settings)
+        )
         self._gateways: list[ZenohGateway] = []
         self._closed = False
+        self._on_router = on_router if connect else None
         self._session.info.declare_transport_events_listener(Callback(self._on_transport, indirect=False))
         _OPEN.add(self)
 
@@ -88,21 +118,83 @@ class Network:
         self._session.close()  # type: ignore[no-untyped-call]
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
-        if event.kind == zenoh.SampleKind.DELETE:
+        there = event.kind == zenoh.SampleKind.PUT
+        if (
+            self._on_router is not None
+            and not self._closed
+            and event.transport.whatami == zenoh.WhatAmI.ROUTER
+        ):
+            self._on_router(there)
+        if not there:
             for gateway in tuple(self._gateways):
                 gateway.session_gone(str(event.transport.zid))
 
 
-def _open(endpoints: Sequence[str], guard: Mapping[str, Any]) -> zenoh.Session:
-    config = zenoh.Config()
+def _open(endpoints: Sequence[str], settings: Mapping[str, Any]) -> zenoh.Session:
     try:
-        for path, value in {**CONFIG, **guard, "listen/endpoints": list(endpoints)}.items():
-            config.insert_json5(path, json.dumps(value))
-        return zenoh.open(config)
+        return _session({**settings, "listen/endpoints": list(endpoints)})
     except zenoh.ZError as error:
         raise GatewayError(
             _explain(error, ", ".join(endpoint.partition("#")[0] for endpoint in endpoints))
         ) from error
+
+
+def _connected(
+    connect: Sequence[str], listen: Sequence[str], settings: Mapping[str, Any], security: str | None
+) -> zenoh.Session:
+    """Connect to a router: as its client, unless clients can connect here, too."""
+    where, mode = ", ".join(connect), {"listen/endpoints": list(listen)} if listen else {"mode": "client"}
+    shown = {**CONNECT, "connect/endpoints": list(connect)}
+    try:
+        for endpoint in connect:
+            shown |= certificate_for(endpoint, security)
+        return _session({**settings, **mode, **shown})
+    except NotConnectedError as error:
+        raise GatewayError(str(error)) from error
+    except zenoh.ZError as error:
+        if "listen" in str(error):
+            raise GatewayError(_explain(error, ", ".join(listen))) from error
+        refused = next(
+            (why for endpoint in connect if security and (why := why_refused(endpoint, security, "router"))),
+            f"no router answers within {CONNECT_S} s: check that it is running and listens there (`tvist router`)",
+        )
+        raise GatewayError(f"no connection to {where}: {refused}") from error
+
+
+def open_router(
+    listen: Sequence[str], connect: Sequence[str], settings: Mapping[str, Any], security: str | None
+) -> zenoh.Session:
+    """Open the session of a router; other routers may appear later.
+
+    Args:
+        listen: Endpoints to listen on.
+        connect: Other routers to connect to.
+        settings: Further settings, by path.
+        security: Folder with a certificate for other routers.
+
+    Raises:
+        GatewayError: The router cannot listen on an endpoint, or the certificate is missing.
+    """
+    shown: dict[str, Any] = {"connect/endpoints": list(connect), "connect/retry": CONNECT["connect/retry"]}
+    try:
+        for endpoint in connect:
+            shown |= certificate_for(endpoint, security)
+    except NotConnectedError as error:
+        raise GatewayError(str(error)) from error
+    return _open(listen, {**settings, **shown})
+
+
+def close_session(session: zenoh.Session) -> None:
+    """Close a session; one that breaks meanwhile is closed, too."""
+    with contextlib.suppress(zenoh.ZError):
+        session.close()  # type: ignore[no-untyped-call]
+
+
+def _session(settings: Mapping[str, Any]) -> zenoh.Session:
+    config = zenoh.Config()
+    for path, value in {**CONFIG, **settings}.items():
+        config.insert_json5(path, json.dumps(value))
+    return zenoh.open(config)
 
 
 def _explain(error: zenoh.ZError, endpoints: str) -> str:

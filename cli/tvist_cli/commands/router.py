@@ -1,0 +1,62 @@
+"""`tvist router`: a router for a fleet."""
+
+import asyncio
+
+from tvist_cli.failure import Failure, told
+from tvist_cli.output import say
+
+
+def router(
+    *,
+    listen: list[str] | None = None,
+    connect: list[str] | None = None,
+    rate: list[str] | None = None,
+    robot: list[str] | None = None,
+    security: str | None = None,
+    insecure: bool = False,
+) -> None:
+    """Run a Zenoh router until Control+C: robots started with --connect and their clients reach each other through it.
+
+    Args:
+        listen: Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447].
+        connect: Endpoint of another router to connect to, repeatable, such as that of another hall.
+        rate: Pass on at most this many states of each robot per second, repeatable: 10, or 10@INTERFACE for what leaves
+            through one network interface [all]. Commands, events and telemetry are not reduced.
+        robot: Robot that --rate is about, repeatable: [NAMESPACE/]NAME, or [NAMESPACE/]NAME*COUNT for NAME-1 to
+            NAME-COUNT. Robots that are not listed share the rate of one.
+        security: Folder made by tvist keys with the roles of robots, clients and routers. The endpoint is then
+            tls/ADDRESS:PORT.
+        insecure: Accept remote connections without TLS; anyone can move the robots, and act as one.
+    """
+    from tvist_server.ending import Ending
+    from tvist_server.gateways.base import GatewayError
+    from tvist_server.gateways.exposure import ExposureError
+    from tvist_server.gateways.router import DEFAULT_ENDPOINT, Rate, Router, robots_of
+
+    with told(ExposureError, ValueError, code=2):
+        rates = [Rate.read(text) for text in rate or []]
+        robots = [place for text in robot or [] for place in robots_of(text)]
+        if robots and not rates:
+            raise Failure("robot needs --rate HZ: it says whose states are reduced", code=2)
+        ending = Ending()
+        with told(GatewayError), ending.at_once():
+            running = Router(
+                listen or [DEFAULT_ENDPOINT],
+                connect or [],
+                rates,
+                robots,
+                security=security,
+                insecure=insecure,
+            )
+
+    async def run() -> None:
+        ended, loop = asyncio.Event(), asyncio.get_running_loop()
+        ending.hear(lambda: loop.call_soon_threadsafe(ended.set))
+        await ended.wait()
+
+    try:
+        say(f"a router listens on {', '.join(listen or [DEFAULT_ENDPOINT])}. Press Control+C to stop.")
+        asyncio.run(run())
+    finally:
+        running.close()
+    ending.close()

@@ -1,0 +1,267 @@
+"""The robots of a network, found by their liveliness tokens: what they are, how they are, and how all of them stop.
+
+One session without a namespace sees the robots of all namespaces. Of each robot it gets one message a second,
+`telemetry`, whatever their number.
+"""
+
+import asyncio
+import re
+from collections.abc import Callable, Collection
+from functools import partial
+from types import TracebackType
+from typing import NamedTuple, Self
+
+import msgspec
+import zenoh
+from zenoh.handlers import Callback
+
+from tvist_client.errors import ClientError, NotConnectedError
+from tvist_client.readiness import readiness
+from tvist_client.robot import ENDPOINT
+from tvist_client.transports.certificates import Folder
+from tvist_client.transports.inbox import wake
+from tvist_client.transports.session import close_session, open_session
+from tvist_client.understood import understood
+from tvist_protocol import keys
+from tvist_protocol.codec import decode_info, decode_reply, decode_telemetry, encode
+from tvist_protocol.commands import Stop
+from tvist_protocol.errors import ProtocolError
+from tvist_protocol.info import Info
+from tvist_protocol.replies import Refused
+from tvist_protocol.stream import Telemetry
+
+ANSWER_S = 3.0
+"""Longest wait for a robot's answer [s]."""
+SETTLE_S = 0.3
+"""Time for tokens to arrive after the session has opened [s]; over a slow network, `look` sees late ones, too."""
+LISTEN_S = 1.3
+"""Time in which every robot in real time publishes its telemetry at least once [s]."""
+_DIGITS = re.compile(r"(\d+)")
+
+
+class Place(NamedTuple):
+    """Where a robot is: its namespace, empty if it has none, and its name."""
+
+    namespace: str
+    robot: str
+
+    def __str__(self) -> str:
+        """Namespace and name as one path, `hall-3/ur5e-1`."""
+        return keys.within(self.namespace, self.robot)
+
+    def key(self, leaf: Callable[[str], str]) -> str:
+        """Key of the robot, such as its `keys.command`."""
+        return keys.within(self.namespace, leaf(self.robot))
+
+
+def place_of(text: str) -> Place:
+    """Read `NAMESPACE/NAME`, or `NAME` alone.
+
+    Raises:
+        ProtocolError: It is neither.
+    """
+    namespace, _, robot = text.rpartition("/")
+    return Place(keys.check_namespace(namespace) if namespace else "", keys.check_robot_name(robot))
+
+
+class FleetRobot(msgspec.Struct, frozen=True):
+    """One robot of a fleet."""
+
+    namespace: str
+    name: str
+    model: str | None
+    """Model of the arm; null if the robot does not answer."""
+    clock: str | None
+    robot_mode: str | None
+    safety_mode: str | None
+    """RTDE names of its modes; null if they are not known."""
+    control: str | None
+    """Client that has control; null if there is none."""
+    ready: bool
+    """Whether it answers and may be moved."""
+    ticks_per_second: float | None
+    """Control periods in its last second [1/s]; null for a robot that has sent no telemetry, as in lockstep."""
+    silent_s: float | None
+    """Time since its last telemetry, which comes once a second [s]."""
+    missed_ticks: int | None
+    late_p99_us: float | None
+    """99th percentile of the lateness of its ticks in its last second [µs]."""
+    load: float | None
+    """Share of its last second in which the thread that ticks worked for this robot [-]."""
+    said: str
+    """What keeps it from being moved, or why it is not known; empty if it is ready."""
+
+
+class StopReport(msgspec.Struct, frozen=True):
+    """What a robot answered to `stop`."""
+
+    namespace: str
+    name: str
+    ok: bool
+    said: str
+
+
+class Fleet:
+    """Robots on a network, by one session. Use as an asynchronous context.
+
+    Args:
+        endpoint: Endpoint of a router, or of one server.
+        security: Folder with this client's certificate, for `tls/<host>:<port>`.
+        namespace: Namespace that the robots are in or below; empty: all namespaces.
+
+    Raises:
+        ProtocolError: The namespace is none.
+    """
+
+    def __init__(
+        self, endpoint: str = ENDPOINT, *, security: Folder | None = None, namespace: str = ""
+    ) -> None:
+        self._endpoint, self._security = endpoint, security
+        self._within = keys.check_namespace(namespace) if namespace else ""
+        self._session: zenoh.Session
+        self._loop: asyncio.AbstractEventLoop
+        self._told: dict[Place, tuple[float, Telemetry]] = {}
+        self.places: set[Place] = set()
+        """Robots whose liveliness tokens are there now."""
+
+    async def __aenter__(self) -> Self:
+        """Connect, and let the tokens arrive.
+
+        Raises:
+            NotConnectedError: Nobody listens there, or the certificate is rejected.
+        """
+        self._loop = asyncio.get_running_loop()
+        self._session = await asyncio.to_thread(open_session, self._endpoint, self._security)
+        self._session.liveliness().declare_subscriber(
+            keys.within(self._within, keys.ANYWHERE_ALIVE),
+            Callback(self._on_token, indirect=False),
+            history=True,
+        )
+        self._session.declare_subscriber(
+            keys.within(self._within, f"{keys.ANYWHERE}/telemetry"),
+            Callback(self._on_telemetry, indirect=False),
+        )
+        await asyncio.sleep(SETTLE_S)
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await asyncio.to_thread(close_session, self._session)
+
+    async def listen(self) -> None:
+        """Wait until every robot in real time has published its telemetry."""
+        await asyncio.sleep(LISTEN_S)
+
+    async def look(self) -> list[FleetRobot]:
+        """Ask every robot what it is and how it is; natural order."""
+        places = sorted(self.places, key=_by_number)
+        answers = await asyncio.gather(*(self._ask(place, keys.info, None) for place in places))
+        return [self._row(place, answer) for place, answer in zip(places, answers, strict=True)]
+
+    async def stop(self, places: Collection[Place]) -> list[StopReport]:
+        """Stop the motions of robots, all at once, whoever has control.
+
+        Args:
+            places: Robots, there or not.
+        """
+        wanted, data = sorted(places, key=_by_number), encode(Stop())
+        answers = await asyncio.gather(*(self._ask(place, keys.command, data) for place in wanted))
+        return [_stopped(place, answer) for place, answer in zip(wanted, answers, strict=True)]
+
+    # ------------------------------------------------------------------ what arrives, in Zenoh's threads
+
+    def _on_token(self, sample: zenoh.Sample) -> None:
+        place = keys.place(str(sample.key_expr))
+        if place is not None:
+            there = sample.kind == zenoh.SampleKind.PUT
+            wake(self._loop, partial(self.places.add if there else self.places.discard, Place(*place)))
+
+    def _on_telemetry(self, sample: zenoh.Sample) -> None:
+        place = keys.place(str(sample.key_expr))
+        if place is not None:
+            wake(self._loop, partial(self._hear, Place(*place), sample.payload.to_bytes()))
+
+    def _hear(self, place: Place, data: bytes) -> None:
+        try:
+            self._told[place] = (self._loop.time(), decode_telemetry(data))
+        except ProtocolError:  # another version's; its silence is reported
+            return
+
+    # ------------------------------------------------------------------ one robot
+
+    async def _ask(
+        self, place: Place, leaf: Callable[[str], str], data: bytes | None
+    ) -> bytes | NotConnectedError:
+        """Return a robot's answer, or why there is none: the others are not kept waiting by an error."""
+        answer: asyncio.Future[bytes | NotConnectedError] = self._loop.create_future()
+
+        def settle(outcome: bytes | NotConnectedError) -> None:
+            if not answer.done():
+                answer.set_result(outcome)
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                wake(self._loop, partial(settle, reply.ok.payload.to_bytes()))
+
+        def on_end() -> None:
+            why = "it does not answer"
+            if place in self.places:
+                why += f" within {ANSWER_S:g} s, although it is on the network: it hangs, or it denies this client"
+            wake(self._loop, partial(settle, NotConnectedError(why)))
+
+        self._session.get(
+            place.key(leaf), Callback(on_reply, on_end, indirect=False), payload=data, timeout=ANSWER_S
+        )
+        return await answer
+
+    def _row(self, place: Place, answer: bytes | NotConnectedError) -> FleetRobot:
+        heard, telemetry = self._told.get(place, (None, None))
+        info, said = _info(answer)
+        stands = None if info is None else readiness(info, None, _unlock(place))
+        return FleetRobot(
+            namespace=place.namespace,
+            name=place.robot,
+            model=None if info is None else info.model,
+            clock=None if info is None else info.clock,
+            robot_mode=None if stands is None else stands.robot_mode,
+            safety_mode=None if stands is None else stands.safety_mode,
+            control=None if info is None else info.control,
+            ready=stands is not None and stands.ready,
+            ticks_per_second=None if telemetry is None else telemetry.ticks_per_second,
+            silent_s=None if heard is None else self._loop.time() - heard,
+            missed_ticks=None if telemetry is None else telemetry.missed_ticks,
+            late_p99_us=None if telemetry is None else telemetry.late_p99_us,
+            load=None if telemetry is None else telemetry.load,
+            said=said if stands is None else stands.sentence if not stands.ready else "",
+        )
+
+
+def _info(answer: bytes | NotConnectedError) -> tuple[Info | None, str]:
+    if isinstance(answer, NotConnectedError):
+        return None, str(answer)
+    try:
+        return understood(decode_info, answer), ""
+    except ClientError as error:
+        return None, str(error)
+
+
+def _stopped(place: Place, answer: bytes | NotConnectedError) -> StopReport:
+    if isinstance(answer, NotConnectedError):
+        return StopReport(*place, ok=False, said=str(answer))
+    try:
+        reply = understood(decode_reply, answer)
+    except ClientError as error:
+        return StopReport(*place, ok=False, said=str(error))
+    if isinstance(reply, Refused):
+        return StopReport(*place, ok=False, said=f"refused: {reply.why}")
+    return StopReport(*place, ok=True, said="stopped")
+
+
+def _unlock(place: Place) -> str:
+    words = ["tvist unlock", "--name", place.robot]
+    return " ".join([*words, "--namespace", place.namespace] if place.namespace else words)
+
+
+def _by_number(place: Place) -> list[list[int | str]]:
+    return [[int(part) if part.isdigit() else part for part in _DIGITS.split(text)] for text in place]

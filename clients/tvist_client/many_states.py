@@ -1,0 +1,100 @@
+"""The newest states of many robots, by one subscription with wildcards."""
+
+import asyncio
+from functools import partial
+from types import TracebackType
+from typing import NamedTuple, Self
+
+import zenoh
+from zenoh.handlers import Callback
+
+from tvist_client.errors import MisuseError
+from tvist_client.fleet import Place
+from tvist_client.robot import ENDPOINT
+from tvist_client.transports.certificates import Folder
+from tvist_client.transports.inbox import wake
+from tvist_client.transports.session import close_session, open_session
+from tvist_protocol import keys
+from tvist_protocol.codec import decode_state
+from tvist_protocol.errors import ProtocolError
+from tvist_protocol.stream import State
+
+
+class Newest(NamedTuple):
+    """The newest state of a robot."""
+
+    state: State
+    received: int
+    """Number of its states since the last look."""
+    at: float
+    """Time at which it came, on the loop's clock [s]."""
+
+
+class ManyStates:
+    """States of all robots that a key selects. Use as an asynchronous context.
+
+    Only the newest state of each robot is kept, and decoded when it is looked at.
+
+    Args:
+        selector: Key with wildcards that ends in `/state`: `tvist/*/state`, or `**/tvist/*/state` for all namespaces.
+        endpoint: Endpoint of a router, or of one server.
+        security: Folder with this client's certificate, for `tls/<host>:<port>`.
+        namespace: Namespace that precedes the key.
+
+    Raises:
+        MisuseError: The selector does not end in `/state`, or is no key.
+    """
+
+    def __init__(
+        self, selector: str, endpoint: str = ENDPOINT, *, security: Folder | None = None, namespace: str = ""
+    ) -> None:
+        leaf = f"/{keys.state('r').rpartition('/')[2]}"
+        if not selector.endswith(leaf):
+            raise MisuseError(
+                f"{selector} is not a key of states: it must end in {leaf}, such as tvist/*{leaf}"
+            )
+        try:
+            zenoh.KeyExpr(selector)
+        except zenoh.ZError as error:
+            raise MisuseError(f"{selector} is not a key: write tvist/*{leaf}, or tvist/NAME{leaf}") from error
+        self._key = keys.within(keys.check_namespace(namespace) if namespace else "", selector)
+        self._endpoint, self._security = endpoint, security
+        self._session: zenoh.Session
+        self._loop: asyncio.AbstractEventLoop
+        self._newest: dict[Place, tuple[bytes, int, float]] = {}
+
+    async def __aenter__(self) -> Self:
+        """Connect and subscribe.
+
+        Raises:
+            NotConnectedError: Nobody listens there, or the certificate is rejected.
+        """
+        self._loop = asyncio.get_running_loop()
+        self._session = await asyncio.to_thread(open_session, self._endpoint, self._security)
+        self._session.declare_subscriber(self._key, Callback(self._on_sample, indirect=False))
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await asyncio.to_thread(close_session, self._session)
+
+    def look(self) -> dict[Place, Newest]:
+        """Return the newest state of each robot that has ever sent one."""
+        found: dict[Place, Newest] = {}
+        for place, (data, received, at) in sorted(self._newest.items()):
+            try:
+                found[place] = Newest(decode_state(data), received, at)
+            except ProtocolError:  # another version's
+                continue
+            self._newest[place] = (data, 0, at)
+        return found
+
+    def _on_sample(self, sample: zenoh.Sample) -> None:
+        place = keys.place(str(sample.key_expr))
+        if place is not None:
+            wake(self._loop, partial(self._keep, Place(*place), sample.payload.to_bytes()))
+
+    def _keep(self, place: Place, data: bytes) -> None:
+        before = self._newest.get(place, (b"", 0, 0.0))
+        self._newest[place] = (data, before[1] + 1, self._loop.time())

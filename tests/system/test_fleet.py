@@ -1,0 +1,178 @@
+"""Robots behind a router: found, told apart by namespaces, stopped together, and back after the router was gone."""
+
+import asyncio
+import json
+import shutil
+import signal
+import subprocess
+import sys
+
+import pytest
+from tests.conformance.served import PATIENCE, Served, free_endpoint
+from tests.conformance.wire import Q1, Wire
+
+from tvist_cli import main
+from tvist_client.check import check
+from tvist_client.fleet import Fleet, Place
+from tvist_client.many_states import ManyStates
+from tvist_server.gateways import network
+
+from .keyring import forge, free_tls_endpoint, made
+from .routed import Router, far
+
+LOCKSTEP = ("--clock", "lockstep")
+
+
+@pytest.fixture(scope="module")
+def router():
+    with Router() as router:
+        yield router
+
+
+@pytest.fixture(scope="module")
+def robots(router):
+    """Two robots without a namespace, and one in one that is called like the first of them."""
+    with (
+        Served(*LOCKSTEP, "--robots", "ur5e*2", name=None, router=router.endpoint),
+        Served(*LOCKSTEP, "--namespace", "hall-3/line-1", name="ur5e-1", router=router.endpoint) as third,
+    ):
+        yield third
+
+
+ALL = [Place("", "ur5e-1"), Place("", "ur5e-2"), Place("hall-3/line-1", "ur5e-1")]
+
+
+def tvist(*arguments):
+    ended = subprocess.run(
+        [sys.executable, "-m", "tvist_cli", *arguments],
+        capture_output=True, text=True, timeout=PATIENCE, check=False,
+    )  # fmt: skip
+    return ended.returncode, ended.stdout, ended.stderr
+
+
+def test_all_are_found_and_each_is_known_by_its_namespace(router, robots):
+    async def look(namespace):
+        async with Fleet(router.endpoint, namespace=namespace) as fleet:
+            return [Place(robot.namespace, robot.name) for robot in await fleet.look() if robot.ready]
+
+    assert asyncio.run(look("")) == ALL
+    assert asyncio.run(look("hall-3")) == ALL[2:]
+    assert asyncio.run(look("hall-4")) == []
+
+
+def test_robots_of_one_name_in_two_namespaces_never_meet(router, robots):
+    with (
+        far(router.endpoint, "ur5e-1", "") as here,
+        far(router.endpoint, "ur5e-1", "hall-3/line-1") as there,
+        here.control("anna") as mine,
+        there.control("otto") as other,
+    ):
+        assert here.step(mine, 3)["tick"] == 3
+        assert there.step(other, 5)["tick"] == 5
+        assert here.command("move_j", token=other, q=Q1)["code"] == "stale_token"
+
+
+def test_check_moves_and_the_rest_reach_a_robot_in_a_namespace(router, robots):
+    report = check(router.endpoint, "ur5e-1", namespace="hall-3/line-1")
+    assert report.ok, report
+    assert report.robots == ["ur5e-1"]
+
+
+def test_stop_reaches_all_and_a_robot_that_is_not_there_fails_the_command(router, robots):
+    code, out, _ = tvist("fleet", "stop", "--all", "--endpoint", router.endpoint, "--json")
+    assert code == 0
+    assert [report["ok"] for report in json.loads(out)["robots"]] == [True] * 3
+    code, out, err = tvist("fleet", "stop", "hall-3/line-1/ur5e-1", "ur5e-9", "--endpoint", router.endpoint)
+    assert code == 1
+    assert out.splitlines() == ["ur5e-9: it does not answer", "hall-3/line-1/ur5e-1: stopped"]
+    assert err == "tvist: 1 of 2 robots may still be moving: ur5e-9 first\n"
+
+
+def test_states_of_many_come_by_one_key(router, robots):
+    async def look():
+        async with ManyStates("**/tvist/*/state", router.endpoint) as states:
+            while len(found := states.look()) < 3:  # noqa: ASYNC110  in lockstep a state comes once a second
+                await asyncio.sleep(0.1)
+            return found
+
+    assert sorted(asyncio.run(asyncio.wait_for(look(), PATIENCE))) == ALL
+
+
+def test_a_router_that_was_killed_finds_all_again_and_no_robot_has_stopped():
+    router = Router()
+    router.wait_until_ready()
+    with Served(*LOCKSTEP, "--robots", "ur5e*2", name=None, router=router.endpoint):
+        router.process.send_signal(signal.SIGKILL)
+        router.wait()
+        with Router(endpoint=router.endpoint) as again:
+
+            async def back():
+                async with Fleet(again.endpoint) as fleet:
+                    while len(fleet.places) < 2:  # noqa: ASYNC110  tokens come from another thread
+                        await asyncio.sleep(0.1)
+                    return await fleet.look()
+
+            found = asyncio.run(asyncio.wait_for(back(), PATIENCE))
+            assert [robot.safety_mode for robot in found] == ["NORMAL", "NORMAL"]
+    router.kill()
+
+
+def test_a_reduced_rate_holds_for_each_listed_robot_and_leaves_events_alone():
+    with Router("--rate", "20", "--robot", "r*3") as router:
+        with Wire(router.endpoint) as robot, Wire(router.endpoint) as client:
+            got = []
+            client.session.declare_subscriber("tvist/*/*", lambda sample: got.append(str(sample.key_expr)))
+            publishers = [
+                robot.session.declare_publisher(f"tvist/r-{number}/{leaf}")
+                for number in (1, 2, 3)
+                for leaf in ("state", "event")
+            ]
+            while not all(publisher.matching_status.matching for publisher in publishers):
+                pass
+            for _ in range(200):
+                for publisher in publishers:
+                    publisher.put(b"x")
+            robot.session.put("tvist/r-1/event", b"last")
+            while got.count("tvist/r-1/event") < 201:
+                pass
+        events = [got.count(f"tvist/r-{number}/event") for number in (1, 2, 3)]
+        states = [got.count(f"tvist/r-{number}/state") for number in (1, 2, 3)]
+        assert events == [201, 200, 200]
+        assert all(1 <= count < 200 for count in states), states
+
+
+@pytest.fixture
+def serve(monkeypatch, capfd):
+    """Start `tvist serve` in this process, which gives up after a fifth of a second; exit code and stderr."""
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    monkeypatch.setitem(network.CONNECT, "connect/timeout_ms", 200)
+
+    def serve(*options):
+        monkeypatch.setattr(sys, "argv", ["tvist", "serve", "--clock", "lockstep", *map(str, options)])
+        with pytest.raises(SystemExit) as ended:
+            main.main()
+        return ended.value.code, capfd.readouterr().err
+
+    return serve
+
+
+def test_a_router_that_is_not_there_is_said_in_one_sentence(serve):
+    nowhere = free_endpoint()
+    code, said = serve("--connect", nowhere)
+    assert code == 1
+    assert said.startswith(f"tvist: no connection to {nowhere}: no router answers within 10 s")
+    assert said.count("\n") == 1
+
+
+def test_a_certificate_that_has_expired_is_said_in_one_sentence(serve, tmp_path):
+    ring = made(tmp_path / "keys", "--member", "hall-3")
+    expired = forge(
+        tmp_path / "old", "hall-3", issuer=(ring / "authority.pem", ring / "authority.key"), days=-1
+    )
+    shutil.copy(ring / "authority.pem", expired)
+    with Router("--security", str(ring), endpoint=free_tls_endpoint()) as router:
+        code, said = serve("--connect", router.endpoint, "--security", expired)
+    assert code == 1
+    assert "certificate" in said
+    assert "expired" in said
+    assert said.count("\n") == 1
