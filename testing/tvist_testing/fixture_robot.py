@@ -46,7 +46,7 @@ class SteppingStream(blocking.Stream[M], Generic[M]):
 
 
 class FixtureRobot(blocking.Robot):
-    """A robot of a test's own. In lockstep, each call that waits for it steps its time, as fast as this machine computes.
+    """A robot of a test's own. In lockstep, each call that waits for it steps its time.
 
     Attributes:
         name: Name of the robot on the network.
@@ -96,13 +96,21 @@ class FixtureRobot(blocking.Robot):
         publish_state()
         self._portal.call(lambda: self._robot.until(0))
 
+    def settle_messages(self) -> None:
+        """Wait until everything has arrived that the robot published before now, such as the truth of the last tick."""
+        self.info()  # answered behind what was published before
+
     def states(self, buffer: int = BUFFER) -> SteppingStream[State]:
         """Iterate over every state from now on; time passes by a tick for each."""
-        return SteppingStream(self._portal, self._stepping, self._portal.run(lambda: self._robot.states(buffer)))
+        return SteppingStream(
+            self._portal, self._stepping, self._portal.run(lambda: self._robot.states(buffer))
+        )
 
     def events(self, buffer: int = BUFFER) -> SteppingStream[Event]:
         """Iterate over every event from now on; time passes until the next one."""
-        return SteppingStream(self._portal, self._stepping, self._portal.run(lambda: self._robot.events(buffer)))
+        return SteppingStream(
+            self._portal, self._stepping, self._portal.run(lambda: self._robot.events(buffer))
+        )
 
 
 class UrRobot(FixtureRobot):

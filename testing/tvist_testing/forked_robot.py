@@ -35,7 +35,9 @@ def serve(wanted: WantedRobot, connection: socket.socket) -> int:
     """
     _log_into(wanted.log)
     ending = Ending()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Control+C is for the test's process, which then ends this one
+    signal.signal(
+        signal.SIGINT, signal.SIG_IGN
+    )  # Control+C is for the test's process, which then ends this one
     preparation = Preparation(wanted)
     try:
         server, place = _listening(wanted, preparation)

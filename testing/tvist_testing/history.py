@@ -38,7 +38,7 @@ class Row:
         self.tool_speed = array("d", state.actual_TCP_speed)
         """Velocity of the tool centre point [m/s], and its angular velocity [rad/s]."""
         self.pose = array("d", truth.flange_pose if truth else state.actual_TCP_pose)
-        """Pose of the flexible arm's flange, or of the measured tool if there is no truth: x y z [m], rotation vector."""
+        """Pose of the flexible arm's flange, else of the measured tool: x y z [m], rotation vector [rad]."""
         self.acceleration = array("d", truth.tool_acceleration if truth else state.actual_tool_accelerometer)
         """Specific force at the flange, without noise if there is truth, in its own frame [m/s²]."""
 

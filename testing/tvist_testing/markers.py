@@ -42,11 +42,13 @@ def state(
     mode: str | None = None,
     payload: Mapping[str, Any] | None = None,
 ) -> Part:
-    """State to start in: a pose by its name such as "Q2", or a file; or q [rad], mode ("POWER_OFF"), carried payload."""
+    """State to start in: a pose such as "Q2", or a file; or q [rad], mode such as "POWER_OFF", carried payload."""
     given = {"q": q, "mode": mode, "payload": payload}
     fields = {name: value for name, value in given.items() if value is not None}
     if start is None and not fields:
-        raise MarkerError('tvist_state has no argument: give a pose such as "Q2", a file, or q=, mode=, payload=')
+        raise MarkerError(
+            'tvist_state has no argument: give a pose such as "Q2", a file, or q=, mode=, payload='
+        )
     part: Part = {"fields": fields} if fields else {}
     if start is not None:
         file = _text("tvist_state", start).endswith(FILES)

@@ -33,7 +33,9 @@ class Preparation:
 
     def __init__(self, wanted: WantedRobot) -> None:
         self._wanted = wanted
-        self._later = sorted((fault for fault in wanted.faults if fault.after > 0.0), key=lambda one: one.after)
+        self._later = sorted(
+            (fault for fault in wanted.faults if fault.after > 0.0), key=lambda one: one.after
+        )
         self._controller: Controller | None = None
         self._post: Callable[[Callable[[], None]], None] | None = None
         self._request: Callable[[Command], Reply] | None = None
@@ -71,7 +73,7 @@ class Preparation:
         try:
             self._inject(fault)
         except RefusedError as error:
-            log.error("the fault %s was refused: %s", fault.fault, error)
+            log.warning("the fault %s was refused: %s", fault.fault, error)
 
     def _inject(self, fault: WantedFault) -> None:
         assert self._controller is not None
@@ -86,7 +88,11 @@ class Preparation:
         _accepted(
             self._request(
                 SimulationInject(
-                    token=token, fault=fault.fault, joint=fault.joint, seconds=fault.seconds, value=fault.value
+                    token=token,
+                    fault=fault.fault,
+                    joint=fault.joint,
+                    seconds=fault.seconds,
+                    value=fault.value,
                 )
             )
         )

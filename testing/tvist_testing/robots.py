@@ -119,7 +119,7 @@ class Robots:
         for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
             environment[threads] = "1"
         with theirs:
-            self._process = subprocess.Popen(
+            self._process = subprocess.Popen(  # noqa: S603  our own interpreter and module
                 [sys.executable, "-m", "tvist_testing.nursery", str(theirs.fileno())],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
@@ -129,7 +129,9 @@ class Robots:
             )
         if not ours.recv(64):
             ours.close()
-            raise CannotServeError("the process that makes robots ended at its start: see what it wrote to stderr")
+            raise CannotServeError(
+                "the process that makes robots ended at its start: see what it wrote to stderr"
+            )
         self._requests = ours
 
 

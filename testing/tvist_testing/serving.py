@@ -51,7 +51,9 @@ class Serving:
         """
         return self._made(kind, item, NAME, 0, ur=ur)
 
-    def robots(self, kind: type[R], item: pytest.Item, count: int, before: int) -> list[tuple[R, RobotOfTest]]:
+    def robots(
+        self, kind: type[R], item: pytest.Item, count: int, before: int
+    ) -> list[tuple[R, RobotOfTest]]:
         """Make several robots of a test.
 
         Args:
@@ -61,7 +63,9 @@ class Serving:
             before: Number of robots that the test has already.
         """
         if not isinstance(count, int) or not 1 <= count <= MOST - before:
-            pytest.fail(f"tvist_robots({count!r}): the number of a test's robots is 1 to {MOST}", pytrace=False)
+            pytest.fail(
+                f"tvist_robots({count!r}): the number of a test's robots is 1 to {MOST}", pytrace=False
+            )
         numbers = range(before, before + count)
         return [self._made(kind, item, f"{NAME}-{number + 1}", number) for number in numbers]
 
