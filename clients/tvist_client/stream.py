@@ -28,6 +28,11 @@ class Stream(AsyncIterator[M], Generic[M]):
         self._error: ClientError | None = None
         self._finished = False
 
+    @property
+    def ready(self) -> bool:
+        """Whether the next message, or the end, is there without waiting."""
+        return bool(self._waiting) or self._finished or self._error is not None
+
     def push(self, message: M) -> None:
         """Add a message."""
         if len(self._waiting) == self._waiting.maxlen:

@@ -1,0 +1,202 @@
+"""Assertions on how a robot moved. They let time pass where they need to see more, and show a small table if they fail.
+
+Times count from the tick in which the reference after shaping came to rest, which is when a motion is reported as done.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from tvist_testing.table import figure, table
+
+if TYPE_CHECKING:
+    from tvist_testing.fixture_robot import FixtureRobot
+    from tvist_testing.history import Row
+
+BAND = 1e-4
+"""Distance from its attained position within which the tool counts as settled [m]."""
+WINDOW = 0.3
+"""Time after the stop in which residual vibration is measured [s]."""
+BEYOND = 0.5
+"""Time for which a robot is observed after the time allowed [s]."""
+
+
+def assert_settles_within(robot: "FixtureRobot", seconds: float, *, band: float = BAND) -> float:
+    """Assert that the tool soon stays where it comes to rest; return the time that it took [s].
+
+    A running motion is awaited first. The tool is the flange of the flexible arm, as the simulation knows it.
+
+    Args:
+        robot: Robot of `tvist_robot`, `tvist_robots` or `tvist_ur`.
+        seconds: Largest time from the stop of the shaped reference until the tool stays within the band [s].
+        band: Distance from the attained position, the mean of the last 0.2 s observed [m].
+
+    Raises:
+        AssertionError: It takes longer, or the robot has not moved; the message has a table.
+        ValueError: `seconds` is less than 0, or `band` is not more than 0.
+    """
+    __tracebackhide__ = True
+    from tvist_testing.measures import settling
+
+    _check("seconds", seconds, least=0.0)
+    _check("band", band, least=math.ulp(0.0))
+    rows = _at_rest(robot, seconds + BEYOND)
+    found = settling(rows, band)
+    if found.seconds <= seconds:
+        return found.seconds
+    took = (
+        f"{found.seconds:.3f}"
+        if found.seconds < math.inf
+        else f"more than {rows[-1].time - rows[0].time:.3f}"
+    )
+    late = settling([row for row in rows if row.time - rows[0].time >= seconds], band)
+    raise AssertionError(
+        f"the tool of {robot.name} does not settle within {seconds:g} s\n"
+        + table(
+            ("after the stop", "measured", "limit"),
+            [
+                ("settling time [s]", took, f"{seconds:g}"),
+                ("distance at the stop [mm]", figure(1e3 * found.farthest), ""),
+                (f"distance after {seconds:g} s [mm]", figure(1e3 * late.farthest), f"{1e3 * band:g}"),
+                ("tick of the stop", str(rows[0].tick), ""),
+            ],
+        )
+    )
+
+
+def assert_residual_vibration_below(robot: "FixtureRobot", limit: float, *, window: float = WINDOW) -> float:
+    """Assert that the tool hardly vibrates after a motion; return the residual vibration [m/s²].
+
+    It is the largest acceleration of the flange, without gravity and noise, from 10 ms after the stop of the shaped
+    reference to the end of the window. A running motion is awaited first.
+
+    Args:
+        robot: Robot of `tvist_robot`, `tvist_robots` or `tvist_ur`.
+        limit: Largest residual vibration [m/s²].
+        window: Duration of the window [s].
+
+    Raises:
+        AssertionError: The tool vibrates more, or the robot has not moved; the message has a table.
+        ValueError: `limit` is less than 0, or `window` is not more than 0.02 s.
+    """
+    __tracebackhide__ = True
+    from tvist_testing.measures import vibration
+
+    _check("limit", limit, least=0.0)
+    _check("window", window, least=0.02)
+    rows = _at_rest(robot, window)
+    alpha = vibration(rows, window)
+    value = max(amplitude for _, amplitude in alpha)
+    if value <= limit:
+        return value
+    thirds = [(third * window / 3, (third + 1) * window / 3) for third in range(3)]
+    peaks = [
+        (
+            f"{first:.2f} to {past:.2f} s",
+            figure(max(a for t, a in alpha if first <= t <= past + 1e-9)),
+            f"{limit:g}",
+        )
+        for first, past in thirds
+    ]
+    raise AssertionError(
+        f"the residual vibration of {robot.name} is {value:.3g} m/s², above {limit:g} m/s²\n"
+        + table(("after the stop", "largest |α| [m/s²]", "limit"), peaks)
+    )
+
+
+def assert_within_limits(
+    robot: "FixtureRobot",
+    *,
+    speed: float | Sequence[float] | None = None,
+    acceleration: float | Sequence[float] | None = None,
+    torque: float | Sequence[float] | None = None,
+    tool_speed: float | None = None,
+) -> None:
+    """Assert that since the test began no joint, and if wanted the tool, was beyond its limits.
+
+    Measured angles, velocities and torques count, and the accelerations of the shaped reference. At most the last ten
+    minutes of simulation are looked at.
+
+    Args:
+        robot: Robot of `tvist_robot`, `tvist_robots` or `tvist_ur`.
+        speed: Largest speed of all joints or of each [rad/s]; by default the robot's own limits.
+        acceleration: Largest acceleration [rad/s²], likewise.
+        torque: Largest torque [N m], likewise.
+        tool_speed: Largest speed of the tool centre point [m/s]; by default it has no limit.
+
+    Raises:
+        AssertionError: A limit was exceeded; the message has a table. Or no time has passed.
+        ValueError: A limit is not positive, or there is not one for each joint.
+    """
+    __tracebackhide__ = True
+    from tvist_testing.measures import fastest_tool, largest
+
+    own = robot.history.joint_limits
+    assert own is not None
+    joints = len(own.velocity)
+    rules = [
+        ("speed [rad/s]", "qd", _each("speed", speed, own.velocity)),
+        ("acceleration [rad/s²]", "qdd", _each("acceleration", acceleration, own.acceleration)),
+        ("torque [N m]", "moment", _each("torque", torque, own.torque)),
+    ]
+    if tool_speed is not None:
+        _check("tool_speed", tool_speed, least=math.ulp(0.0))
+    rows = tuple(robot.history.rows)
+    if not rows:
+        raise AssertionError(f"no time has passed for {robot.name}, so there is nothing to look at")
+    beyond: list[tuple[str, str, str, str]] = []
+    for joint in range(joints):
+        low, high = own.position[joint]
+        for row in (min(rows, key=lambda one: one.q[joint]), max(rows, key=lambda one: one.q[joint])):
+            if not low <= row.q[joint] <= high:
+                bounds = f"{figure(low)} to {figure(high)}"
+                beyond.append(
+                    (f"joint {joint}: angle [rad]", figure(row.q[joint]), bounds, f"{row.time:.3f}")
+                )
+        for what, quantity, limits in rules:
+            found = largest(rows, quantity, joint)
+            if found.value > limits[joint]:
+                name = f"joint {joint}: {what}"
+                beyond.append((name, figure(found.value), figure(limits[joint]), f"{found.time:.3f}"))
+    if tool_speed is not None and (tool := fastest_tool(rows)).value > tool_speed:
+        beyond.append(("tool: speed [m/s]", figure(tool.value), figure(tool_speed), f"{tool.time:.3f}"))
+    if beyond:
+        raise AssertionError(
+            f"{robot.name} was beyond its limits\n" + table(("what", "largest", "limit", "at [s]"), beyond)
+        )
+
+
+def _at_rest(robot: "FixtureRobot", seconds: float) -> "list[Row]":
+    """Let the shaped reference come to rest, and at least some time pass after that; return the rows since then."""
+    __tracebackhide__ = True
+    robot.rest()
+    history = robot.history
+    if not any(row.moving for row in history.rows):
+        raise AssertionError(f"{robot.name} has not moved, so there is nothing to look at")
+    rows = history.since_rest()
+    seen = rows[-1].time - rows[0].time if rows else 0.0
+    ticks = math.ceil((seconds - seen) / history.period - 1e-6)
+    if ticks > 0:
+        robot.advance(ticks)
+        robot.settle_messages()
+    return history.since_rest()
+
+
+def _check(name: str, value: float, least: float) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < math.inf:
+        needed = "more than 0" if least == math.ulp(0.0) else f"at least {least:g}"
+        raise ValueError(f"{name} is {value!r}: must be a number, {needed}")
+
+
+def _each(name: str, given: float | Sequence[float] | None, own: Sequence[float]) -> Sequence[float]:
+    """Return a limit for each joint."""
+    if given is None:
+        return own
+    limits = [float(given)] * len(own) if isinstance(given, int | float) else [float(one) for one in given]
+    if len(limits) != len(own):
+        raise ValueError(
+            f"{name} has {len(limits)} limits: must be one number, or one for each of {len(own)} joints"
+        )
+    for limit in limits:
+        _check(name, limit, least=math.ulp(0.0))
+    return limits

@@ -1,0 +1,134 @@
+"""The robot of a test: the blocking client in lockstep, whose waiting calls let time pass."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Generic, Self, TypeVar
+
+from tvist_client import blocking, stream
+from tvist_client import robot as asynchronous_robot
+from tvist_client.portal import Portal
+from tvist_client.published import BUFFER
+from tvist_protocol.stream import Event, State
+from tvist_testing.history import History
+from tvist_testing.robots import ServedRobot
+
+CLIENT = "test"
+"""Name under which the test holds the clock while one of its calls waits."""
+M = TypeVar("M")
+
+
+class SteppingRobot(asynchronous_robot.Robot):
+    """An asynchronous robot that takes the clock for each call that needs time to pass."""
+
+    async def advance(self, ticks: int) -> int:
+        """Advance time; neither control nor the clock is needed.
+
+        Args:
+            ticks: Number of control periods of 0.002 s, at least 1.
+        """
+        if self.stepper is not None or self.arm is not None or await self.clock() == "realtime":
+            return await super().advance(ticks)
+        async with self.clock_control(CLIENT):
+            return await super().advance(ticks)
+
+
+class SteppingStream(blocking.Stream[M], Generic[M]):
+    """Messages as an iterator that lets time pass while none is there."""
+
+    def __init__(self, portal: Portal, robot: SteppingRobot, messages: stream.Stream[M]) -> None:
+        super().__init__(portal, messages)
+        self._robot = robot
+
+    def __next__(self) -> M:
+        while not self._portal.run(lambda: self._stream.ready):
+            self._portal.call(lambda: self._robot.pass_time(1))
+        return super().__next__()
+
+
+class FixtureRobot(blocking.Robot):
+    """A robot of a test's own. In lockstep, each call that waits for it steps its time.
+
+    Attributes:
+        name: Name of the robot on the network.
+        endpoint: Zenoh endpoint, by which programs in other processes reach it.
+        pid: Number of its process, for tests that kill or stop it.
+        log: File with the robot's log.
+        recording: File that the robot records into; after the test it remains only if the test failed.
+        seed: Seed of sensor noise and gear errors.
+        history: What the robot has measured since the test began.
+    """
+
+    def __init__(self, portal: Portal, robot: SteppingRobot) -> None:
+        super().__init__(portal, robot)
+        self._stepping = robot
+        self.name = self.endpoint = ""
+        self.pid = self.seed = 0
+        self.log = self.recording = Path()
+        self.history = History()
+
+    @classmethod
+    def of(cls, served: ServedRobot, name: str, seed: int, log: Path, recording: Path) -> Self:
+        """Connect to a served robot, and wait for its present state."""
+        portal = Portal()
+        try:
+            robot = portal.call(lambda: SteppingRobot.connect(served.endpoint, name))
+        except BaseException:
+            portal.close()
+            raise
+        self = cls(portal, robot)
+        self.name, self.endpoint, self.pid, self.seed = name, served.endpoint, served.pid, seed
+        self.log, self.recording = log, recording
+        try:
+            self._begin(served.publish_state)
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def _begin(self, publish_state: Callable[[], None]) -> None:
+        """Subscribe, and have the state published that no tick precedes."""
+        self.history.joint_limits = self.info().limits
+        self.on_truth(self.history.on_truth)
+        self.on_state(self.history.on_state)
+        self.on_event(self.history.on_event)
+        self._portal.run(self._robot._ios.subscribe)  # noqa: SLF001  so that `io` has something at once
+        self.info()  # answered after the robot has learnt of the subscriptions
+        publish_state()
+        self._portal.call(lambda: self._robot.until(0))
+
+    def settle_messages(self) -> None:
+        """Wait until everything has arrived that the robot published before now, such as the truth of the last tick."""
+        self.info()  # answered behind what was published before
+
+    def states(self, buffer: int = BUFFER) -> SteppingStream[State]:
+        """Iterate over every state from now on; time passes by a tick for each."""
+        return SteppingStream(
+            self._portal, self._stepping, self._portal.run(lambda: self._robot.states(buffer))
+        )
+
+    def events(self, buffer: int = BUFFER) -> SteppingStream[Event]:
+        """Iterate over every event from now on; time passes until the next one."""
+        return SteppingStream(
+            self._portal, self._stepping, self._portal.run(lambda: self._robot.events(buffer))
+        )
+
+
+class UrRobot(FixtureRobot):
+    """A robot of a test's own with UR's interfaces, in real time, since clients of UR robots wait by the wall clock.
+
+    Attributes:
+        host: IP address of UR's interfaces; on Linux it has UR's usual ports.
+        ports: Port of each interface: `dashboard`, `primary`, `secondary`, `realtime`, `rtde`, and so on.
+    """
+
+    def __init__(self, portal: Portal, robot: SteppingRobot) -> None:
+        super().__init__(portal, robot)
+        self.host = ""
+        self.ports: dict[str, int] = {}
+
+    @classmethod
+    def of(cls, served: ServedRobot, name: str, seed: int, log: Path, recording: Path) -> Self:
+        """Connect to a served robot, and wait for a state."""
+        self = super().of(served, name, seed, log, recording)
+        self.host, self.ports = served.host, served.ports
+        return self

@@ -1,0 +1,127 @@
+"""One robot in a process of its own, which the test's process commands over a socket.
+
+From the test: `state` to publish the present state, `close` to end in order, with a complete recording. To the test:
+one line of JSON with the robot's endpoint, or with the reason why there is none. The end of the socket is like `close`.
+"""
+
+import asyncio
+import json
+import logging
+import os
+import secrets
+import signal
+import socket
+import sys
+import threading
+from typing import Any
+
+from tvist_server.config import from_mapping
+from tvist_server.ending import Ending
+from tvist_server.gateways.base import GatewayError
+from tvist_server.server import Server
+from tvist_testing.preparation import Preparation
+from tvist_testing.wanted import WantedRobot
+
+ATTEMPTS = 50
+"""Number of ports or addresses to try, since another process may take one just before the robot listens there."""
+
+
+def serve(wanted: WantedRobot, connection: socket.socket) -> int:
+    """Serve a robot until the test's process wants it to end; return the exit code of this process.
+
+    Args:
+        wanted: The robot.
+        connection: Socket to the test's process.
+    """
+    _log_into(wanted.log)
+    ending = Ending()
+    signal.signal(
+        signal.SIGINT, signal.SIG_IGN
+    )  # Control+C is for the test's process, which then ends this one
+    preparation = Preparation(wanted)
+    try:
+        server, place = _listening(wanted, preparation)
+        preparation.on(server.robots[0])
+    except Exception as error:  # noqa: BLE001  whatever it is, the test should say it
+        _tell(connection, {"error": str(error) or type(error).__name__})
+        return 1
+    listening = threading.Thread(target=_obey, args=(connection, server, ending), daemon=True)
+
+    def ready() -> None:
+        _tell(connection, {**place, "pid": os.getpid()})
+        listening.start()
+
+    asyncio.run(server.run(ready, ending))
+    if server.failure is not None:
+        logging.getLogger(__name__).error("%s", server.failure)
+    return 0 if server.failure is None else 1
+
+
+def _listening(wanted: WantedRobot, preparation: Preparation) -> tuple[Server, dict[str, Any]]:
+    """Return a server on ports that nobody else uses, and where it listens."""
+    for attempt in range(ATTEMPTS):
+        address = _own_address() if wanted.ur else "127.0.0.1"
+        endpoint = f"tcp/{address}:{_free_port(address)}"
+        options: dict[str, Any] = {**wanted.options, "listen": (endpoint,)}
+        place: dict[str, Any] = {"endpoint": endpoint}
+        if wanted.ur:
+            usual = address != "127.0.0.1"
+            ports = {} if usual else {name: _free_port(address) for name in _interfaces()}
+            options |= {"ur": True, "ur_address": address, "ur_ports": ports}
+        config = from_mapping(options, "robot")
+        try:
+            server = Server(config, preparation.observe)
+        except GatewayError:
+            if attempt == ATTEMPTS - 1:
+                raise
+            continue
+        if wanted.ur:
+            host, open_ports = config.interfaces(0)
+            place |= {"host": host, "ports": open_ports}
+        return server, place
+    raise AssertionError
+
+
+def _own_address() -> str:
+    """Return an address of this machine on which UR's own ports are free, as far as the system has such addresses."""
+    if sys.platform != "linux":  # elsewhere only 127.0.0.1 is there
+        return "127.0.0.1"
+    return f"127.{1 + secrets.randbelow(254)}.{secrets.randbelow(256)}.{1 + secrets.randbelow(254)}"
+
+
+def _interfaces() -> tuple[str, ...]:
+    from tvist_server.ur_ports import UrPorts
+
+    return UrPorts.__struct_fields__
+
+
+def _free_port(address: str) -> int:
+    with socket.socket() as probe:
+        probe.bind((address, 0))
+        return int(probe.getsockname()[1])
+
+
+def _obey(connection: socket.socket, server: Server, ending: Ending) -> None:
+    robot = server.robots[0]
+    with connection.makefile("rb") as orders:
+        for order in orders:
+            if order == b"state\n":
+                robot.driven.post(robot.repeat)
+            else:
+                break
+    ending.request()
+
+
+def _tell(connection: socket.socket, message: dict[str, Any]) -> None:
+    connection.sendall(json.dumps(message).encode() + b"\n")
+
+
+def _log_into(path: str) -> None:
+    """Let everything that this process says go into a file."""
+    file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    for standard in (1, 2):
+        os.dup2(file, standard)
+    os.close(file)
+    logging.basicConfig(
+        stream=sys.stderr, level=logging.INFO, format="%(levelname)s %(name)s: %(message)s", force=True
+    )

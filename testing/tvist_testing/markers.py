@@ -1,0 +1,159 @@
+"""The markers of a test, each with its arguments, and the robot that they describe."""
+
+import inspect
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tvist_testing.wanted import WantedFault
+
+if TYPE_CHECKING:
+    import pytest
+
+Part = dict[str, Any]
+"""What a marker adds to the description of a robot."""
+FILES = (".toml", ".json")
+"""Ends of the names of files with a state."""
+
+
+class MarkerError(ValueError):
+    """A marker has arguments that it cannot have; the message says which, and what is expected."""
+
+
+def robot(robot: str) -> Part:
+    """Robot by its name, such as "ur5e", or the path of a robot file."""
+    return {"robot": _text("tvist_robot", robot)}
+
+
+def payload(kilograms: float) -> Part:
+    """Payload that the arm carries and declares [kg]."""
+    return {"payload": _number("tvist_payload", kilograms, "a mass in kg")}
+
+
+def shaper(shaper: str) -> Part:
+    """Shaper by its name, such as "none" or "zv", or FILE.py:NAME."""
+    return {"shaper": _text("tvist_shaper", shaper)}
+
+
+def state(
+    start: str | None = None,
+    *,
+    q: Any = None,
+    mode: str | None = None,
+    payload: Mapping[str, Any] | None = None,
+) -> Part:
+    """State to start in: a pose such as "Q2", or a file; or q [rad], mode such as "POWER_OFF", carried payload."""
+    given = {"q": q, "mode": mode, "payload": payload}
+    fields = {name: value for name, value in given.items() if value is not None}
+    if start is None and not fields:
+        raise MarkerError(
+            'tvist_state has no argument: give a pose such as "Q2", a file, or q=, mode=, payload='
+        )
+    part: Part = {"fields": fields} if fields else {}
+    if start is not None:
+        file = _text("tvist_state", start).endswith(FILES)
+        if file and fields:
+            raise MarkerError(f"tvist_state has the file {start} and {', '.join(fields)}: give one of both")
+        part["state" if file else "start"] = start
+    return part
+
+
+def faults(
+    fault: str,
+    *,
+    joint: int | None = None,
+    seconds: float | None = None,
+    value: float | None = None,
+    after: float = 0.0,
+) -> Part:
+    """Fault of simulation.inject, with its fields, after a simulation time [s]; repeat the marker for more faults."""
+    from tvist_protocol.faults import FAULTS
+
+    if fault not in FAULTS:
+        raise MarkerError(f"tvist_faults has the fault {fault!r}: must be one of {', '.join(FAULTS)}")
+    if _number("tvist_faults", after, "a time in s") < 0.0:
+        raise MarkerError(f"tvist_faults has after={after:g}: must be at least 0 s")
+    return {"faults": WantedFault(fault, joint, seconds, value, float(after))}
+
+
+def program(program: str) -> Part:
+    """Program in URScript to load: its text, or a file NAME.script; `arm.play_program()` or the dashboard plays it."""
+    text = _text("tvist_program", program)
+    if "\n" in text or not text.endswith(".script"):
+        return {"program": ("test", text)}
+    path = Path(text)
+    try:
+        return {"program": (path.stem, path.read_text(encoding="utf-8"))}
+    except OSError as error:
+        raise MarkerError(f"tvist_program has the file {text}: {error.strerror}") from error
+    except UnicodeDecodeError:
+        raise MarkerError(f"tvist_program has the file {text}: it is no text") from None
+
+
+def seed(seed: int) -> Part:
+    """Seed of sensor noise and gear errors; without the marker, that of --tvist-seed."""
+    if not isinstance(seed, int) or isinstance(seed, bool):
+        raise MarkerError(f"tvist_seed has {seed!r}: must be a whole number")
+    return {"seed": seed}
+
+
+MARKERS: dict[str, Callable[..., Part]] = {
+    "tvist_robot": robot,
+    "tvist_payload": payload,
+    "tvist_shaper": shaper,
+    "tvist_state": state,
+    "tvist_faults": faults,
+    "tvist_program": program,
+    "tvist_seed": seed,
+}
+
+
+def described() -> list[str]:
+    """Return the markers with their arguments and meaning, as pytest lists them."""
+    lines = []
+    for name, function in MARKERS.items():
+        signature = inspect.signature(function).replace(return_annotation=inspect.Signature.empty)
+        plain = [one.replace(annotation=inspect.Parameter.empty) for one in signature.parameters.values()]
+        lines.append(f"{name}{signature.replace(parameters=plain)}: {function.__doc__}")
+    return lines
+
+
+def combined(item: "pytest.Item") -> Part:
+    """Return what all markers of a test say together; of equal markers the nearest counts, but faults add up.
+
+    Raises:
+        MarkerError: A marker has arguments that it cannot have.
+    """
+    found: Part = {}
+    injected: list[WantedFault] = []
+    for name, function in MARKERS.items():
+        markers = list(item.iter_markers(name))
+        for marker in markers if name == "tvist_faults" else markers[:1]:
+            part = _called(name, function, marker)
+            if "faults" in part:
+                injected.insert(0, part["faults"])  # markers come from the nearest to the farthest
+            else:
+                found |= part
+    found["faults"] = tuple(injected)
+    return found
+
+
+def _called(name: str, function: Callable[..., Part], marker: "pytest.Mark") -> Part:
+    try:
+        inspect.signature(function).bind(*marker.args, **marker.kwargs)
+    except TypeError as error:
+        takes = ", ".join(inspect.signature(function).parameters)
+        raise MarkerError(f"{name} has wrong arguments, {error}: it takes {takes}") from None
+    return function(*marker.args, **marker.kwargs)
+
+
+def _text(name: str, value: object) -> str:
+    if not isinstance(value, str | Path) or not str(value).strip():
+        raise MarkerError(f"{name} has {value!r}: must be a text that is not empty")
+    return str(value)
+
+
+def _number(name: str, value: object, what: str) -> float:
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        raise MarkerError(f"{name} has {value!r}: must be {what}")
+    return float(value)

@@ -1,0 +1,93 @@
+"""The process that makes robots: it imports and compiles everything once, and forks for each robot.
+
+A forked robot starts in a fraction of the time of `tvist serve`. It has a process of its own, and each begins with a
+copy of the same memory, so what a robot computes does not depend on the robots before it.
+
+The test's process runs `python -m tvist_testing.nursery FD`. On the socket of that number it sends one line of JSON
+for each robot, with one end of the robot's own socket. When the test's process ends, for whatever reason, its sockets
+close, and so the nursery and all its robots end.
+"""
+
+import gc
+import json
+import os
+import signal
+import socket
+import sys
+
+LONGEST = 4 << 20
+"""Longest description of a robot [bytes]; its program may have a million characters."""
+
+
+def main(number: int) -> None:
+    """Make robots until the socket closes.
+
+    Args:
+        number: File descriptor of the socket.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Control+C ends the test's process, and with it this one
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # so that no robot stays behind as a zombie
+    warm_up()
+    gc.collect()
+    gc.freeze()
+    with socket.socket(fileno=number) as requests:
+        requests.sendall(b"ready\n")
+        while True:
+            line, descriptors = _receive(requests)
+            if not line:
+                return
+            if os.fork() == 0:
+                requests.close()
+                _become_robot(line, descriptors[0])
+            os.close(descriptors[0])
+
+
+def warm_up() -> None:
+    """Let a robot make a short motion, which loads or compiles every kernel that a robot usually needs."""
+    from tvist_controller.loopback import LoopbackHost
+    from tvist_protocol.codec import decode_reply, encode
+    from tvist_protocol.commands import MoveJ, TakeControl
+    from tvist_protocol.replies import Accepted
+    from tvist_protocol.simulation import SimulationStep
+    from tvist_server import server  # noqa: F401  what a robot imports before it serves
+    from tvist_server.config import ServeConfig
+
+    setup = ServeConfig(clock="lockstep", truth=True).setup()
+    host = LoopbackHost(setup)
+    reply = decode_reply(host.request("nursery", encode(TakeControl(client="nursery", lease_s=60.0))))
+    assert isinstance(reply, Accepted)
+    assert reply.token is not None
+    near = tuple(angle + 0.01 for angle in setup.q)
+    host.request("nursery", encode(MoveJ(token=reply.token, q=near)))
+    host.request("nursery", encode(SimulationStep(token=reply.token, ticks=100)))
+
+
+def _receive(requests: socket.socket) -> tuple[bytes, list[int]]:
+    """Return the next line and the descriptors that came with it; an empty line at the end."""
+    line, descriptors, _, _ = socket.recv_fds(requests, 65536, 1)
+    while line and not line.endswith(b"\n") and len(line) < LONGEST:
+        more = requests.recv(65536)
+        if not more:
+            return b"", descriptors
+        line += more
+    return line, descriptors
+
+
+def _become_robot(line: bytes, descriptor: int) -> None:
+    """Serve a robot in this forked process, and end it."""
+    from tvist_testing.forked_robot import serve
+    from tvist_testing.wanted import WantedRobot
+
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    code = 1
+    try:
+        with socket.socket(fileno=descriptor) as connection:
+            code = serve(WantedRobot.from_builtins(json.loads(line)), connection)
+    finally:
+        sys.stderr.flush()
+        # Without the clean-up of the interpreter, which belongs to the process that was forked.
+        os._exit(code)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

@@ -1,0 +1,152 @@
+"""The plugin that pytest loads: fixtures with robots, markers, and what remains of a failed test.
+
+It is loaded wherever this package is installed, so it imports nothing but pytest and the standard library; the rest
+follows with the first robot.
+"""
+
+import shutil
+import tempfile
+from collections.abc import Callable, Generator, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from tvist_testing.fixture_robot import FixtureRobot, UrRobot
+    from tvist_testing.kept import RobotOfTest
+    from tvist_testing.serving import Serving
+
+_ROBOTS = pytest.StashKey[list["RobotOfTest"]]()
+_TOLD = pytest.StashKey[bool]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the command line's options."""
+    group = parser.getgroup("tvist", "robots of tvist")
+    group.addoption(
+        "--tvist-seed",
+        type=int,
+        default=0,
+        metavar="N",
+        help="Seed of sensor noise and gear errors of robots without the marker tvist_seed [0].",
+    )
+    group.addoption(
+        "--tvist-recordings",
+        default="tvist-recordings",
+        metavar="DIR",
+        help="Folder for the recordings and logs of failed tests [tvist-recordings in the root folder].",
+    )
+    group.addoption(
+        "--tvist-keep-all", action="store_true", help="Keep the recordings and logs of passed tests as well."
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Register the markers."""
+    from tvist_testing.markers import described
+
+    for line in described():
+        config.addinivalue_line("markers", line)
+
+
+@pytest.fixture(scope="session")
+def _tvist_serving(request: pytest.FixtureRequest) -> Iterator["Serving"]:
+    """What makes robots in this session."""
+    from tvist_testing.serving import Serving
+
+    config = request.config
+    kept = config.rootpath / config.getoption("tvist_recordings")
+    folder = Path(tempfile.mkdtemp(prefix="tvist-"))
+    serving = Serving(folder, kept, config.getoption("tvist_seed"))
+    try:
+        yield serving
+    finally:
+        serving.close()
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@pytest.fixture
+def tvist_robots(
+    request: pytest.FixtureRequest, _tvist_serving: "Serving"
+) -> Iterator[Callable[[int], "list[FixtureRobot]"]]:
+    """Make robots: `tvist_robots(3)` returns three like `tvist_robot`, which differ in name, endpoint and seed."""
+    from tvist_testing.fixture_robot import FixtureRobot
+
+    made: list[FixtureRobot] = []
+
+    def make(count: int) -> "list[FixtureRobot]":
+        robots = _tvist_serving.robots(FixtureRobot, request.node, count, len(made))
+        of_test = request.node.stash.setdefault(_ROBOTS, [])
+        for robot, one in robots:
+            of_test.append(one)
+            made.append(robot)
+        return [robot for robot, _ in robots]
+
+    yield make
+    for robot in made:
+        robot.close()
+
+
+@pytest.fixture
+def tvist_robot(request: pytest.FixtureRequest, _tvist_serving: "Serving") -> Iterator["FixtureRobot"]:
+    """A robot in lockstep of the test's own, ready to be read and moved."""
+    from tvist_testing.fixture_robot import FixtureRobot
+
+    robot, one = _tvist_serving.robot(FixtureRobot, request.node)
+    request.node.stash.setdefault(_ROBOTS, []).append(one)
+    yield robot
+    robot.close()
+
+
+@pytest.fixture
+def tvist_ur(request: pytest.FixtureRequest, _tvist_serving: "Serving") -> Iterator["UrRobot"]:
+    """A robot in real time of the test's own, with UR's interfaces on an address of its own."""
+    from tvist_testing.fixture_robot import UrRobot
+
+    robot, one = _tvist_serving.robot(UrRobot, request.node, ur=True)
+    request.node.stash.setdefault(_ROBOTS, []).append(one)
+    yield robot
+    robot.close()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Say in the report of a failed test where its recordings are; at the test's end keep them, or remove them."""
+    report = yield
+    robots = item.stash.get(_ROBOTS, [])
+    if not robots:
+        return report
+    told = item.stash.get(_TOLD, False)
+    if report.failed and not told:
+        item.stash[_TOLD] = told = True
+        _tell(item, report, robots)
+    if report.when == "teardown":
+        keep_all = item.config.getoption("tvist_keep_all")
+        if keep_all and not told:
+            _note(item, report, robots)
+        for robot in robots:
+            if told or keep_all:
+                robot.keep()
+            else:
+                robot.discard()
+        del item.stash[_ROBOTS]
+    return report
+
+
+def _tell(item: pytest.Item, report: pytest.TestReport, robots: "list[RobotOfTest]") -> None:
+    _note(item, report, robots)
+    for robot in robots:
+        title = f"tvist: robot {robot.recording.stem}"
+        add = getattr(report.longrepr, "addsection", None)
+        if add is None:
+            report.sections.append((title, robot.described()))
+        else:
+            add(title, robot.described())
+
+
+def _note(item: pytest.Item, report: pytest.TestReport, robots: "list[RobotOfTest]") -> None:
+    """Let JUnit and other reports have the paths and the seeds."""
+    properties = [one for robot in robots for one in robot.properties()]
+    item.user_properties += properties  # of the reports that follow
+    report.user_properties += properties

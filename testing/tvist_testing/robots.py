@@ -1,0 +1,160 @@
+"""The test's side of the process that makes robots."""
+
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Self
+
+from tvist_testing.wanted import WantedRobot
+
+PATIENCE = 300.0
+"""Longest wait for an answer of the process [s]: the first start compiles, which takes minutes on a slow machine."""
+NEEDED = ("numpy", "numba", "pinocchio", "ruckig", "mcap", "lark", "zstandard", "cryptography")
+"""Packages of the extra `server` that a robot needs."""
+
+
+class CannotServeError(RuntimeError):
+    """No robot can be served; the message says why, and what to do."""
+
+
+class ServedRobot:
+    """A robot in a process of its own.
+
+    Attributes:
+        endpoint: Zenoh endpoint on which it listens.
+        host: IP address of UR's interfaces; empty if they are not open.
+        ports: Port of each of UR's interfaces.
+        pid: Number of its process.
+    """
+
+    def __init__(self, connection: socket.socket, told: dict[str, Any]) -> None:
+        self.endpoint = str(told["endpoint"])
+        self.host = str(told.get("host", ""))
+        self.ports: dict[str, int] = told.get("ports", {})
+        self.pid = int(told["pid"])
+        self._connection = connection
+
+    def publish_state(self) -> None:
+        """Let the robot publish its present state again."""
+        self._connection.sendall(b"state\n")
+
+    def close(self) -> None:
+        """End the robot in order, so that its recording is complete; a second call does nothing."""
+        with contextlib.suppress(OSError):
+            self._connection.sendall(b"close\n")
+            self._wait()
+        self._connection.close()
+
+    def kill(self) -> None:
+        """End the robot at once, even if a test has stopped its process; nothing is left to be read."""
+        with contextlib.suppress(OSError):
+            os.kill(self.pid, signal.SIGKILL)
+            self._wait()
+        self._connection.close()
+
+    def _wait(self) -> None:
+        """Wait until the process has ended, which closes its end of the socket."""
+        while self._connection.recv(4096):
+            pass
+
+
+class Robots:
+    """The process that makes robots, which starts with the first one. One for each process of tests."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._requests: socket.socket | None = None
+
+    def serve(self, wanted: WantedRobot) -> ServedRobot:
+        """Serve a robot; return it when it answers.
+
+        Raises:
+            CannotServeError: The robot cannot be served as wanted, or not on this machine.
+        """
+        if self._requests is None or (self._process is not None and self._process.poll() is not None):
+            self._start()
+        assert self._requests is not None
+        ours, theirs = socket.socketpair()
+        ours.settimeout(PATIENCE)
+        with theirs:
+            line = json.dumps(wanted.to_builtins()).encode() + b"\n"
+            sent = socket.send_fds(self._requests, [line], [theirs.fileno()])
+            self._requests.sendall(line[sent:])
+        told = _line(ours)
+        if "endpoint" not in told:
+            ours.close()
+            raise CannotServeError(str(told.get("error", f"the robot ended at its start: see {wanted.log}")))
+        return ServedRobot(ours, told)
+
+    def close(self) -> None:
+        """End the process; a second call does nothing."""
+        if self._requests is not None:
+            self._requests.close()
+            self._requests = None
+        if self._process is not None:
+            self._process.wait(PATIENCE)
+            self._process = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def _start(self) -> None:
+        why = unavailable()
+        if why is not None:
+            raise CannotServeError(why)
+        self.close()
+        ours, theirs = socket.socketpair()
+        ours.settimeout(PATIENCE)
+        environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+        # The matrices are small, and a process with threads cannot fork safely.
+        for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+            environment[threads] = "1"
+        with theirs:
+            self._process = subprocess.Popen(  # noqa: S603  our own interpreter and module
+                [sys.executable, "-m", "tvist_testing.nursery", str(theirs.fileno())],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                pass_fds=[theirs.fileno()],
+                env=environment,
+                cwd=Path.cwd(),
+            )
+        if not ours.recv(64):
+            ours.close()
+            raise CannotServeError(
+                "the process that makes robots ended at its start: see what it wrote to stderr"
+            )
+        self._requests = ours
+
+
+def unavailable() -> str | None:
+    """Return why no robot can be served here; None if one can."""
+    if not hasattr(os, "fork"):
+        return "tvist's fixtures need Linux or macOS: this system has no fork"
+    missing = [name for name in ("tvist_server", *NEEDED) if find_spec(name) is None]
+    if missing:
+        return (
+            f"tvist's fixtures need the server's packages ({', '.join(missing)} "
+            f"{'is' if len(missing) == 1 else 'are'} missing): pip install 'tvist[testing]'"
+        )
+    return None
+
+
+def _line(connection: socket.socket) -> dict[str, Any]:
+    """Return the next line of JSON; empty if the connection has ended."""
+    line = b""
+    while not line.endswith(b"\n"):
+        more = connection.recv(65536)
+        if not more:
+            return {}
+        line += more
+    content: dict[str, Any] = json.loads(line)
+    return content

@@ -1,0 +1,116 @@
+"""Robots for one session of tests: from a test's markers to a robot that is ready to be read."""
+
+import itertools
+import json
+from pathlib import Path
+from typing import Any, TypeVar
+
+import pytest
+
+from tvist_protocol.errors import TvistError
+from tvist_testing.fixture_robot import FixtureRobot
+from tvist_testing.kept import RobotOfTest, folder_of
+from tvist_testing.markers import MarkerError, combined
+from tvist_testing.robots import CannotServeError, Robots
+from tvist_testing.wanted import WantedRobot
+
+NAME = "ur5e"
+"""Name of a single robot, which clients look for unless they are told another one."""
+MOST = 100
+"""Largest number of robots of a test."""
+R = TypeVar("R", bound=FixtureRobot)
+
+
+class Serving:
+    """Makes robots.
+
+    Args:
+        folder: Folder for recordings and logs of running tests.
+        kept: Folder for those of failed tests.
+        seed: Seed of robots whose tests have no marker for it.
+    """
+
+    def __init__(self, folder: Path, kept: Path, seed: int) -> None:
+        self._folder = folder
+        self._kept = kept
+        self._seed = seed
+        self._robots = Robots()
+        self._numbers = itertools.count()
+
+    def close(self) -> None:
+        """End the process that makes robots."""
+        self._robots.close()
+
+    def robot(self, kind: type[R], item: pytest.Item, *, ur: bool = False) -> tuple[R, RobotOfTest]:
+        """Make a test's robot; a robot that cannot be made fails the test with one sentence.
+
+        Args:
+            kind: Class of its client.
+            item: The test.
+            ur: Whether UR's interfaces are open, and time is real.
+        """
+        return self._made(kind, item, NAME, 0, ur=ur)
+
+    def robots(
+        self, kind: type[R], item: pytest.Item, count: int, before: int
+    ) -> list[tuple[R, RobotOfTest]]:
+        """Make several robots of a test.
+
+        Args:
+            kind: Class of their clients.
+            item: The test.
+            count: Number of robots.
+            before: Number of robots that the test has already.
+        """
+        if not isinstance(count, int) or not 1 <= count <= MOST - before:
+            pytest.fail(
+                f"tvist_robots({count!r}): the number of a test's robots is 1 to {MOST}", pytrace=False
+            )
+        numbers = range(before, before + count)
+        return [self._made(kind, item, f"{NAME}-{number + 1}", number) for number in numbers]
+
+    def _made(
+        self, kind: type[R], item: pytest.Item, name: str, number: int, *, ur: bool = False
+    ) -> tuple[R, RobotOfTest]:
+        folder = self._folder / str(next(self._numbers))
+        folder.mkdir()
+        recording, log = folder / f"{name}.mcap", folder / f"{name}.log"
+        failure = ""
+        try:
+            part = combined(item)
+            seed = part.pop("seed", self._seed) + number
+            served = self._robots.serve(self._wanted(part, folder, name, seed, ur=ur))
+            try:
+                robot = kind.of(served, name, seed, log, recording)
+            except BaseException:
+                served.kill()
+                raise
+        except (MarkerError, CannotServeError) as error:
+            failure = f"the robot of this test cannot be made: {error}"
+        except TvistError as error:
+            failure = f"the robot of this test does not answer: {error}"
+        if failure:
+            pytest.fail(failure, pytrace=False)
+        return robot, RobotOfTest(served, recording, log, self._kept / folder_of(item.nodeid), seed)
+
+    @staticmethod
+    def _wanted(part: dict[str, Any], folder: Path, name: str, seed: int, *, ur: bool) -> WantedRobot:
+        faults, program = part.pop("faults"), part.pop("program", None)
+        fields = part.pop("fields", None)
+        if fields is not None:
+            state = folder / f"{name}.json"
+            try:
+                state.write_text(json.dumps(fields, default=list), encoding="utf-8")
+            except TypeError:
+                raise MarkerError(f"tvist_state has {fields}: must be numbers, lists and texts") from None
+            part["state"] = str(state)
+        options = {
+            **part,
+            "name": name,
+            "seed": seed,
+            "clock": "realtime" if ur else "lockstep",
+            "truth": True,
+            "record": str(folder / f"{name}.mcap"),
+            "dump": str(folder),
+        }
+        return WantedRobot(options, program, faults, ur, str(folder / f"{name}.log"))
