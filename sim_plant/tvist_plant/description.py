@@ -18,7 +18,8 @@ from tvist_plant.robot_tables import (
     RobotDescription,
     Tensor,
 )
-from tvist_plant.similar import completed
+from tvist_plant.similar import completed, with_limits
+from tvist_plant.urdf import read_urdf
 from tvist_plant.user_file import read_toml, toml
 
 __all__ = [
@@ -48,7 +49,7 @@ def load(robot: str | Path) -> RobotDescription:
     """Read and check a robot file.
 
     Args:
-        robot: Name of a robot that comes with the package, or path of a TOML file.
+        robot: Name of a robot that comes with the package, or path of a TOML or URDF file.
 
     Raises:
         DescriptionError: There is no such robot, or the file is invalid; the message names the key.
@@ -58,6 +59,8 @@ def load(robot: str | Path) -> RobotDescription:
     try:
         if isinstance(robot, str) and robot in robots():
             content = toml(shipped.read_text(encoding="utf-8"))
+        elif Path(robot).suffix == ".urdf":
+            content = with_limits(read_urdf(robot))
         else:
             content = read_toml(robot, "robot file")
         content = completed(content)

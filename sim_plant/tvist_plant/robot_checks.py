@@ -4,7 +4,14 @@ from pathlib import Path
 
 import numpy as np
 
-from tvist_plant.robot_tables import MAX_JOINTS, ORIGINS, DescriptionError, RobotDescription, Tensor
+from tvist_plant.robot_tables import (
+    MAX_JOINTS,
+    ORIGINS,
+    DescriptionError,
+    Kinematics,
+    RobotDescription,
+    Tensor,
+)
 from tvist_plant.units import check_limits
 
 
@@ -35,10 +42,13 @@ def _check(description: RobotDescription, source: str | Path) -> None:
         raise DescriptionError(
             f"robot file {source}: robot.joints has {joints} names; 1 to {MAX_JOINTS} are supported"
         )
+    _check_kinematics(description.kinematics, source)
     for table in ("kinematics", "links", "limits", "drives"):
         values = getattr(description, table)
         for key in values.__struct_fields__:
             value = getattr(values, key)
+            if table == "kinematics" and not value:
+                continue
             if isinstance(value, tuple) and len(value) != joints:
                 raise DescriptionError(
                     f"robot file {source}: {table}.{key} has {len(value)} entries; robot.joints has {joints}"
@@ -49,7 +59,7 @@ def _check(description: RobotDescription, source: str | Path) -> None:
             f"robot file {source}: link_flexibility.stiffness has {len(flexible.stiffness)} entries; "
             f"link_flexibility.links has {len(flexible.links)}"
         )
-    possible = [link for link in range(joints) if description.kinematics.a[link] != 0.0]
+    possible = [link for link, length in enumerate(description.kinematics.a) if length != 0.0]
     if len(set(flexible.links)) < len(flexible.links) or not set(flexible.links).issubset(possible):
         raise DescriptionError(
             f"robot file {source}: link_flexibility.links is {list(flexible.links)}; "
@@ -61,6 +71,18 @@ def _check(description: RobotDescription, source: str | Path) -> None:
             raise DescriptionError(
                 f"robot file {source}: poses.{name} has {len(pose)} entries; robot.joints has {joints}"
             )
+
+
+def _check_kinematics(kinematics: Kinematics, source: str | Path) -> None:
+    """Check that the frames of the links are given in one way."""
+    given = [key for key in ("a", "d", "alpha") if getattr(kinematics, key)]
+    if kinematics.placement and given:
+        raise DescriptionError(
+            f"robot file {source}: kinematics has placement and {', '.join(given)}: give one or the other"
+        )
+    missing = [key for key in ("a", "d", "alpha") if key not in given]
+    if not kinematics.placement and missing:
+        raise DescriptionError(f"robot file {source}: kinematics.{missing[0]} is missing")
 
 
 def _check_collision(description: RobotDescription, source: str | Path) -> None:

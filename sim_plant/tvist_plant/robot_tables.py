@@ -11,13 +11,14 @@ Number = Annotated[float, Meta(ge=-1e7, le=1e7)]
 Positive = Annotated[float, Meta(gt=0, le=1e7)]
 NotNegative = Annotated[float, Meta(ge=0, le=1e7)]
 Vector3 = tuple[Number, Number, Number]
+Placement = tuple[Number, Number, Number, Number, Number, Number]
 Tensor = tuple[NotNegative, Number, Number, NotNegative, Number, NotNegative]
 """Symmetric 3x3 matrix: xx xy xz yy yz zz."""
 
 MAX_JOINTS = 7
 DISTURBANCES = ("friction", "gear", "noise")
 """Disturbances unknown to a shaper: Coulomb friction, kinematic error of the gears, noise of the accelerometer."""
-ORIGINS = ("published", "measured", "assumed", "invented")
+ORIGINS = ("published", "measured", "given", "assumed", "invented")
 """Kinds of origin that `provenance` knows."""
 QUIET_STEP = 2.0 * math.pi / 2**23
 """Step of an encoder with 23 bits per turn [rad]; an arm at rest moves by less than this while its drives settle."""
@@ -40,19 +41,25 @@ class RobotNames(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Names of the joints, from the base to the flange, which also define the number of joints."""
 
 
-class Kinematics(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Standard Denavit-Hartenberg parameters, one entry per joint."""
+class Kinematics(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
+    """The frame at the end of each link in that of its joint, which turns about z; one entry per joint.
 
-    a: tuple[Number, ...]
+    The next joint turns about the z axis of this frame; that of the last link is the flange. Either the standard
+    Denavit-Hartenberg parameters give it, Tz(d) Tx(a) Rx(alpha), or `placement` does.
+    """
+
+    a: tuple[Number, ...] = ()
     """Link lengths [m]."""
-    d: tuple[Number, ...]
+    d: tuple[Number, ...] = ()
     """Link offsets [m]."""
-    alpha: tuple[Number, ...]
+    alpha: tuple[Number, ...] = ()
     """Link twists [rad]."""
+    placement: tuple[Placement, ...] = ()
+    """Position [m] and roll, pitch, yaw about fixed axes [rad]: x y z roll pitch yaw."""
 
 
 class Links(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Masses of the rigid links, in the Denavit-Hartenberg frame of each link."""
+    """Masses of the rigid links, in the frame at the end of each link."""
 
     mass: tuple[Positive, ...]
     """Masses [kg]."""
@@ -150,7 +157,7 @@ class Body(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     name: str
     link: Annotated[int, Meta(ge=-1, lt=MAX_JOINTS)]
-    """Index of the link that it belongs to, and in whose Denavit-Hartenberg frame it is given; -1 for the world."""
+    """Index of the link that it belongs to, and in whose frame it is given; -1 for the world."""
     start: Vector3
     """One end of its axis [m]."""
     end: Vector3

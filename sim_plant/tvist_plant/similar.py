@@ -24,7 +24,7 @@ from typing import Any, Final
 
 import msgspec
 
-from tvist_plant.robot_tables import ArmLimits, Drives, Kinematics, LinkFlexibility
+from tvist_plant.robot_tables import ArmLimits, Drives, Kinematics, LinkFlexibility, Payload, Sensors
 from tvist_plant.user_file import toml
 
 RULE: Final = "assumed: the UR5e's, scaled by dynamic similarity to this arm's torques and length"
@@ -52,8 +52,10 @@ class _Measured(msgspec.Struct, frozen=True):
 
     kinematics: Kinematics
     limits: ArmLimits
+    payload: Payload
     drives: Drives
     link_flexibility: LinkFlexibility
+    sensors: Sensors
 
 
 @cache
@@ -64,6 +66,8 @@ def _measured() -> _Measured:
 
 def stretched(kinematics: Kinematics) -> float:
     """Return the length of all links after the first [m], stretched out into one line."""
+    if kinematics.placement:
+        return math.fsum(math.hypot(*link[:3]) for link in kinematics.placement[1:])
     return math.fsum(math.hypot(a, d) for a, d in zip(kinematics.a[1:], kinematics.d[1:], strict=False))
 
 
@@ -123,11 +127,11 @@ class Scale:
     def link_flexibility(self, kinematics: Kinematics) -> dict[str, Any]:
         """Return the table `link_flexibility`: the long links between the first joint and the wrist bend as the UR5e's.
 
-        A link is long if most of its length is along its x axis; the first one is like the upper arm, all others are
-        like the forearm.
+        Only links with Denavit-Hartenberg parameters bend. A link is long if most of its length is along its x axis;
+        the first one is like the upper arm, all others are like the forearm.
         """
         own = _measured().link_flexibility
-        joints = len(self.torque)
+        joints = len(self.torque) if kinematics.a else 0
         long = [
             link
             for link in range(1, joints - WRIST)
@@ -161,7 +165,7 @@ def completed(content: Mapping[str, Any]) -> dict[str, Any]:
         limits = msgspec.convert(whole.get("limits"), ArmLimits)
     except msgspec.ValidationError:
         return whole
-    if not 1 <= len(limits.torque) <= min(len(kinematics.a), len(kinematics.d)):
+    if len(limits.torque) != max(len(kinematics.placement), min(len(kinematics.a), len(kinematics.d))):
         return whole
     scale = Scale(kinematics, limits.torque)
     whole["drives"] = scale.drives()
@@ -170,6 +174,49 @@ def completed(content: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(provenance, dict):
         whole["provenance"] = {"drives": RULE, "link_flexibility": RULE, **provenance}
     return whole
+
+
+def with_limits(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the content of a robot file with what a URDF lacks: further limits, payload, sensors and poses.
+
+    The payload is the UR5e's, scaled as a weight at the arm's end that loads the second joint as much; accelerations
+    and repeatability scale with the length.
+
+    Args:
+        content: A robot file of an arm with at least one joint, whose `limits` has position, velocity and torque.
+    """
+    known, given = _measured(), content["limits"]
+    scale = Scale(msgspec.convert(content["kinematics"], Kinematics), given["torque"])
+    joints = len(scale.torque)
+    mass = float(f"{known.limits.payload * scale.torque[min(1, joints - 1)] / scale.length:.2g}")
+    size = (mass / known.payload.mass) ** (1 / 3)
+    limits = {
+        **given,
+        "acceleration": [_rounded(known.limits.acceleration[0] / scale.length)] * joints,
+        "jerk": [_rounded(known.limits.jerk[0] / scale.length**1.5)] * joints,
+        "payload": mass,
+        "repeatability": _rounded(known.limits.repeatability * scale.length),
+    }
+    payload = {
+        "mass": mass,
+        "com": [_rounded(size * value) for value in known.payload.com],
+        "inertia": [_rounded(size**5 * value) for value in known.payload.inertia],
+    }
+    guessed = {f"limits.{key}": RULE for key in ("acceleration", "jerk", "payload", "repeatability")}
+    return {
+        **content,
+        "limits": limits,
+        "payload": payload,
+        "sensors": msgspec.structs.asdict(known.sensors),
+        "poses": {
+            name: [min(angle, 0.5 * limit) for limit in given["position"]] for name, angle in _POSES.items()
+        },
+        "provenance": {**content["provenance"], **guessed, "payload": RULE, "sensors": "assumed: the UR5e's"},
+    }
+
+
+_POSES: Final = {"Q1": 0.0, "Q2": 0.5}
+"""Poses of an arm from a URDF: the angle of every joint [rad]."""
 
 
 def _rounded(value: float) -> float:
