@@ -68,12 +68,12 @@ def info_of(controller: Controller) -> Info:
         arm=controller.arm,
         programs=sorted(controller.programs.known),
         poses=setup.description.poses,
-        geometry=geometry_of(setup.description),
+        geometry=None if setup.description.kinematics.placement else geometry_of(setup.description),
     )
 
 
 def geometry_of(description: RobotDescription) -> Geometry:
-    """Kinematics and shape of an arm, for clients that draw it."""
+    """Kinematics and shape of an arm with Denavit-Hartenberg parameters, for clients that draw it."""
     kinematics, collision = description.kinematics, description.collision
     return Geometry(
         a=list(kinematics.a),

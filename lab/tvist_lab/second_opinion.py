@@ -1,17 +1,18 @@
 """Verification of the plant: the same arm built in MuJoCo from the same description, independently of our model.
 
-Bodies, virtual joints and lumps are placed by the description's Denavit-Hartenberg parameters; MuJoCo computes the
+Bodies, virtual joints and lumps are placed by the description's frames; MuJoCo computes the
 dynamics and integrates them (semi-implicit Euler with implicit damping, first order). Only the description is shared;
 gear errors and sensor noise are left out. Requires the package `mujoco`.
 """
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from tvist_plant.description import Payload, RobotDescription, Tensor
 from tvist_plant.drives import DriveCommand
-from tvist_plant.model import FLANGE
+from tvist_plant.model import FLANGE, link_frame
 
 Floats = NDArray[np.float64]
 
@@ -173,11 +174,12 @@ def _build(description: RobotDescription, payload: Payload, timestep: float) -> 
     )
     frame = spec.worldbody
     for number in range(description.joints):
-        a, d, alpha = kinematics.a[number], kinematics.d[number], kinematics.alpha[number]
-        turn = [np.cos(alpha / 2), np.sin(alpha / 2), 0.0, 0.0]
+        place = link_frame(description, number)
+        turn = np.roll(pin.Quaternion(place.rotation).coeffs(), 1).tolist()  # MuJoCo has the scalar first
         body = frame.add_body()
         body.add_joint(name=_joint(number), type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
         if number in stiffness_of:
+            a, d = kinematics.a[number], kinematics.d[number]
             near, far = _lump_places(description, number)
             lump, Ixx = links.mass[number] / 2, links.inertia[number][0]
             small = (Ixx / 2, 0.0, 0.0, Ixx / 2, 0.0, Ixx / 2)
@@ -194,7 +196,7 @@ def _build(description: RobotDescription, payload: Payload, timestep: float) -> 
             frame = body.add_body(pos=[a / 2, 0, 0], quat=turn)
             _add_mass(frame, lump, far, small)
         else:
-            frame = body.add_body(pos=[a, 0, d], quat=turn)
+            frame = body.add_body(pos=place.translation.tolist(), quat=turn)
             _add_mass(frame, links.mass[number], links.com[number], links.inertia[number])
         B = drives.rotor_inertia[number]
         rotor = spec.worldbody.add_body()

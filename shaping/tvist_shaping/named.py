@@ -22,28 +22,41 @@ AnyShaper: TypeAlias = Shaper | FirShaper
 """Types that a user's own shaper may have."""
 
 
-def _auto() -> Design:
-    return ShortDesign(0.030, wanted=FirDesign(residual=(0.035, 0.035, 0.06, 0.2)), name="auto")
+SLOW = 5.5
+"""Lower bound of an arm's frequencies [Hz] below which the designs with constant mean delay become longer: their times
+grow as the longest period.
+"""
 
 
-def _short() -> Design:
-    return ShortDesign(0.028, wanted=FirDesign(residual=(0.05, 0.05, 0.08, 0.2)), name="short")
+def _brief(mean_delay: float, residual: float, third: float, name: str, slower: float) -> Design:
+    wanted = FirDesign(
+        residual=(residual, residual, third, 0.2), shortest=0.05 * slower, longest=0.15 * slower
+    )
+    return ShortDesign(mean_delay * slower, wanted=wanted, name=name)
 
 
-def _auto_target() -> Design:
-    return ShortDesign(0.026, wanted=FirDesign(residual=(0.035, 0.035, 0.06, 0.2)), name=AIMED)
+def _auto(slower: float) -> Design:
+    return _brief(0.030, 0.035, 0.06, "auto", slower)
 
 
-def _elastic_auto() -> Design:
-    return SmoothedDesign(_auto(), running_means(8, 8), ELASTIC_AUTO)
+def _short(slower: float) -> Design:
+    return _brief(0.028, 0.05, 0.08, "short", slower)
 
 
-def _planned() -> Design:
-    return ShortDesign(0.026, wanted=FirDesign(residual=(0.035, 0.035, 0.06, 0.2)), name=PLANNED)
+def _auto_target(slower: float) -> Design:
+    return _brief(0.026, 0.035, 0.06, AIMED, slower)
+
+
+def _elastic_auto(slower: float) -> Design:
+    return SmoothedDesign(_auto(slower), running_means(8, 8), ELASTIC_AUTO)
+
+
+def _planned(slower: float) -> Design:
+    return _brief(0.026, 0.035, 0.06, PLANNED, slower)
 
 
 AIMED, PLANNED, ELASTIC_AUTO = "auto-target", "planned", "elastic-auto"
-DESIGNS: Mapping[str, Callable[[], Design]] = MappingProxyType(
+DESIGNS: Mapping[str, Callable[[float], Design]] = MappingProxyType(
     {
         "auto": _auto,
         "short": _short,
@@ -54,7 +67,7 @@ DESIGNS: Mapping[str, Callable[[], Design]] = MappingProxyType(
 )
 """Designs with constant mean delay against an arm's four lowest modes: one with a smaller residual, one that is
 shorter, one that knows where a motion will end, one that leaves motions unchanged if they are planned to leave no
-vibration, and one for what feed-forward of the arm's elasticity leaves.
+vibration, and one for what feed-forward of the arm's elasticity leaves. The argument is the factor of their times.
 """
 _KINDS = {AIMED: AimedFilter, PLANNED: PlannedFilter}
 SMOOTHED: Mapping[str, FeedForward] = MappingProxyType(
@@ -136,7 +149,7 @@ class Registry:
             return shaper.modes
         if name in SMOOTHED:
             return 1
-        return DESIGNS[name]().modes if name in DESIGNS else modes
+        return DESIGNS[name](1.0).modes if name in DESIGNS else modes
 
     def feed_forward_of(self, name: str) -> FeedForward:
         """Return the feed-forward for the drives that a filter needs, see `Filter.feed_forward`.
@@ -166,7 +179,8 @@ class Registry:
             return SmoothingFilter(name, weights, estimator, joints=joints, feed_forward=feed_forward)
         if name in DESIGNS:
             kind = _KINDS.get(name, SteadyFilter)
-            return kind(DESIGNS[name](), estimator, joints=joints, feed_forward=feed_forward)
+            slower = max(1.0, SLOW / estimator.f_d_min)
+            return kind(DESIGNS[name](slower), estimator, joints=joints, feed_forward=feed_forward)
         shaper = self.own[name] if name in self.own else SHAPERS[name]
         if isinstance(shaper, FirShaper):
             return SteadyFilter(shaper.design(), estimator, joints=joints)

@@ -1,238 +1,40 @@
 """A robot as described by its file: numbers with units, checked but not processed."""
 
-import math
 import tomllib
-from collections.abc import Collection
 from importlib import resources
 from pathlib import Path
-from typing import Annotated
 
 import msgspec
-import numpy as np
-from msgspec import Meta, Struct
 
 from tvist_plant._words import in_words
-from tvist_plant.units import check_limits
+from tvist_plant.robot_checks import check, is_real_body
+from tvist_plant.robot_tables import (
+    DISTURBANCES,
+    QUIET_STEP,
+    Body,
+    DescriptionError,
+    Drives,
+    Payload,
+    RobotDescription,
+    Tensor,
+)
+from tvist_plant.similar import completed, with_limits
+from tvist_plant.urdf import read_urdf
 from tvist_plant.user_file import read_toml, toml
 
-Number = Annotated[float, Meta(ge=-1e7, le=1e7)]
-Positive = Annotated[float, Meta(gt=0, le=1e7)]
-NotNegative = Annotated[float, Meta(ge=0, le=1e7)]
-Vector3 = tuple[Number, Number, Number]
-Tensor = tuple[NotNegative, Number, Number, NotNegative, Number, NotNegative]
-"""Symmetric 3x3 matrix: xx xy xz yy yz zz."""
-
-MAX_JOINTS = 7
-DISTURBANCES = ("friction", "gear", "noise")
-"""Disturbances unknown to a shaper: Coulomb friction, kinematic error of the gears, noise of the accelerometer."""
-QUIET_STEP = 2.0 * math.pi / 2**23
-"""Step of an encoder with 23 bits per turn [rad]; an arm at rest moves by less than this while its drives settle."""
-
-
-class DescriptionError(ValueError):
-    """A robot file is invalid; the message names the file, the key, the value and what is allowed."""
-
-
-class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One table of the file; unknown keys are rejected."""
-
-
-class RobotNames(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Names of the robot and its parts."""
-
-    name: str
-    model: str
-    joints: tuple[str, ...]
-    """Names of the joints, from the base to the flange, which also define the number of joints."""
-
-
-class Kinematics(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Standard Denavit-Hartenberg parameters, one entry per joint."""
-
-    a: tuple[Number, ...]
-    """Link lengths [m]."""
-    d: tuple[Number, ...]
-    """Link offsets [m]."""
-    alpha: tuple[Number, ...]
-    """Link twists [rad]."""
-
-
-class Links(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Masses of the rigid links, in the Denavit-Hartenberg frame of each link."""
-
-    mass: tuple[Positive, ...]
-    """Masses [kg]."""
-    com: tuple[Vector3, ...]
-    """Centres of mass [m]."""
-    inertia: tuple[Tensor, ...]
-    """Inertias about the centres of mass [kg m^2]."""
-
-
-class ArmLimits(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Limits of the controller; tuples have one entry per joint."""
-
-    position: tuple[Positive, ...]
-    """Largest distance from zero in either direction [rad]."""
-    velocity: tuple[Positive, ...]
-    """Velocity limits [rad/s]."""
-    acceleration: tuple[Positive, ...]
-    """Acceleration limits [rad/s^2]."""
-    jerk: tuple[Positive, ...]
-    """Jerk limits [rad/s^3]."""
-    torque: tuple[Positive, ...]
-    """Torque limits [N m]."""
-    payload: NotNegative
-    """Rated payload [kg]."""
-    repeatability: Positive
-    """Repeatability of the tool's position [m]."""
-
-
-class Payload(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A rigid body on the flange."""
-
-    mass: NotNegative = 0.0
-    """Mass [kg]."""
-    com: Vector3 = (0.0, 0.0, 0.0)
-    """Centre of mass in the flange frame [m]."""
-    inertia: Tensor = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    """Inertia about the centre of mass, flange axes [kg m^2]."""
-
-
-class Drives(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Motors, strain wave gears and the drives' cascaded loops; tuples have one entry per joint."""
-
-    gear_stiffness: tuple[Positive, ...]
-    """Gear stiffness K_g [N m/rad]."""
-    gear_damping: tuple[NotNegative, ...]
-    """Gear damping D_g [N m s/rad]."""
-    rotor_inertia: tuple[Positive, ...]
-    """Rotor inertia B, reflected to the joint side [kg m^2]."""
-    velocity_gain: tuple[NotNegative, ...]
-    """Velocity gain K_d [N m s/rad]."""
-    position_gain: tuple[NotNegative, ...]
-    """Position gain K_p [1/s]."""
-    integral_gain: tuple[NotNegative, ...]
-    """Integral gain K_i [1/s]."""
-    coulomb_friction: tuple[NotNegative, ...]
-    """Coulomb friction F_c [N m]."""
-    friction_width: Positive
-    """Width w in F_c tanh(velocity/w) [rad/s]."""
-    friction_feedforward: NotNegative
-    """Share of F_c that is fed forward [-]."""
-    friction_feedforward_width: Positive
-    """Width of the fed-forward friction [rad/s]."""
-    windup_feedforward: tuple[NotNegative, ...]
-    """c_w, share of the gears' wind-up that is fed forward [-]."""
-    gear_error_amplitude: NotNegative
-    """Amplitude of the gears' kinematic error [rad]."""
-    gear_error_waves: Positive
-    """Number of waves of that error per turn of the joint [-]."""
-    linear_friction: bool = False
-    """Use F_c/w times velocity as friction, and feed all of it forward: the plant that the linear modes describe."""
-
-
-class LinkFlexibility(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Links that bend, with two virtual elastic joints about y and z in the middle of each."""
-
-    links: tuple[Annotated[int, Meta(ge=0, lt=MAX_JOINTS)], ...] = ()
-    """Indices of the links, 0 for the first."""
-    stiffness: tuple[Positive, ...] = ()
-    """Stiffness for both axes, one entry per link [N m/rad]."""
-    damping_time: NotNegative = 0.0
-    """Damping divided by stiffness [s]."""
-
-
-class Sensors(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Properties of the sensors."""
-
-    accelerometer_noise: NotNegative = 0.0
-    """rms per axis [m/s^2]."""
-    encoder_step: NotNegative = 0.0
-    """Change of a joint angle after which its reading is updated [rad]."""
-
-
-class Body(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A capsule that encloses a part of the arm."""
-
-    name: str
-    link: Annotated[int, Meta(ge=-1, lt=MAX_JOINTS)]
-    """Index of the link that it belongs to, and in whose Denavit-Hartenberg frame it is given; -1 for the world."""
-    start: Vector3
-    """One end of its axis [m]."""
-    end: Vector3
-    """The other end of its axis [m]."""
-    radius: Positive
-    """Radius [m]."""
-
-
-class Collision(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Bodies that must not collide: those of the arm, and the floor. Neighbours in the list may touch."""
-
-    floor: Number = 0.0
-    """Height of the floor [m]; the first two bodies stand on it and cannot collide with it."""
-    has_floor: bool = True
-    """Whether there is a floor."""
-    payload_radius: Positive = 0.05
-    """Radius of the capsule from the flange through the payload's centre to twice its distance [m]."""
-    apart: tuple[tuple[str, str], ...] = ()
-    """Further pairs that cannot collide; "payload" is one of the names."""
-    bodies: tuple[Body, ...] = ()
-    """Bodies of the arm, from the base to the flange."""
-
-
-class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Content of a robot file."""
-
-    robot: RobotNames
-    kinematics: Kinematics
-    links: Links
-    limits: ArmLimits
-    payload: Payload
-    drives: Drives
-    link_flexibility: LinkFlexibility = LinkFlexibility()
-    sensors: Sensors = Sensors()
-    collision: Collision = Collision()
-    poses: dict[str, tuple[Number, ...]] = {}
-    """Named joint positions [rad]."""
-
-    @property
-    def joints(self) -> int:
-        """Number of joints."""
-        return len(self.robot.joints)
-
-    def quiet(self) -> "RobotDescription":
-        """Return the same arm with sensors whose values are constant once the arm is at rest."""
-        return msgspec.structs.replace(self, sensors=Sensors(encoder_step=QUIET_STEP))
-
-    def without_floor(self) -> "RobotDescription":
-        """Return the same arm without a floor that it could collide with."""
-        replace = msgspec.structs.replace
-        return replace(self, collision=replace(self.collision, has_floor=False))
-
-    def clean(self) -> "RobotDescription":
-        """Return the same arm without noise, gear error and Coulomb friction (its linear equivalent stays)."""
-        return self.disturbed_by(())
-
-    def disturbed_by(self, kept: Collection[str]) -> "RobotDescription":
-        """Return the same arm with only some of its disturbances; the linear equivalent of Coulomb friction stays.
-
-        Args:
-            kept: Disturbances to keep, of `DISTURBANCES`.
-
-        Raises:
-            DescriptionError: There is no such disturbance.
-        """
-        for name in kept:
-            if name not in DISTURBANCES:
-                raise DescriptionError(f"disturbance is {name!r}: must be one of {', '.join(DISTURBANCES)}")
-        replace, drives, sensors = msgspec.structs.replace, self.drives, self.sensors
-        if "friction" not in kept:
-            drives = replace(drives, linear_friction=True)
-        if "gear" not in kept:
-            drives = replace(drives, gear_error_amplitude=0.0)
-        if "noise" not in kept:
-            sensors = replace(sensors, accelerometer_noise=0.0)
-        return replace(self, drives=drives, sensors=sensors)
+__all__ = [
+    "DISTURBANCES",
+    "QUIET_STEP",
+    "Body",
+    "DescriptionError",
+    "Drives",
+    "Payload",
+    "RobotDescription",
+    "Tensor",
+    "is_real_body",
+    "load",
+    "robots",
+]
 
 
 def robots() -> tuple[str, ...]:
@@ -247,7 +49,7 @@ def load(robot: str | Path) -> RobotDescription:
     """Read and check a robot file.
 
     Args:
-        robot: Name of a robot that comes with the package, or path of a TOML file.
+        robot: Name of a robot that comes with the package, or path of a TOML or URDF file.
 
     Raises:
         DescriptionError: There is no such robot, or the file is invalid; the message names the key.
@@ -257,8 +59,11 @@ def load(robot: str | Path) -> RobotDescription:
     try:
         if isinstance(robot, str) and robot in robots():
             content = toml(shipped.read_text(encoding="utf-8"))
+        elif Path(robot).suffix == ".urdf":
+            content = with_limits(read_urdf(robot))
         else:
             content = read_toml(robot, "robot file")
+        content = completed(content)
         description = msgspec.convert(content, RobotDescription)
     except OSError as error:
         known = ", ".join(robots())
@@ -269,82 +74,5 @@ def load(robot: str | Path) -> RobotDescription:
         raise DescriptionError(f"robot file {robot}: it is not valid TOML: {error}") from error
     except msgspec.ValidationError as error:
         raise DescriptionError(f"robot file {robot}: {in_words(error, content)}") from error
-    _check(description, robot)
-    check_limits(description.limits.position, description.limits.velocity, f"robot file {robot}")
-    _check_bodies(description, robot)
+    check(description, robot)
     return description
-
-
-def is_real_body(inertia: Tensor) -> bool:
-    """Return whether the principal moments are physically possible: none negative, none above the sum of the others."""
-    xx, xy, xz, yy, yz, zz = inertia
-    least, middle, most = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return bool(least >= -1e-9 * most and most <= (least + middle) * (1.0 + 1e-6))
-
-
-def _check(description: RobotDescription, source: str | Path) -> None:
-    """Check what types cannot express, such as lengths that must agree and links that must exist."""
-    joints = description.joints
-    if not 1 <= joints <= MAX_JOINTS:
-        raise DescriptionError(
-            f"robot file {source}: robot.joints has {joints} names; 1 to {MAX_JOINTS} are supported"
-        )
-    for table in ("kinematics", "links", "limits", "drives"):
-        values = getattr(description, table)
-        for key in values.__struct_fields__:
-            value = getattr(values, key)
-            if isinstance(value, tuple) and len(value) != joints:
-                raise DescriptionError(
-                    f"robot file {source}: {table}.{key} has {len(value)} entries; robot.joints has {joints}"
-                )
-    flexible = description.link_flexibility
-    if len(flexible.links) != len(flexible.stiffness):
-        raise DescriptionError(
-            f"robot file {source}: link_flexibility.stiffness has {len(flexible.stiffness)} entries; "
-            f"link_flexibility.links has {len(flexible.links)}"
-        )
-    possible = [link for link in range(joints) if description.kinematics.a[link] != 0.0]
-    if len(set(flexible.links)) < len(flexible.links) or not set(flexible.links).issubset(possible):
-        raise DescriptionError(
-            f"robot file {source}: link_flexibility.links is {list(flexible.links)}; "
-            f"each may occur only once and must be one of {possible}, whose length kinematics.a is not 0"
-        )
-    _check_collision(description, source)
-    for name, pose in description.poses.items():
-        if len(pose) != joints:
-            raise DescriptionError(
-                f"robot file {source}: poses.{name} has {len(pose)} entries; robot.joints has {joints}"
-            )
-
-
-def _check_collision(description: RobotDescription, source: str | Path) -> None:
-    """Check that bodies belong to links that exist, and that pairs name bodies."""
-    names = [body.name for body in description.collision.bodies]
-    known = {*names, "payload"}
-    if len(known) <= len(names):
-        raise DescriptionError(
-            f"robot file {source}: collision.bodies has the names {names}; "
-            "each may occur only once, and the names payload and floor are reserved"
-        )
-    for body in description.collision.bodies:
-        if body.link >= description.joints:
-            raise DescriptionError(
-                f"robot file {source}: collision.bodies: {body.name} has link {body.link}; "
-                f"it must be below {description.joints}"
-            )
-    for pair in description.collision.apart:
-        if not known.issuperset(pair):
-            raise DescriptionError(
-                f"robot file {source}: collision.apart has {list(pair)}; the bodies are {sorted(known)}"
-            )
-
-
-def _check_bodies(description: RobotDescription, source: str | Path) -> None:
-    """Check that every inertia is physically possible."""
-    links = {f"links.inertia[{number}]": inertia for number, inertia in enumerate(description.links.inertia)}
-    for key, inertia in {**links, "payload.inertia": description.payload.inertia}.items():
-        if not is_real_body(inertia):
-            raise DescriptionError(
-                f"robot file {source}: {key} is {list(inertia)}; no body can have this: "
-                "a principal moment is negative or larger than the other two together"
-            )

@@ -17,6 +17,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from tvist_plant.description import Payload, RobotDescription, Tensor
+from tvist_plant.urdf import rotation as rotation_of
 
 FLANGE = "flange"
 
@@ -93,7 +94,8 @@ def flexible_model(description: RobotDescription, payload: Payload) -> FlexibleM
 
 def carries_weight(description: RobotDescription) -> bool:
     """Whether gravity can load a joint: not where every axis is vertical, as the first one always is."""
-    return bool(np.any(np.abs(np.sin(description.kinematics.alpha[:-1])) > 1e-9))
+    turns = [link_frame(description, number).rotation for number in range(description.joints - 1)]
+    return any(np.hypot(turn[0, 2], turn[1, 2]) > 1e-9 for turn in turns)
 
 
 def _shift(x: float, z: float) -> pin.SE3:
@@ -101,8 +103,11 @@ def _shift(x: float, z: float) -> pin.SE3:
 
 
 def link_frame(description: RobotDescription, number: int) -> pin.SE3:
-    """Return the Denavit-Hartenberg frame of a link in the frame of its joint: Tz(d) Tx(a) Rx(alpha)."""
+    """Return the frame at the end of a link in that of its joint: Tz(d) Tx(a) Rx(alpha), or its placement."""
     kinematics = description.kinematics
+    if kinematics.placement:
+        x, y, z, *turn = kinematics.placement[number]
+        return pin.SE3(rotation_of(*turn), np.array([x, y, z]))
     alpha = kinematics.alpha[number]
     rotation = np.array([[1, 0, 0], [0, np.cos(alpha), -np.sin(alpha)], [0, np.sin(alpha), np.cos(alpha)]])
     return pin.SE3(rotation, np.array([kinematics.a[number], 0.0, kinematics.d[number]]))

@@ -52,6 +52,10 @@ class Chain:
                 f"{GEOMETRY_VERSION}: update it"
             )
         self.joints = len(geometry.a)
+        if not geometry.a:
+            raise GeometryError(
+                "the robot has no Denavit-Hartenberg parameters: an arm from a URDF cannot be drawn"
+            )
         if not len(geometry.d) == len(geometry.alpha) == self.joints:
             raise GeometryError("the robot's geometry has lists of different lengths")
         if any(not 0 <= link < self.joints for link in geometry.bending) or any(

@@ -125,7 +125,8 @@ class LivePage:
     def __init__(self, server: ViserServer, robot: Robot, info: Info, *, factor: float = 1.0) -> None:
         if info.geometry is None:
             raise GeometryError(
-                f"its server is of version {info.version}, which does not tell the arm's geometry: update the server"
+                f"a {info.model} on a server of version {info.version} does not tell its geometry: arms from a URDF "
+                "cannot be drawn, and servers before 0.1.0 must be updated"
             )
         Chain(info.geometry)  # raises before anything is on the page
         self._server, self._robot, self._info = server, robot, info

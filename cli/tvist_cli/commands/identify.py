@@ -243,11 +243,11 @@ def _modal(
 ) -> None:
     from tvist_controller.setup import paper_payload
     from tvist_lab.identification.modal import identify_modal
-    from tvist_lab.identification.modal_plan import ModalPlan
+    from tvist_lab.identification.modal_plan import ModalPlan, jog_of
     from tvist_protocol.calibration import calibration_to_json
 
     carried = () if masses is None else tuple(paper_payload(arm, mass) for mass in _masses(masses))
-    plan = ModalPlan(ring_downs=ring_downs, payloads=carried, seed=place.seed)
+    plan = ModalPlan(ring_downs=ring_downs, payloads=carried, seed=place.seed, jog=jog_of(arm))
     command = f"tvist identify --model modal --ring-downs {ring_downs} --seed {place.seed}"
     command += place.options
     if masses is not None:

@@ -23,19 +23,17 @@ def available() -> tuple[str, ...]:
 def default_for(model: str) -> str | None:
     """Name of the calibration that a robot uses unless another one is named.
 
-    It is the first, by name, of those that come with the package, are for this model and have the paper's polynomials.
+    It is the first, by name, of those that come with the package, are for this model and have the paper's polynomials;
+    if none has them, the first for this model.
 
     Args:
         model: The robot's model.
 
     Returns:
-        The name; None if the package has no such calibration for this model.
+        The name; None if the package has no calibration for this model.
     """
-    for name in available():
-        calibration = load(name)
-        if calibration.robot == model and calibration.polynomial is not None:
-            return name
-    return None
+    own = [name for name in available() if load(name).robot == model]
+    return next((name for name in own if load(name).polynomial is not None), own[0] if own else None)
 
 
 def load(calibration: str | Path) -> Calibration:

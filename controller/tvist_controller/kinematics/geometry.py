@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from tvist_controller._compiled import compiled
-from tvist_controller.kinematics.denavit_hartenberg import Floats, dh_table
+from tvist_controller.kinematics.denavit_hartenberg import PLACED, Floats, dh_table
 from tvist_plant.description import RobotDescription
 
 ANY, PARALLEL, SPHERICAL = 0.0, 1.0, 2.0
@@ -18,12 +18,17 @@ EXACT = 1e-9
 def arm_table(description: RobotDescription) -> Floats:
     """Return what the kernels of inverse kinematics need to know of an arm, shape (n + 1, 5).
 
-    The first n rows are those of `dh_table`, with the largest distance of the joint from zero [rad] in the last column.
+    The first n rows are those of `dh_table`, with the joint's largest distance from zero [rad] in the fifth column.
+    With placements, the shape is (n + 1, 17).
     The last row has the form (`ANY`, `PARALLEL` or `SPHERICAL`), the length l₃ [m] of the forearm between the axes of
     elbow and wrist in the arm's plane, and its angle ψ [rad] to the x axis of its Denavit-Hartenberg frame.
     """
     dh = dh_table(description)
     limits = np.array(description.limits.position, dtype=float)
+    if dh.shape[1] > PLACED:
+        placed = np.vstack((dh, np.zeros(dh.shape[1])))
+        placed[:-1, PLACED - 1], placed[-1, 0] = limits, ANY
+        return placed
     form = _form(dh)
     forearm, angle = 0.0, 0.0
     if form == PARALLEL:
@@ -41,9 +46,9 @@ def is_of_ur_form(description: RobotDescription) -> bool:
 
 def _form(dh: Floats) -> float:
     """Recognise a form that `postures` solves."""
-    if len(dh) != 6:
+    if len(dh) != 6 or dh.shape[1] > PLACED:
         return ANY
-    a, d, cosine, sine = dh.T
+    a, d, cosine, sine = dh[:, :4].T
     turned, straight = np.abs(cosine) < EXACT, np.abs(sine) < EXACT
     if not (turned[0] and straight[1] and turned[3] and turned[4] and abs(a[1]) > EXACT):
         return ANY

@@ -20,8 +20,6 @@ from tvist_plant.plant import PERIOD
 
 NOISE = 0.03
 """Assumed noise, rms per axis [m/s^2]."""
-LIMITS = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
-"""Limits of the jog, as in a client's `move_j`."""
 
 
 def choose(
@@ -68,7 +66,7 @@ def predicted(arm: ArmModes, q: Floats, payload: int, jog: Jog) -> Ringing:
     system[N:, :N], system[N:, N:] = (-np.linalg.solve(inertia, part) for part in (stiffness, damping))
     move = expm(PERIOD * system)
     forced = np.linalg.solve(system, (move - np.eye(2 * N))[:, N:]) @ np.linalg.inv(inertia)
-    pushes = _pushes(drivetrain.rows[:, joints], mass[np.ix_(joints, joints)], jog.of(len(q)))
+    pushes = _pushes(drivetrain.rows[:, joints], mass[np.ix_(joints, joints)], jog.of(len(q)), jog.limits)
     full = np.zeros((len(pushes), N))
     full[:, motors] = pushes
     z, rates = np.zeros(2 * N), []
@@ -84,10 +82,10 @@ def predicted(arm: ArmModes, q: Floats, payload: int, jog: Jog) -> Ringing:
     return Ringing(q=q, payload=payload, force=force, noise=NOISE)
 
 
-def _pushes(rows: Floats, rigid: Floats, jog: Floats) -> Floats:
+def _pushes(rows: Floats, rigid: Floats, jog: Floats, limits: MotionLimits) -> Floats:
     """Torques of the drives on their motors during and after a jog, shape (ticks, n) [N m]."""
     _, B, K_d, K_p, _ = rows
-    motion = quickest_motion(JointLine(np.zeros_like(jog), jog), LIMITS, PERIOD)
+    motion = quickest_motion(JointLine(np.zeros_like(jog), jog), limits, PERIOD)
     way = []
     while not motion.finished:
         way.append(motion.next())

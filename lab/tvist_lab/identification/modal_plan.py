@@ -9,6 +9,7 @@ from tvist_lab.identification.ring_downs import Jog
 from tvist_lab.recordings import Floats
 from tvist_lab.workspace import identified, ranges
 from tvist_plant.description import RobotDescription
+from tvist_plant.similar import Scale
 from tvist_protocol.values import Payload
 
 RING_DOWNS = 12
@@ -29,6 +30,11 @@ class ModalPlan:
     seed: int = 0
     """Seed of the candidate configurations."""
     jog: Jog = field(default_factory=Jog)
+
+
+def jog_of(description: RobotDescription) -> Jog:
+    """Return the jog for an arm: a quicker one if the arm is shorter than the UR5e, so that its tool shakes as much."""
+    return Jog(quickness=max(1.0, 1.0 / Scale(description.kinematics, description.limits.torque).time))
 
 
 def check(plan: ModalPlan, payloads: int) -> None:

@@ -1,11 +1,12 @@
 """Measurement of ring-downs: make the arm vibrate at a configuration and record it."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from tvist_client.arm import Arm
 from tvist_client.robot import Robot
+from tvist_controller.api import MotionLimits
 from tvist_lab.collect import collect
 from tvist_lab.metrics import RingDown, fit_ring_down, motions, tool_acceleration
 from tvist_lab.recordings import Floats, RecordingError
@@ -37,6 +38,14 @@ class Jog:
     """Length of the jog for the fastest joint [rad]."""
     shares: tuple[float, ...] = (0.6, 0.6, 1.0)
     """Shares of the joints, from the base on [-]."""
+    quickness: float = 1.0
+    """Factor of the velocity; acceleration and jerk grow with its square and cube [-]."""
+
+    @property
+    def limits(self) -> MotionLimits:
+        """Return the limits of the jog: those of a client's `move_j`, and quicker ones for an arm that needs them."""
+        quick = self.quickness
+        return MotionLimits(velocity=1.5 * quick, acceleration=2.0 * quick**2, jerk=100.0 * quick**3)
 
     def of(self, joints: int) -> Floats:
         """Return the displacement of the joints, shape (joints,) [rad]."""
@@ -106,7 +115,7 @@ async def measure(robot: Robot, arm: Arm, q: Floats, jog: Jog, repeats: int) -> 
         await robot.advance(round(PAUSE / period))
         with collect(robot) as collected:
             await robot.advance(1)
-            await arm.move_j(q)
+            await arm.move_j(q, **asdict(jog.limits))
             await robot.advance(round(LISTEN / period))
         recording = collected.recording()
         stop = motions(recording)[0].shaped_stop
@@ -134,7 +143,7 @@ async def listen(robot: Robot, arm: Arm, q: Floats, payload: int, jog: Jog) -> R
     period = 1.0 / (await robot.info()).rate_hz
     with collect(robot) as collected:
         await robot.advance(round(PAUSE / period))
-        await arm.move_j(q)
+        await arm.move_j(q, **asdict(jog.limits))
         await robot.advance(SKIPPED + SAMPLES + 50)
     recording = collected.recording()
     if recording.missing_ticks:

@@ -9,12 +9,13 @@ from tvist_controller.api import body, drivetrain, mass_matrix
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import FlexibleModel, flexible_model
+from tvist_plant.similar import WRIST, Scale
 from tvist_protocol.calibration import ModalParameter, Quantity, Status
 from tvist_protocol.values import Payload
 from tvist_shaping.estimators.drivetrain import Drivetrain
 
 LARGE = 3
-"""Number of joints with large drives, counted from the base; each has its own parameters."""
+"""Number of joints with large drives, counted from the base, of an arm of up to six; each has its own parameters."""
 UNSURE = 0.7
 """Standard deviation of a guess's logarithm: within a factor of four with 95 % probability [-]."""
 NARROWER = 0.5
@@ -25,7 +26,7 @@ SURE = 1.959963984540054
 
 @dataclass(frozen=True)
 class Unknown:
-    """A parameter before it is measured, with a guess for robot arms of about 5 kg payload."""
+    """A parameter before it is measured, with a guess."""
 
     quantity: Quantity
     joints: tuple[int, ...]
@@ -39,29 +40,37 @@ class Unknown:
 def unknowns(description: RobotDescription) -> tuple[Unknown, ...]:
     """Return the parameters of an arm's linear model: one per large joint, and one for all joints of the wrist.
 
-    The rotors' inertia is assumed, since in the visible frequencies it has nearly the same effect as more link
-    inertia.
+    The guesses are those for an arm of about 5 kg payload, scaled as `Scale` scales springs and drives. The rotors'
+    inertia is assumed, since in the visible frequencies it has nearly the same effect as more link inertia.
     """
     joints = range(description.joints)
-    wrist = tuple(joints[LARGE:])
+    large = max(LARGE, description.joints - WRIST)
+    scale = Scale(description.kinematics, description.limits.torque)
+    groups: list[tuple[tuple[int, ...], float, float, float]] = [
+        ((joint,), 24_000.0, 800.0, 1.0) for joint in joints[:large]
+    ]
+    if joints[large:]:
+        groups.append((tuple(joints[large:]), 8_000.0, 300.0, 0.2))
     found = []
-    for joint in joints[:LARGE]:
+    for group, stiffness, gain, rotor in groups:
+        torque = scale.torque[group[0]]
         found += [
-            Unknown("gear_stiffness", (joint,), 24_000.0),
-            Unknown("velocity_gain", (joint,), 800.0),
-            Unknown("rotor_inertia", (joint,), 1.0, 0.0),
+            Unknown("gear_stiffness", group, stiffness * torque),
+            Unknown("velocity_gain", group, gain * torque * scale.time),
+            Unknown("rotor_inertia", group, rotor * torque * scale.length, 0.0),
         ]
-    if wrist:
-        found += [
-            Unknown("gear_stiffness", wrist, 8_000.0),
-            Unknown("velocity_gain", wrist, 300.0),
-            Unknown("rotor_inertia", wrist, 0.2, 0.0),
-        ]
-    found += [Unknown("position_gain", tuple(joints), 12.0), Unknown("damping_time", tuple(joints), 2e-4)]
+    found += [
+        Unknown("position_gain", tuple(joints), 12.0 / scale.time),
+        Unknown("damping_time", tuple(joints), 2e-4 * scale.time),
+    ]
     # A beam is stiffer towards the base, where it is thicker.
     links = description.link_flexibility.links
     found += [
-        Unknown("bending_stiffness", (link,), 200_000.0 if link == min(links) else 100_000.0)
+        Unknown(
+            "bending_stiffness",
+            (link,),
+            (200_000.0 if link == min(links) else 100_000.0) * scale.torque[link],
+        )
         for link in links
     ]
     return tuple(found)

@@ -48,7 +48,7 @@ class FlexibleShoulder:
         """
         kinematics, links = description.kinematics, description.links
         aside = [com[1] for com in links.com] + [payload.com[1]]
-        if description.joints != 2 or any(kinematics.alpha) or any(aside):
+        if len(kinematics.a) != 2 or any(kinematics.alpha) or any(aside):
             raise ValueError(
                 f"robot {description.robot.name}: the closed form is for two vertical axes with masses in line"
             )

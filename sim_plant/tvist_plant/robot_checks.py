@@ -1,0 +1,134 @@
+"""Checks of a robot file that types cannot express."""
+
+from pathlib import Path
+
+import numpy as np
+
+from tvist_plant.robot_tables import (
+    MAX_JOINTS,
+    ORIGINS,
+    DescriptionError,
+    Kinematics,
+    RobotDescription,
+    Tensor,
+)
+from tvist_plant.units import check_limits
+
+
+def check(description: RobotDescription, source: str | Path) -> None:
+    """Check lengths, limits, bodies and names of a robot file.
+
+    Raises:
+        DescriptionError: Something is wrong; the message names the file, the key and what is allowed.
+        UserFileError: A limit is probably in degrees.
+    """
+    _check(description, source)
+    check_limits(description.limits.position, description.limits.velocity, f"robot file {source}")
+    _check_bodies(description, source)
+    _check_provenance(description, source)
+
+
+def is_real_body(inertia: Tensor) -> bool:
+    """Return whether the principal moments are physically possible: none negative, none above the sum of the others."""
+    xx, xy, xz, yy, yz, zz = inertia
+    least, middle, most = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return bool(least >= -1e-9 * most and most <= (least + middle) * (1.0 + 1e-6))
+
+
+def _check(description: RobotDescription, source: str | Path) -> None:
+    """Check what types cannot express, such as lengths that must agree and links that must exist."""
+    joints = description.joints
+    if not 1 <= joints <= MAX_JOINTS:
+        raise DescriptionError(
+            f"robot file {source}: robot.joints has {joints} names; 1 to {MAX_JOINTS} are supported"
+        )
+    _check_kinematics(description.kinematics, source)
+    for table in ("kinematics", "links", "limits", "drives"):
+        values = getattr(description, table)
+        for key in values.__struct_fields__:
+            value = getattr(values, key)
+            if table == "kinematics" and not value:
+                continue
+            if isinstance(value, tuple) and len(value) != joints:
+                raise DescriptionError(
+                    f"robot file {source}: {table}.{key} has {len(value)} entries; robot.joints has {joints}"
+                )
+    flexible = description.link_flexibility
+    if len(flexible.links) != len(flexible.stiffness):
+        raise DescriptionError(
+            f"robot file {source}: link_flexibility.stiffness has {len(flexible.stiffness)} entries; "
+            f"link_flexibility.links has {len(flexible.links)}"
+        )
+    possible = [link for link, length in enumerate(description.kinematics.a) if length != 0.0]
+    if len(set(flexible.links)) < len(flexible.links) or not set(flexible.links).issubset(possible):
+        raise DescriptionError(
+            f"robot file {source}: link_flexibility.links is {list(flexible.links)}; "
+            f"each may occur only once and must be one of {possible}, whose length kinematics.a is not 0"
+        )
+    _check_collision(description, source)
+    for name, pose in description.poses.items():
+        if len(pose) != joints:
+            raise DescriptionError(
+                f"robot file {source}: poses.{name} has {len(pose)} entries; robot.joints has {joints}"
+            )
+
+
+def _check_kinematics(kinematics: Kinematics, source: str | Path) -> None:
+    """Check that the frames of the links are given in one way."""
+    given = [key for key in ("a", "d", "alpha") if getattr(kinematics, key)]
+    if kinematics.placement and given:
+        raise DescriptionError(
+            f"robot file {source}: kinematics has placement and {', '.join(given)}: give one or the other"
+        )
+    missing = [key for key in ("a", "d", "alpha") if key not in given]
+    if not kinematics.placement and missing:
+        raise DescriptionError(f"robot file {source}: kinematics.{missing[0]} is missing")
+
+
+def _check_collision(description: RobotDescription, source: str | Path) -> None:
+    """Check that bodies belong to links that exist, and that pairs name bodies."""
+    names = [body.name for body in description.collision.bodies]
+    known = {*names, "payload"}
+    if len(known) <= len(names):
+        raise DescriptionError(
+            f"robot file {source}: collision.bodies has the names {names}; "
+            "each may occur only once, and the names payload and floor are reserved"
+        )
+    for body in description.collision.bodies:
+        if body.link >= description.joints:
+            raise DescriptionError(
+                f"robot file {source}: collision.bodies: {body.name} has link {body.link}; "
+                f"it must be below {description.joints}"
+            )
+    for pair in description.collision.apart:
+        if not known.issuperset(pair):
+            raise DescriptionError(
+                f"robot file {source}: collision.apart has {list(pair)}; the bodies are {sorted(known)}"
+            )
+
+
+def _check_bodies(description: RobotDescription, source: str | Path) -> None:
+    """Check that every inertia is physically possible."""
+    links = {f"links.inertia[{number}]": inertia for number, inertia in enumerate(description.links.inertia)}
+    for key, inertia in {**links, "payload.inertia": description.payload.inertia}.items():
+        if not is_real_body(inertia):
+            raise DescriptionError(
+                f"robot file {source}: {key} is {list(inertia)}; no body can have this: "
+                "a principal moment is negative or larger than the other two together"
+            )
+
+
+def _check_provenance(description: RobotDescription, source: str | Path) -> None:
+    """Check that what is said to come from somewhere exists, and that the kind of its source is known."""
+    for key, origin in description.provenance.items():
+        value: object = description
+        for part in key.split("."):
+            value = getattr(value, part, None)
+        if value is None or key.startswith("_"):
+            raise DescriptionError(f"robot file {source}: provenance.{key}: there is no such table or key")
+        kind, colon, words = origin.partition(":")
+        if kind not in ORIGINS or not colon or not words.strip():
+            raise DescriptionError(
+                f"robot file {source}: provenance.{key} is {origin!r}: "
+                f"must be one of {', '.join(ORIGINS)}, a colon and the source"
+            )

@@ -1,0 +1,223 @@
+"""Springs and drives of an arm that nobody has measured: the UR5e's, scaled by dynamic similarity.
+
+An arm is taken for a scaled copy of the UR5e in the same gravity. Two ratios describe a joint: τ, of its largest torque
+to that of the UR5e's joint, and λ, of the arm's stretched length to the UR5e's. A joint's torque holds a weight m g L,
+so the inertia that it carries, m L², grows as τ λ, and times grow as the square root of λ (equal Froude number):
+
+    stiffness, friction            K, k_l, F_c  ∝ τ          every gear twists by the same angle at its largest torque
+    inertia of a rotor             B            ∝ τ λ
+    damper of a gear, gain         D_g, K_d     ∝ τ √λ       every damping ratio stays the same
+    gains of the loops             K_p, K_i     ∝ 1/√λ       as frequencies do
+    widths of friction             w            ∝ 1/√λ       F_c/w is a damper
+    time of a link's damping       d_l/k_l      ∝ √λ
+    shares, and errors of gears                 are the same
+
+The first joint is like the UR5e's base, the last three like its wrist, the one before these like its elbow, and all
+others like its shoulder; an arm of less than five joints has the UR5e's first ones.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib import resources
+from typing import Any, Final
+
+import msgspec
+
+from tvist_plant.robot_tables import ArmLimits, Drives, Kinematics, LinkFlexibility, Payload, Sensors
+from tvist_plant.user_file import toml
+
+RULE: Final = "assumed: the UR5e's, scaled by dynamic similarity to this arm's torques and length"
+"""Provenance of what this module computes."""
+WRIST: Final = 3
+"""Number of joints at the end of an arm that are like those of the UR5e's wrist."""
+DIGITS: Final = 4
+"""Number of significant digits that a scaled value keeps."""
+
+_TORQUE, _INERTIA, _DAMPER = 0.0, 1.0, 0.5
+_POWERS: Final = {
+    "gear_stiffness": _TORQUE,
+    "coulomb_friction": _TORQUE,
+    "rotor_inertia": _INERTIA,
+    "gear_damping": _DAMPER,
+    "velocity_gain": _DAMPER,
+}
+"""Power of λ by which each parameter of a joint grows that is proportional to its torque."""
+_RATES: Final = ("position_gain", "integral_gain", "friction_width", "friction_feedforward_width")
+"""Parameters that are proportional to a frequency."""
+
+
+class _Measured(msgspec.Struct, frozen=True):
+    """The UR5e, whose springs and drives agree with measurements."""
+
+    kinematics: Kinematics
+    limits: ArmLimits
+    payload: Payload
+    drives: Drives
+    link_flexibility: LinkFlexibility
+    sensors: Sensors
+
+
+@cache
+def _measured() -> _Measured:
+    text = (resources.files("tvist_plant") / "robots" / "ur5e.toml").read_text(encoding="utf-8")
+    return msgspec.convert(toml(text), _Measured)
+
+
+def stretched(kinematics: Kinematics) -> float:
+    """Return the length of all links after the first [m], stretched out into one line."""
+    if kinematics.placement:
+        return math.fsum(math.hypot(*link[:3]) for link in kinematics.placement[1:])
+    return math.fsum(math.hypot(a, d) for a, d in zip(kinematics.a[1:], kinematics.d[1:], strict=False))
+
+
+def counterpart(joint: int, joints: int) -> int:
+    """Return the index of the UR5e's joint that a joint of an arm with so many joints is like."""
+    if joints < WRIST + 2:
+        return joint
+    if joint >= joints - WRIST:
+        return joint - joints + 6
+    return 0 if joint == 0 else 2 if joint == joints - WRIST - 1 else 1
+
+
+class Scale:
+    """Ratios of an arm to the UR5e.
+
+    Args:
+        kinematics: The arm's links.
+        torque: Largest torque of each joint, shape (n,) [N m].
+    """
+
+    def __init__(self, kinematics: Kinematics, torque: Sequence[float]) -> None:
+        measured = _measured()
+        self.like = [counterpart(joint, len(torque)) for joint in range(len(torque))]
+        """Index of the UR5e's joint that each joint is like, shape (n,)."""
+        self.torque = [
+            value / measured.limits.torque[like] for value, like in zip(torque, self.like, strict=True)
+        ]
+        """τ of each joint, shape (n,) [-]."""
+        length = stretched(kinematics)
+        self.length = length / stretched(measured.kinematics) if length > 0.0 else 1.0
+        """λ [-]."""
+
+    @property
+    def time(self) -> float:
+        """Ratio of times, √λ [-]."""
+        return math.sqrt(self.length)
+
+    def drives(self) -> dict[str, Any]:
+        """Return the table `drives` of the arm."""
+        own = msgspec.structs.asdict(_measured().drives)
+        for key, power in _POWERS.items():
+            grown = self.length**power
+            own[key] = [
+                _rounded(own[key][like] * torque * grown)
+                for like, torque in zip(self.like, self.torque, strict=True)
+            ]
+        for key in _RATES:
+            value = own[key]
+            own[key] = (
+                [_rounded(value[like] / self.time) for like in self.like]
+                if isinstance(value, tuple)
+                else _rounded(value / self.time)
+            )
+        own["windup_feedforward"] = [own["windup_feedforward"][like] for like in self.like]
+        return own
+
+    def link_flexibility(self, kinematics: Kinematics) -> dict[str, Any]:
+        """Return the table `link_flexibility`: the long links between the first joint and the wrist bend as the UR5e's.
+
+        Only links with Denavit-Hartenberg parameters bend. A link is long if most of its length is along its x axis;
+        the first one is like the upper arm, all others are like the forearm.
+        """
+        own = _measured().link_flexibility
+        joints = len(self.torque) if kinematics.a else 0
+        long = [
+            link
+            for link in range(1, joints - WRIST)
+            if abs(kinematics.a[link]) > abs(kinematics.d[link])
+            and abs(kinematics.a[link]) > LONG * self.length
+        ]
+        return {
+            "links": long,
+            "stiffness": [
+                _rounded(own.stiffness[min(number, 1)] * self.torque[link])
+                for number, link in enumerate(long)
+            ],
+            "damping_time": _rounded(own.damping_time * self.time),
+        }
+
+
+LONG: Final = 0.2
+"""Length of a link above which it bends, in an arm as long as the UR5e [m]."""
+
+
+def completed(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the content of a robot file with springs and drives by the rule, if it has no table `drives`.
+
+    What is wrong with the content is left as it is, for the checks that follow.
+    """
+    whole = dict(content)
+    if "drives" in whole:
+        return whole
+    try:
+        kinematics = msgspec.convert(whole.get("kinematics"), Kinematics)
+        limits = msgspec.convert(whole.get("limits"), ArmLimits)
+    except msgspec.ValidationError:
+        return whole
+    if len(limits.torque) != max(len(kinematics.placement), min(len(kinematics.a), len(kinematics.d))):
+        return whole
+    scale = Scale(kinematics, limits.torque)
+    whole["drives"] = scale.drives()
+    whole.setdefault("link_flexibility", scale.link_flexibility(kinematics))
+    provenance = whole.get("provenance", {})
+    if isinstance(provenance, dict):
+        whole["provenance"] = {"drives": RULE, "link_flexibility": RULE, **provenance}
+    return whole
+
+
+def with_limits(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the content of a robot file with what a URDF lacks: further limits, payload, sensors and poses.
+
+    The payload is the UR5e's, scaled as a weight at the arm's end that loads the second joint as much; accelerations
+    and repeatability scale with the length.
+
+    Args:
+        content: A robot file of an arm with at least one joint, whose `limits` has position, velocity and torque.
+    """
+    known, given = _measured(), content["limits"]
+    scale = Scale(msgspec.convert(content["kinematics"], Kinematics), given["torque"])
+    joints = len(scale.torque)
+    mass = float(f"{known.limits.payload * scale.torque[min(1, joints - 1)] / scale.length:.2g}")
+    size = (mass / known.payload.mass) ** (1 / 3)
+    limits = {
+        **given,
+        "acceleration": [_rounded(known.limits.acceleration[0] / scale.length)] * joints,
+        "jerk": [_rounded(known.limits.jerk[0] / scale.length**1.5)] * joints,
+        "payload": mass,
+        "repeatability": _rounded(known.limits.repeatability * scale.length),
+    }
+    payload = {
+        "mass": mass,
+        "com": [_rounded(size * value) for value in known.payload.com],
+        "inertia": [_rounded(size**5 * value) for value in known.payload.inertia],
+    }
+    guessed = {f"limits.{key}": RULE for key in ("acceleration", "jerk", "payload", "repeatability")}
+    return {
+        **content,
+        "limits": limits,
+        "payload": payload,
+        "sensors": msgspec.structs.asdict(known.sensors),
+        "poses": {
+            name: [min(angle, 0.5 * limit) for limit in given["position"]] for name, angle in _POSES.items()
+        },
+        "provenance": {**content["provenance"], **guessed, "payload": RULE, "sensors": "assumed: the UR5e's"},
+    }
+
+
+_POSES: Final = {"Q1": 0.0, "Q2": 0.5}
+"""Poses of an arm from a URDF: the angle of every joint [rad]."""
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")

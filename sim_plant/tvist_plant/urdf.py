@@ -1,0 +1,353 @@
+"""Robots from URDF files: an open chain of turning joints, its masses and its limits.
+
+A URDF says nothing of springs, drives, accelerations or payload: these follow from the UR5e's by the rule of
+`tvist_plant.similar`. Links that are fixed to each other become one. The base frame is where the first joint's axis
+meets the height of the URDF's root link; that axis must be vertical.
+"""
+
+import math
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Final
+from xml.etree.ElementTree import Element, ParseError, iterparse
+
+import numpy as np
+import numpy.typing as npt
+
+from tvist_plant.robot_tables import DescriptionError
+from tvist_plant.user_file import DEEPEST, UserFileError, read_text
+
+Floats = npt.NDArray[np.float64]
+
+TURNING: Final = ("revolute", "continuous")
+FLANGES: Final = ("tool0", "flange")
+"""Names of a link that stands for the flange, if it is fixed to the last joint; otherwise that joint's link does."""
+CONTINUOUS: Final = 4.0 * math.pi
+"""Largest distance from zero of a joint without end stops [rad]."""
+UPRIGHT: Final = 1e-6
+"""Deviation of the first axis from the vertical that still counts as rounding [-]."""
+
+
+class UrdfError(DescriptionError):
+    """A URDF file describes no arm that can be simulated; the message names the link or joint."""
+
+
+@dataclass(frozen=True)
+class _Joint:
+    name: str
+    kind: str
+    parent: str
+    child: str
+    placement: Floats
+    """Frame of the child in that of the parent, 4x4."""
+    axis: Floats
+    limit: Element | None
+
+
+@dataclass
+class _Body:
+    """Sum of rigid bodies, in one frame."""
+
+    mass: float = 0.0
+    moment: Floats = field(default_factory=lambda: np.zeros(3))
+    """Mass times centre of mass [kg m]."""
+    inertia: Floats = field(default_factory=lambda: np.zeros((3, 3)))
+    """Inertia about the frame's origin [kg m²]."""
+
+    def add(self, mass: float, com: Floats, inertia: Floats) -> None:
+        self.mass += mass
+        self.moment = self.moment + mass * com
+        self.inertia = self.inertia + inertia + mass * (com @ com * np.eye(3) - np.outer(com, com))
+
+    def about_centre(self) -> tuple[Floats, Floats]:
+        com = self.moment / self.mass
+        return com, self.inertia - self.mass * (com @ com * np.eye(3) - np.outer(com, com))
+
+
+def read_urdf(path: str | Path) -> dict[str, Any]:
+    """Read a URDF file as the content of a robot file without springs and drives.
+
+    Raises:
+        UrdfError: The file describes no arm that can be simulated.
+        UserFileError: The file is not text, too large or nested too deeply.
+        OSError: The file cannot be read.
+    """
+    where = f"robot file {path}"
+    root = _parsed(path, where)
+    links = {_named(link, where): link for link in root.findall("link")}
+    joints = [_joint(joint, where) for joint in root.findall("joint")]
+    for joint in joints:
+        for link in (joint.parent, joint.child):
+            if link not in links:
+                raise UrdfError(f"{where}: joint {joint.name}: there is no link {link!r}")
+    chain = _chain(_root(links, joints, where), joints, where)
+    return _content(str(root.get("name") or Path(path).stem), Path(path), links, joints, chain, where)
+
+
+def _parsed(path: str | Path, where: str) -> Element:
+    text = read_text(path, "robot file")
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise UrdfError(f"{where}: it has a document type, which no URDF needs: remove it")
+    depth = 0
+    root: Element | None = None
+    try:
+        for event, element in iterparse(BytesIO(text.encode()), ("start", "end")):
+            root = element if root is None else root
+            depth += 1 if event == "start" else -1
+            if depth > DEEPEST:
+                raise UserFileError(f"{where} is nested too deeply: at most {DEEPEST} levels are supported")
+    except ParseError as error:
+        raise UrdfError(f"{where}: it is not valid XML: {error}") from error
+    if root is None or root.tag != "robot":
+        raise UrdfError(f"{where}: it is no URDF: its outermost element must be <robot>; expand xacro first")
+    return root
+
+
+def _named(element: Element, where: str) -> str:
+    name = element.get("name")
+    if not name:
+        raise UrdfError(f"{where}: a <{element.tag}> has no name")
+    return name
+
+
+def _joint(element: Element, where: str) -> _Joint:
+    name = _named(element, where)
+    here = f"{where}: joint {name}"
+    ends = [
+        part.get("link") if (part := element.find(tag)) is not None else None for tag in ("parent", "child")
+    ]
+    if not ends[0] or not ends[1]:
+        raise UrdfError(f"{here} has no parent or no child link")
+    axis = element.find("axis")
+    direction = np.array([1.0, 0.0, 0.0]) if axis is None else _numbers(axis, "xyz", (1.0, 0.0, 0.0), here)
+    kind = str(element.get("type"))
+    if kind in TURNING and not np.linalg.norm(direction) > 0.0:
+        raise UrdfError(f"{here}: axis is 0 0 0: must have a direction")
+    if kind in TURNING and element.find("mimic") is not None:
+        raise UrdfError(f"{here} mimics another joint: only joints of their own are supported")
+    return _Joint(name, kind, ends[0], ends[1], _origin(element, here), direction, element.find("limit"))
+
+
+def _numbers(element: Element, key: str, default: tuple[float, ...], here: str) -> Floats:
+    text = element.get(key)
+    try:
+        found = np.array(default if text is None else [float(word) for word in text.split()])
+    except ValueError:
+        found = np.zeros(0)
+    if len(found) != len(default) or not np.isfinite(found).all():
+        raise UrdfError(f"{here}: {key} is {text!r}: must be {len(default)} numbers")
+    return found
+
+
+def _origin(element: Element, here: str) -> Floats:
+    origin = element.find("origin")
+    placement = np.eye(4)
+    if origin is not None:
+        placement[:3, :3] = rotation(*_numbers(origin, "rpy", (0.0, 0.0, 0.0), here))
+        placement[:3, 3] = _numbers(origin, "xyz", (0.0, 0.0, 0.0), here)
+    return placement
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> Floats:
+    """Return the rotation matrix of URDF's angles: about fixed x, then y, then z [rad], shape (3, 3)."""
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(angle), math.sin(angle)) for angle in (roll, pitch, yaw))
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def angles(matrix: Floats) -> tuple[float, float, float]:
+    """Return URDF's angles of a rotation matrix [rad]; where they are not unique, roll is 0."""
+    level = math.hypot(matrix[0, 0], matrix[1, 0])
+    if level < UPRIGHT:
+        return 0.0, math.atan2(-matrix[2, 0], level), math.atan2(-matrix[0, 1], matrix[1, 1])
+    return (
+        math.atan2(matrix[2, 1], matrix[2, 2]),
+        math.atan2(-matrix[2, 0], level),
+        math.atan2(matrix[1, 0], matrix[0, 0]),
+    )
+
+
+def _root(links: dict[str, Element], joints: list[_Joint], where: str) -> str:
+    children = [joint.child for joint in joints]
+    twice = next((name for name in children if children.count(name) > 1), None)
+    if twice is not None:
+        raise UrdfError(f"{where}: link {twice} is the child of two joints: closed chains are not supported")
+    roots = [name for name in links if name not in children]
+    if len(roots) != 1:
+        raise UrdfError(f"{where}: {len(roots)} links are no joint's child: exactly one must be, the base")
+    return roots[0]
+
+
+def _chain(root: str, joints: list[_Joint], where: str) -> list[_Joint]:
+    """Return the movable joints from the base on.
+
+    Raises:
+        UrdfError: The chain branches, or a joint is of a kind that is not supported.
+    """
+    chain: list[_Joint] = []
+    at: str | None = root
+    while at is not None:
+        rigid = _rigid(at, joints)
+        ways = [joint for joint in joints if joint.parent in rigid and joint.kind != "fixed"]
+        if len(ways) > 1:
+            names = ", ".join(joint.name for joint in ways)
+            raise UrdfError(
+                f"{where}: the chain branches after link {at}, into the joints {names}: only one chain is supported; "
+                "make the others fixed or remove them"
+            )
+        at = None
+        for joint in ways:
+            if joint.kind not in TURNING:
+                raise UrdfError(
+                    f"{where}: joint {joint.name} is {joint.kind}: must be {', '.join(TURNING)} or fixed"
+                )
+            chain.append(joint)
+            at = joint.child
+    if not chain:
+        raise UrdfError(f"{where}: it has no joint that turns")
+    return chain
+
+
+def _rigid(link: str, joints: list[_Joint]) -> dict[str, Floats]:
+    """Return the links that are fixed to a link, itself included, with their frames in its frame."""
+    found = {link: np.eye(4)}
+    waiting = [link]
+    while waiting:
+        at = waiting.pop()
+        for joint in joints:
+            if joint.parent == at and joint.kind == "fixed" and joint.child not in found:
+                found[joint.child] = found[at] @ joint.placement
+                waiting.append(joint.child)
+    return found
+
+
+def _content(
+    name: str, path: Path, links: dict[str, Element], joints: list[_Joint], chain: list[_Joint], where: str
+) -> dict[str, Any]:
+    turns = [_about_z(joint.axis) for joint in chain]
+    frames = [_in_previous(joint, joints) for joint in chain]
+    first = frames[0] @ turns[0]
+    if first[2, 2] < 1.0 - UPRIGHT:
+        raise UrdfError(f"{where}: the axis of joint {chain[0].name} must point straight up from the base")
+    placements, bodies = [], []
+    for number, joint in enumerate(chain):
+        back = np.asarray(np.linalg.inv(turns[number]), dtype=np.float64)
+        last = number == len(chain) - 1
+        after = _flange(joint.child, joints) if last else frames[number + 1] @ turns[number + 1]
+        placement: Floats = back @ after
+        bodies.append(_body(joint.child, links, joints, placement, back, where))
+        if number == 0:  # turning about the first axis and moving along it change places with the joint
+            upright = first.copy()
+            upright[:2, 3] = 0.0
+            placement = upright @ placement
+        placements.append([*placement[:3, 3].tolist(), *angles(placement[:3, :3])])
+    masses = [body.mass for body in bodies]
+    centres = [body.about_centre() for body in bodies]
+    given = f"given: {path.name}"
+    limits, notes = _limits(chain, where)
+    return {
+        "robot": {"name": path.stem, "model": name, "joints": [joint.name for joint in chain]},
+        "kinematics": {"placement": placements},
+        "links": {
+            "mass": masses,
+            "com": [com.tolist() for com, _ in centres],
+            "inertia": [tensor[np.triu_indices(3)].tolist() for _, tensor in centres],
+        },
+        "limits": limits,
+        "provenance": {
+            "kinematics": given,
+            "links": given,
+            "limits.velocity": given,
+            "limits.torque": given,
+            "limits.position": f"assumed: {notes}" if notes else given,
+        },
+    }
+
+
+def _about_z(axis: Floats) -> Floats:
+    """Return a frame whose z axis is a joint's axis, 4x4."""
+    z = axis / np.linalg.norm(axis)
+    frame = np.eye(4)
+    if np.array_equal(z, [0.0, 0.0, 1.0]):
+        return frame
+    x = np.eye(3)[int(np.argmin(np.abs(z)))]
+    x = x - (x @ z) * z
+    x /= np.linalg.norm(x)
+    frame[:3, :3] = np.column_stack((x, np.cross(z, x), z))
+    return frame
+
+
+def _in_previous(joint: _Joint, joints: list[_Joint]) -> Floats:
+    """Return the frame of a joint in that of the link which the joint before it moves, or of the base."""
+    placement, at = joint.placement, joint.parent
+    while (
+        before := next((one for one in joints if one.child == at and one.kind == "fixed"), None)
+    ) is not None:
+        placement, at = before.placement @ placement, before.parent
+    return placement
+
+
+def _flange(link: str, joints: list[_Joint]) -> Floats:
+    rigid = _rigid(link, joints)
+    return next((rigid[name] for name in FLANGES if name in rigid), rigid[link])
+
+
+def _body(
+    link: str, links: dict[str, Element], joints: list[_Joint], end: Floats, back: Floats, where: str
+) -> _Body:
+    """Return the bodies that a joint moves up to the next one, in the frame at their end."""
+    whole, into = _Body(), np.linalg.inv(end) @ back
+    for name, placement in _rigid(link, joints).items():
+        inertial = links[name].find("inertial")
+        if inertial is None:
+            continue
+        here = f"{where}: link {name}"
+        mass, tensor = inertial.find("mass"), inertial.find("inertia")
+        if mass is None or tensor is None:
+            raise UrdfError(f"{here}: <inertial> has no <mass> or no <inertia>")
+        value = float(_numbers(mass, "value", (0.0,), here)[0])
+        xx, xy, xz, yy, yz, zz = (
+            float(_numbers(tensor, key, (0.0,), here)[0])
+            for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+        )
+        at = into @ placement @ _origin(inertial, here)
+        turn = at[:3, :3]
+        matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        whole.add(value, at[:3, 3], turn @ matrix @ turn.T)
+    if not whole.mass > 0.0:
+        raise UrdfError(f"{where}: link {link} has no <inertial> with a mass: a moving link needs one")
+    return whole
+
+
+def _limits(chain: list[_Joint], where: str) -> tuple[dict[str, Any], str]:
+    """Return the table `limits`, and what was assumed about positions."""
+    position, velocity, torque, notes = [], [], [], []
+    for joint in chain:
+        here = f"{where}: joint {joint.name}"
+        if joint.limit is None:
+            raise UrdfError(f"{here} has no <limit>: effort and velocity are needed")
+        values = {
+            key: float(_numbers(joint.limit, key, (0.0,), here)[0])
+            for key in ("lower", "upper", "effort", "velocity")
+        }
+        for key in ("effort", "velocity"):
+            if not values[key] > 0.0:
+                raise UrdfError(f"{here}: <limit> has {key} {values[key]:g}: must be more than 0")
+        low, high = values["lower"], values["upper"]
+        if joint.kind == "continuous":
+            low, high = -CONTINUOUS, CONTINUOUS
+        elif not low < high:
+            raise UrdfError(f"{here}: <limit> has lower {low:g} and upper {high:g}: lower must be less")
+        most = max(abs(low), abs(high))
+        if low + high != 0.0:
+            notes.append(f"{joint.name} {low:g} to {high:g} rad in the URDF, here ±{most:g}")
+        position.append(most)
+        velocity.append(values["velocity"])
+        torque.append(values["effort"])
+    return {"position": position, "velocity": velocity, "torque": torque}, "; ".join(notes)
