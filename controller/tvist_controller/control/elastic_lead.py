@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tvist_controller._compiled import compiled
-from tvist_controller.elimination import eliminate
 from tvist_controller.control.differentiator import Floats
+from tvist_controller.elimination import eliminate
 
 Integers = npt.NDArray[np.int64]
 
