@@ -11,7 +11,7 @@ READY := .venv/.ready
 # The folders of the distributions: tvist-protocol, tvist-shaping, tvist-urscript and tvist.
 DISTRIBUTIONS := ./protocol ./shaping ./urscript .
 
-.PHONY: docs docs-serve setup demo notebooks test test-all lint elsewhere bench soak dist format lock schemas clean
+.PHONY: checksums docs docs-serve release setup demo notebooks test test-all lint elsewhere bench soak dist format lock schemas clean
 
 setup: $(READY)
 
@@ -96,6 +96,13 @@ dist: setup
 	for each in $(DISTRIBUTIONS); do \
 	  (cd $$each && SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) $(CURDIR)/$(BIN)/hatchling build -d $(CURDIR)/dist) || exit 1; \
 	done
+
+checksums: dist
+	$(BIN)/python -m tools.release checksums dist
+
+# `make release VERSION=X.Y.Z` writes versions and the changelog's date, and says what to do next.
+release:
+	$(PYTHON) -m tools.release prepare $(VERSION)
 
 schemas: setup
 	$(BIN)/python -m tvist_protocol.generate

@@ -1,0 +1,1 @@
+"""Releases: one version for all distributions, a dated changelog, a tag."""
