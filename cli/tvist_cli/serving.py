@@ -53,6 +53,8 @@ def say_who_can_reach(server: "Server", config: "ServeConfig") -> None:
     for address, ports in server.ur:
         listed = ", ".join(f"{interface} {port}" for interface, port in ports.items())
         say(f"UR's interfaces are open on {address}: {listed}")
+    if server.metrics is not None:
+        say(f"figures for Prometheus are on {server.metrics.page}")
     whom = "this robot" if len(server.robots) == 1 else "these robots"
     for endpoint in config.endpoints if config.insecure else ():
         say(f"anyone who can reach {endpoint} can move {whom}")

@@ -55,6 +55,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Zenoh endpoints of routers to connect to; the robot uses the first that answers."""
     namespace: Namespace | None = None
     """Chunks that precede the robot's keys, so that robots of several places can share a network."""
+    metrics: str | None = None
+    """ADDRESS:PORT to publish figures for Prometheus on, or a port of the loopback interface."""
     security: str | None = None
     """Folder with certificates and roles, made by `tvist keys`; endpoints are then tls/… With `connect`, the folder of
     a client with the role robot."""

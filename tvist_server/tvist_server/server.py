@@ -23,6 +23,7 @@ from tvist_server.fleet import recording_of
 from tvist_server.gateways.base import Gateway
 from tvist_server.gateways.console import Console, ConsoleGateway
 from tvist_server.gateways.exposure import ExposureError, check_endpoints, guarded, guarded_interfaces
+from tvist_server.gateways.metrics import Metrics
 from tvist_server.gateways.network import Network
 from tvist_server.gateways.ur.interfaces import UrInterfaces
 from tvist_server.robot import ServedRobot
@@ -68,6 +69,8 @@ class Server:
         except ExposureError as error:
             raise ConfigError(str(error)) from error
         self.robots: list[ServedRobot] = []
+        self.metrics: Metrics | None = None
+        """Figures for Prometheus; None if they are not published."""
         self.left = True
         """Whether the network is closed after `close`. Zenoh or a courier may still wait for a client that has stopped
         reading."""
@@ -86,6 +89,7 @@ class Server:
                 on_router=partial(self._tell_router, ", ".join(config.connect)),
             )
             self._console = Console()
+            self.metrics = None if config.metrics is None else Metrics(config.metrics)
             self._interfaces: list[UrInterfaces] = []
             self.ur: list[tuple[str, dict[InterfaceName, int]]] = []
             """Address and ports of each robot's UR interfaces; empty if they are not open."""
@@ -120,6 +124,8 @@ class Server:
 
     def discard(self) -> None:
         """Close the robots of a server that has not started, and remove their recordings."""
+        if self.metrics is not None:
+            self.metrics.close()
         for robot in self.robots:
             robot.close()
             robot.discard_recording()
@@ -135,6 +141,8 @@ class Server:
             self._interfaces.append(interfaces)
             self.ur.append((interfaces.address, interfaces.ports))
             gateways.append(interfaces)
+        if self.metrics is not None:
+            gateways.append(self.metrics.gateway(config.namespace or "", name))
         if not self._observed:
             gateways.append(ConsoleGateway(self._console, name, partial(config.command_line, name=name)))
         return gateways
@@ -179,6 +187,8 @@ class Server:
             for robot in self.robots:
                 robot.close()
             self._console.close()
+            if self.metrics is not None:
+                self.metrics.close()
         finally:
             with contextlib.suppress(Exception):
                 self._network.close()

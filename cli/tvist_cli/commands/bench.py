@@ -3,8 +3,11 @@
 import asyncio
 from typing import Any
 
-from tvist_cli.failure import Failure, interrupted
-from tvist_cli.output import err, out, print_json, say, table
+from tvist_cli.failure import Failure, interrupted, told
+from tvist_cli.output import err, number, out, print_json, say, table
+
+MOST = 2000
+"""Largest number of simulated publishers of a fleet."""
 
 
 def bench(
@@ -15,6 +18,7 @@ def bench(
     viewed: int | None = None,
     reverse: float | None = None,
     reading: float | None = None,
+    fleet: int | None = None,
     json: bool = False,
 ) -> None:
     """Measure the plant, the filter, the whole control cycle, a served robot, and how many robots one core can run.
@@ -30,6 +34,9 @@ def bench(
             500 Hz, as a driver does, and count the program's time-outs; two bare processes do the same meanwhile.
         reading: Instead, record a moving robot for this many minutes of simulation, and compare how long this recording
             takes to read with how long the bare MCAP reader takes; also export it to every format.
+        fleet: Instead, connect this many simulated publishers to two routers, let a client see all their states at
+            several rates for --seconds each, and report what the routers need, how late states are, and how long the
+            fleet needs to be found and to come back after a router was killed.
         json: Print one JSON object.
     """
     _check(
@@ -37,8 +44,12 @@ def bench(
         {"soak": soak, "reverse": reverse, "reading": reading},
         {"hostile": hostile, "viewed": viewed},
     )
+    if fleet is not None and not (2 <= fleet <= MOST and seconds > 0.0):
+        raise Failure(f"fleet is {fleet}: must be 2 to {MOST} publishers, and seconds more than 0", code=2)
     try:
-        if hostile is not None:
+        if fleet is not None:
+            _fleet(fleet, seconds, json)
+        elif hostile is not None:
             _hostile(hostile, seconds, json)
         elif viewed is not None:
             _viewed(viewed, seconds, json)
@@ -102,6 +113,31 @@ def _viewed(pairs: int, seconds: float, json: bool) -> None:
     _pairs(result, f"{pairs} pairs of {seconds:g} s, without and with a page")
     figures = {key: value for key, value in result.items() if not isinstance(value, dict)}
     table("the page", ("what", "figure"), [(key, f"{value:.4g}") for key, value in figures.items()])
+
+
+def _fleet(count: int, seconds: float, json: bool) -> None:
+    from tvist_lab.benchmark.fleet import FleetError
+    from tvist_lab.benchmark.fleet import fleet as run
+
+    with told(FleetError):
+        result = run(count, seconds, tell=say)
+    if json:
+        print_json(result)
+        return
+    flat = {key: value for key, value in result.items() if isinstance(value, float | int)}
+    table(
+        f"{count} publishers, two routers",
+        ("what", "figure"),
+        [(key, f"{value:.4g}") for key, value in flat.items()],
+    )
+    rates = result["rates"]
+    unwatched = [(f"unwatched {key}", f"{value:.4g}") for key, value in result["unwatched"].items()]
+    table("nobody subscribes", ("what", "figure"), unwatched)
+    table(
+        "everything is watched",
+        ("what", *(f"{each['rate_hz']:g} Hz each" for each in rates)),
+        [(key, *(number(each[key], 4) for each in rates)) for key in rates[0] if key != "rate_hz"],
+    )
 
 
 def _reverse(seconds: float, json: bool) -> None:

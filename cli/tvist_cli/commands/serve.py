@@ -27,6 +27,7 @@ def serve(
     listen: list[str] | None = None,
     connect: list[str] | None = None,
     namespace: str | None = None,
+    metrics: str | None = None,
     security: str | None = None,
     insecure: bool = False,
     profile: str | None = None,
@@ -67,6 +68,7 @@ def serve(
             answers. If none does within 10 s, the command fails; a router that is lost later is looked for again.
         namespace: Words separated by / that precede the robot's keys, such as hall-3, so that robots of one name can
             share a network. Clients give the same --namespace.
+        metrics: ADDRESS:PORT to publish figures for Prometheus on, over HTTP without encryption, or PORT of 127.0.0.1.
         security: Folder made by tvist keys. The endpoint is then tls/ADDRESS:PORT, and clients without a role have no
             access. With --connect, the folder of a robot, made by tvist keys --member; the router checks clients.
         insecure: Accept remote connections without TLS and do not authenticate clients; anyone can move the robot.
@@ -116,7 +118,7 @@ def serve(
     """
     given: dict[str, Any] = {
         "name": name, "robot": robot, "robots": robots, "listen": listen, "connect": connect,
-        "namespace": namespace, "security": security,
+        "namespace": namespace, "metrics": metrics, "security": security,
         "insecure": insecure or None, "profile": lower(profile), "payload": payload,
         "overload": overload or None, "shaper": lower(shaper), "shape_servo": shape_servo or None,
         "calibration": calibration, "clock": lower(clock), "speed": speed,

@@ -142,8 +142,12 @@ def _open(endpoints: Sequence[str], settings: Mapping[str, Any]) -> zenoh.Sessio
 def _connected(
     connect: Sequence[str], listen: Sequence[str], settings: Mapping[str, Any], security: str | None
 ) -> zenoh.Session:
-    """Connect to a router: as its client, unless clients can connect here, too."""
-    where, mode = ", ".join(connect), {"listen/endpoints": list(listen)} if listen else {"mode": "client"}
+    """Connect to a router: as its client, or as its peer if clients can connect here, too.
+
+    It is no router, since each router keeps a map of all others, and a fleet has many robots.
+    """
+    here = {"mode": "peer", "listen/endpoints": list(listen)} if listen else {"mode": "client"}
+    where, mode = ", ".join(connect), here
     shown = {**CONNECT, "connect/endpoints": list(connect)}
     try:
         for endpoint in connect:

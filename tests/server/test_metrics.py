@@ -1,0 +1,70 @@
+"""The page for Prometheus, read by the library's own parser."""
+
+import re
+import urllib.request
+from pathlib import Path
+
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+
+from tvist_protocol.stream import Event, Telemetry
+from tvist_server.gateways.base import GatewayError
+from tvist_server.gateways.metrics import COUNTERS, Metrics, place
+
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "metrics.md"
+COUNTS = dict.fromkeys((field for _, _, field in COUNTERS), 7)
+TELEMETRY = Telemetry(
+    tick=1000, ticks_per_second=499.5, late_p50_us=50.0, late_p99_us=900.0, late_max_us=2000.0, load=0.13, **COUNTS
+)  # fmt: skip
+
+
+@pytest.fixture
+def metrics():
+    metrics = Metrics("0")
+    yield metrics
+    metrics.close()
+
+
+def read(metrics):
+    with urllib.request.urlopen(metrics.page) as answer:  # noqa: S310  our own page
+        return {family.name: family for family in text_string_to_metric_families(answer.read().decode())}
+
+
+def test_what_a_robot_says_is_on_the_page_with_its_place(metrics):
+    gateway = metrics.gateway("hall-3", "left")
+    gateway.publish("telemetry", TELEMETRY, b"")
+    for _ in range(2):
+        gateway.publish("event", Event(tick=1, kind="lease_lost", id=None, why="gone"), b"")
+    families = read(metrics)
+    labels = {"namespace": "hall-3", "robot": "left"}
+    (rate,) = families["tvist_ticks_per_second"].samples
+    assert (rate.labels, rate.value) == (labels, 499.5)
+    lateness = {
+        sample.labels["quantile"]: sample.value for sample in families["tvist_tick_lateness_seconds"].samples
+    }
+    assert lateness == pytest.approx({"0.5": 50e-6, "0.99": 900e-6, "1": 2e-3})
+    (events,) = (sample for sample in families["tvist_events"].samples if sample.name.endswith("_total"))
+    assert (events.labels, events.value) == ({**labels, "kind": "lease_lost"}, 2)
+    assert {name for name, _, _ in COUNTERS} < set(families)
+
+
+def test_a_robot_that_has_said_nothing_has_no_figures(metrics):
+    metrics.gateway("", "left")
+    assert all(not family.samples for family in read(metrics).values())
+
+
+def test_the_reference_names_every_figure_and_no_other(metrics):
+    listed = set(re.findall(r"^\| `(tvist_\w+)", PAGE.read_text(), re.MULTILINE))
+    totals = {"counter": "_total"}
+    assert listed == {f"{name}{totals.get(family.type, '')}" for name, family in read(metrics).items()}
+
+
+@pytest.mark.parametrize("address", ["", "here", "127.0.0.1:", "127.0.0.1:70000", "1.2.3.4:x"])
+def test_what_is_no_address_is_refused(address):
+    with pytest.raises(GatewayError, match="must be ADDRESS:PORT"):
+        place(address)
+
+
+def test_a_port_alone_is_the_loopback_interfaces():
+    assert place("9447") == ("127.0.0.1", 9447)
+    assert place("[::1]:9447") == ("::1", 9447)

@@ -1,0 +1,170 @@
+"""Figures of the robots for Prometheus, over HTTP; they can be read and nothing can be changed."""
+
+import contextlib
+import socket
+from collections import Counter
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from tvist_controller.sink import Topic
+from tvist_protocol.stream import Event, State, Telemetry
+from tvist_server.gateways.base import Gateway, GatewayError, Message
+
+if TYPE_CHECKING:
+    from prometheus_client.metrics_core import Metric
+    from prometheus_client.registry import Collector
+else:
+    Collector = object  # the library is imported when figures are asked for
+
+LABELS = ("namespace", "robot")
+MICRO = 1e-6
+
+
+class MetricsGateway(Gateway):
+    """Keeps a robot's newest messages for whoever asks; it takes no input.
+
+    Args:
+        namespace: Namespace of the robot; empty if it has none.
+        robot: Name of the robot.
+    """
+
+    setpoints_refused = 0
+
+    def __init__(self, namespace: str, robot: str) -> None:
+        self.labels = (namespace, robot)
+        self.state: State | None = None
+        """Newest state."""
+        self.telemetry: Telemetry | None = None
+        """Newest telemetry."""
+        self.events: Counter[str] = Counter()
+        """Number of events of each kind."""
+
+    def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  every gateway gets it
+        """Keep a message."""
+        if isinstance(message, State):
+            self.state = message
+        elif isinstance(message, Telemetry):
+            self.telemetry = message
+        elif isinstance(message, Event):
+            self.events[message.kind] += 1
+
+    def close(self) -> None:
+        """Do nothing, since the figures of the last second may still be read."""
+
+
+class Metrics(Collector):
+    """An HTTP server for Prometheus; `collect` computes the figures when somebody asks.
+
+    Args:
+        address: `ADDRESS:PORT`, or a port of the loopback interface; port 0 takes any.
+
+    Raises:
+        GatewayError: The server cannot listen there, or prometheus_client is not installed.
+    """
+
+    def __init__(self, address: str) -> None:
+        host, port = place(address)
+        try:
+            from prometheus_client import CollectorRegistry, start_http_server
+        except ImportError as error:
+            raise GatewayError(
+                "metrics needs the package prometheus-client: pip install 'tvist[server]'"
+            ) from error
+        registry = CollectorRegistry()
+        self._robots: list[MetricsGateway] = []
+        registry.register(self)
+        try:
+            self._server, self._thread = start_http_server(port, host, registry)
+        except (OSError, socket.gaierror) as error:
+            raise GatewayError(f"cannot publish metrics on {address}: {error.strerror or error}") from error
+        self.page = f"http://{f'[{host}]' if ':' in host else host}:{self._server.server_port}/metrics"
+        """Address of the page with the figures."""
+
+    def gateway(self, namespace: str, robot: str) -> MetricsGateway:
+        """Create the gateway of a robot."""
+        gateway = MetricsGateway(namespace, robot)
+        self._robots.append(gateway)
+        return gateway
+
+    def close(self) -> None:
+        """Stop listening."""
+        with contextlib.suppress(OSError):
+            self._server.shutdown()
+            self._server.server_close()
+
+    def collect(self) -> "Iterator[Metric]":
+        """Yield the figures of all robots; robots that have sent no telemetry yet have only those of their states."""
+        from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
+
+        states = [(robot.labels, robot.state) for robot in self._robots if robot.state is not None]
+        told = [(robot.labels, robot.telemetry) for robot in self._robots if robot.telemetry is not None]
+        ticks = CounterMetricFamily("tvist_ticks", "Control periods since the start.", labels=LABELS)
+        robot_mode = GaugeMetricFamily("tvist_robot_mode", "Robot mode, as RTDE numbers it.", labels=LABELS)
+        safety = GaugeMetricFamily("tvist_safety_mode", "Safety mode, as RTDE numbers it.", labels=LABELS)
+        for labels, state in states:
+            ticks.add_metric(labels, state.tick)
+            robot_mode.add_metric(labels, state.robot_mode)
+            safety.add_metric(labels, state.safety_mode)
+        yield from (ticks, robot_mode, safety)
+        rate = GaugeMetricFamily(
+            "tvist_ticks_per_second", "Control periods in the last second.", labels=LABELS
+        )
+        load = GaugeMetricFamily(
+            "tvist_load_ratio", "Share of the last second that ticks of this robot took.", labels=LABELS
+        )
+        late = GaugeMetricFamily(
+            "tvist_tick_lateness_seconds",
+            "Lateness of ticks in the last second.",
+            labels=(*LABELS, "quantile"),
+        )
+        for labels, telemetry in told:
+            rate.add_metric(labels, telemetry.ticks_per_second)
+            if telemetry.load is not None:
+                load.add_metric(labels, telemetry.load)
+            lateness = {
+                "0.5": telemetry.late_p50_us,
+                "0.99": telemetry.late_p99_us,
+                "1": telemetry.late_max_us,
+            }
+            for quantile, value in lateness.items():
+                late.add_metric((*labels, quantile), value * MICRO)
+        yield from (rate, load, late)
+        for name, what, field in COUNTERS:
+            family = CounterMetricFamily(name, what, labels=LABELS)
+            for labels, telemetry in told:
+                family.add_metric(labels, getattr(telemetry, field))
+            yield family
+        events = CounterMetricFamily("tvist_events", "Events of each kind.", labels=(*LABELS, "kind"))
+        for robot in self._robots:
+            for kind, count in robot.events.copy().items():
+                events.add_metric((*robot.labels, kind), count)
+        yield events
+
+
+COUNTERS = (
+    ("tvist_missed_ticks", "Control periods that began too late.", "missed_ticks"),
+    ("tvist_commands", "Commands received.", "commands"),
+    ("tvist_commands_refused", "Commands refused.", "refused"),
+    ("tvist_setpoints_received", "Set-points received.", "setpoints_received"),
+    ("tvist_setpoints_refused", "Set-points of no stream, or that are no posture.", "setpoints_refused"),
+    ("tvist_setpoints_late", "Set-points dropped since a newer one was played.", "setpoints_late"),
+    ("tvist_setpoints_lost", "Set-points that had not come when their turn came.", "setpoints_lost"),
+    ("tvist_setpoints_limited", "Set-points that exceeded a limit.", "setpoints_limited"),
+    ("tvist_states_dropped", "States that the network could not take in time.", "dropped_states"),
+    ("tvist_recorder_dropped", "Messages that the recorder had no room for.", "recorder_dropped"),
+)
+"""Counters of the telemetry: name, meaning, field."""
+
+
+def place(address: str) -> tuple[str, int]:
+    """Split `ADDRESS:PORT`; without an address it is the loopback interface.
+
+    Raises:
+        GatewayError: It is neither.
+    """
+    host, _, port = address.rpartition(":")
+    if not (port.isascii() and port.isdigit() and len(port) < 6 and int(port) < 65536):
+        raise GatewayError(
+            f"metrics is {address!r}: must be ADDRESS:PORT, or PORT for 127.0.0.1, such as 9447"
+        )
+    return host.removeprefix("[").removesuffix("]") or "127.0.0.1", int(port)
