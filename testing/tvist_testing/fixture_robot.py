@@ -71,6 +71,9 @@ class FixtureRobot(blocking.Robot):
         self.log = self.recording = Path()
         self.history = History()
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name} at {self.endpoint}>"
+
     @classmethod
     def of(cls, served: ServedRobot, name: str, seed: int, log: Path, recording: Path) -> Self:
         """Connect to a served robot, and wait for its present state."""
