@@ -15,6 +15,7 @@ def bench(
     viewed: int | None = None,
     reverse: float | None = None,
     reading: float | None = None,
+    fixture: int | None = None,
     json: bool = False,
 ) -> None:
     """Measure the plant, the filter, the whole control cycle, a served robot, and how many robots one core can run.
@@ -30,8 +31,12 @@ def bench(
             500 Hz, as a driver does, and count the program's time-outs; two bare processes do the same meanwhile.
         reading: Instead, record a moving robot for this many minutes of simulation, and compare how long this recording
             takes to read with how long the bare MCAP reader takes; also export it to every format.
+        fixture: Instead, compare how long the pytest fixture tvist_robot takes, in sessions of this many tests, with
+            how long tvist serve takes to start.
         json: Print one JSON object.
     """
+    if fixture is not None and fixture < 2:
+        raise Failure(f"fixture is {fixture}: must be at least 2 tests", code=2)
     _check(
         seconds,
         {"soak": soak, "reverse": reverse, "reading": reading},
@@ -46,6 +51,8 @@ def bench(
             _reverse(reverse, json)
         elif reading is not None:
             _reading(reading, json)
+        elif fixture is not None:
+            _fixture(fixture, json)
         elif soak is not None:
             _soak(soak, json)
         else:
@@ -131,6 +138,17 @@ def _reading(minutes: float, json: bool) -> None:
     formats = {key: value for key, value in result.items() if isinstance(value, dict)}
     rows = [(key, *(f"{figure:.4g}" for figure in value.values())) for key, value in formats.items()]
     table("export", ("format", "write s", "read s", "bytes", "equal"), rows)
+
+
+def _fixture(tests: int, json: bool) -> None:
+    from tvist_lab.benchmark.fixture import fixture
+
+    result = fixture(tests, tell=say)
+    if json:
+        print_json(result)
+        return
+    rows = [(key, f"{value:.4g}") for key, value in result.items()]
+    table(f"the fixture tvist_robot in sessions of {tests} tests", ("what", "figure"), rows)
 
 
 def _pairs(result: dict[str, Any], title: str) -> None:
