@@ -15,8 +15,11 @@ from tvist_testing.wanted import WantedRobot
 
 PATIENCE = 300.0
 """Longest wait for an answer of the process [s]: the first start compiles, which takes minutes on a slow machine."""
-NEEDED = ("numpy", "numba", "pinocchio", "ruckig", "mcap", "lark", "zstandard", "cryptography")
-"""Packages of the extra `server` that a robot needs."""
+NEEDED = (
+    "tvist_server", "tvist_shaping", "tvist_urscript",
+    "numpy", "numba", "pinocchio", "ruckig", "mcap", "zstandard", "cryptography",
+)  # fmt: skip
+"""Packages that a robot needs, most of them of the extra `server`."""
 
 
 class CannotServeError(RuntimeError):
@@ -149,7 +152,7 @@ def unavailable() -> str | None:
     """Return why no robot can be served here; None if one can."""
     if not hasattr(os, "fork"):
         return "tvist's fixtures need Linux or macOS: this system has no fork"
-    missing = [name for name in ("tvist_server", *NEEDED) if find_spec(name) is None]
+    missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
         return (
             f"tvist's fixtures need the server's packages ({', '.join(missing)} "

@@ -12,6 +12,7 @@ import pytest
 from tvist_client import MotionStoppedError
 from tvist_client.errors import ClientError
 from tvist_protocol.modes import RobotMode, SafetyMode
+from tvist_testing import assert_settles_within
 from tvist_testing import robots as making
 
 TARGET = [0.5, -3.1, 0.2, -1.6, 0.0, 0.0]
@@ -156,6 +157,7 @@ class TestUr:
         assert control.moveJ(target, 1.05, 1.4)
         control.stopScript()
         control.disconnect()
+        assert_settles_within(tvist_ur, 0.5)
         assert tvist_ur.info().payload.mass == 3.0
         assert tvist_ur.state().actual_q == pytest.approx(target, abs=2e-3)
 
