@@ -6,6 +6,7 @@ from typing import Generic, Self, TypeVar
 
 from tvist_client import blocking, stream
 from tvist_client import robot as asynchronous_robot
+from tvist_client.errors import AnswerTimeoutError
 from tvist_client.portal import Portal
 from tvist_client.published import BUFFER
 from tvist_protocol.stream import Event, State
@@ -14,6 +15,8 @@ from tvist_testing.robots import ServedRobot
 
 CLIENT = "test"
 """Name under which the test holds the clock while one of its calls waits."""
+LONGEST = 15_000
+"""Number of ticks that may pass until the next message of an iterator; 30 s of simulation."""
 M = TypeVar("M")
 
 
@@ -40,9 +43,11 @@ class SteppingStream(blocking.Stream[M], Generic[M]):
         self._robot = robot
 
     def __next__(self) -> M:
-        while not self._portal.run(lambda: self._stream.ready):
+        for _ in range(LONGEST):
+            if self._portal.run(lambda: self._stream.ready):
+                return super().__next__()
             self._portal.call(lambda: self._robot.pass_time(1))
-        return super().__next__()
+        raise AnswerTimeoutError(f"nothing came within {LONGEST} ticks of simulation")
 
 
 class FixtureRobot(blocking.Robot):
@@ -65,6 +70,9 @@ class FixtureRobot(blocking.Robot):
         self.pid = self.seed = 0
         self.log = self.recording = Path()
         self.history = History()
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name} at {self.endpoint}>"
 
     @classmethod
     def of(cls, served: ServedRobot, name: str, seed: int, log: Path, recording: Path) -> Self:

@@ -4,10 +4,7 @@ It is loaded wherever this package is installed, so it imports nothing but pytes
 follows with the first robot.
 """
 
-import shutil
-import tempfile
 from collections.abc import Callable, Generator, Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -18,6 +15,7 @@ if TYPE_CHECKING:
     from tvist_testing.serving import Serving
 
 _ROBOTS = pytest.StashKey[list["RobotOfTest"]]()
+_SERVING = pytest.StashKey["Serving"]()
 _TOLD = pytest.StashKey[bool]()
 
 
@@ -50,20 +48,27 @@ def pytest_configure(config: pytest.Config) -> None:
         config.addinivalue_line("markers", line)
 
 
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """End the process that makes robots; a session fixture would end before the last test's report is made."""
+    serving = config.stash.get(_SERVING, None)
+    if serving is not None:
+        serving.close()
+
+
 @pytest.fixture(scope="session")
-def _tvist_serving(request: pytest.FixtureRequest) -> Iterator["Serving"]:
+def _tvist_serving(request: pytest.FixtureRequest) -> "Serving":
     """What makes robots in this session."""
+    from tvist_testing.robots import unavailable
+
+    why = unavailable()
+    if why is not None:
+        pytest.fail(why, pytrace=False)
     from tvist_testing.serving import Serving
 
     config = request.config
     kept = config.rootpath / config.getoption("tvist_recordings")
-    folder = Path(tempfile.mkdtemp(prefix="tvist-"))
-    serving = Serving(folder, kept, config.getoption("tvist_seed"))
-    try:
-        yield serving
-    finally:
-        serving.close()
-        shutil.rmtree(folder, ignore_errors=True)
+    serving = config.stash[_SERVING] = Serving(kept, config.getoption("tvist_seed"))
+    return serving
 
 
 @pytest.fixture

@@ -15,8 +15,11 @@ from tvist_testing.wanted import WantedRobot
 
 PATIENCE = 300.0
 """Longest wait for an answer of the process [s]: the first start compiles, which takes minutes on a slow machine."""
-NEEDED = ("numpy", "numba", "pinocchio", "ruckig", "mcap", "lark", "zstandard", "cryptography")
-"""Packages of the extra `server` that a robot needs."""
+NEEDED = (
+    "tvist_server", "tvist_shaping", "tvist_urscript",
+    "numpy", "numba", "pinocchio", "ruckig", "mcap", "zstandard", "cryptography",
+)  # fmt: skip
+"""Packages that a robot needs, most of them of the extra `server`."""
 
 
 class CannotServeError(RuntimeError):
@@ -31,6 +34,7 @@ class ServedRobot:
         host: IP address of UR's interfaces; empty if they are not open.
         ports: Port of each of UR's interfaces.
         pid: Number of its process.
+        closed: Whether it has ended.
     """
 
     def __init__(self, connection: socket.socket, told: dict[str, Any]) -> None:
@@ -38,6 +42,7 @@ class ServedRobot:
         self.host = str(told.get("host", ""))
         self.ports: dict[str, int] = told.get("ports", {})
         self.pid = int(told["pid"])
+        self.closed = False
         self._connection = connection
 
     def publish_state(self) -> None:
@@ -50,6 +55,7 @@ class ServedRobot:
             self._connection.sendall(b"close\n")
             self._wait()
         self._connection.close()
+        self.closed = True
 
     def kill(self) -> None:
         """End the robot at once, even if a test has stopped its process; nothing is left to be read."""
@@ -57,6 +63,7 @@ class ServedRobot:
             os.kill(self.pid, signal.SIGKILL)
             self._wait()
         self._connection.close()
+        self.closed = True
 
     def _wait(self) -> None:
         """Wait until the process has ended, which closes its end of the socket."""
@@ -70,6 +77,7 @@ class Robots:
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
         self._requests: socket.socket | None = None
+        self._served: list[ServedRobot] = []
 
     def serve(self, wanted: WantedRobot) -> ServedRobot:
         """Serve a robot; return it when it answers.
@@ -90,10 +98,15 @@ class Robots:
         if "endpoint" not in told:
             ours.close()
             raise CannotServeError(str(told.get("error", f"the robot ended at its start: see {wanted.log}")))
-        return ServedRobot(ours, told)
+        served = ServedRobot(ours, told)
+        self._served = [one for one in self._served if not one.closed] + [served]
+        return served
 
     def close(self) -> None:
-        """End the process; a second call does nothing."""
+        """End the process, and robots that still run; a second call does nothing."""
+        for served in self._served:
+            if not served.closed:
+                served.kill()
         if self._requests is not None:
             self._requests.close()
             self._requests = None
@@ -139,7 +152,7 @@ def unavailable() -> str | None:
     """Return why no robot can be served here; None if one can."""
     if not hasattr(os, "fork"):
         return "tvist's fixtures need Linux or macOS: this system has no fork"
-    missing = [name for name in ("tvist_server", *NEEDED) if find_spec(name) is None]
+    missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
         return (
             f"tvist's fixtures need the server's packages ({', '.join(missing)} "

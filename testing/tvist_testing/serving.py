@@ -2,6 +2,8 @@
 
 import itertools
 import json
+import shutil
+import tempfile
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -25,21 +27,21 @@ class Serving:
     """Makes robots.
 
     Args:
-        folder: Folder for recordings and logs of running tests.
-        kept: Folder for those of failed tests.
+        kept: Folder for recordings and logs of failed tests.
         seed: Seed of robots whose tests have no marker for it.
     """
 
-    def __init__(self, folder: Path, kept: Path, seed: int) -> None:
-        self._folder = folder
+    def __init__(self, kept: Path, seed: int) -> None:
+        self._folder = Path(tempfile.mkdtemp(prefix="tvist-"))
         self._kept = kept
         self._seed = seed
         self._robots = Robots()
         self._numbers = itertools.count()
 
     def close(self) -> None:
-        """End the process that makes robots."""
+        """End the process that makes robots, and remove the files of robots whose tests were interrupted."""
         self._robots.close()
+        shutil.rmtree(self._folder, ignore_errors=True)
 
     def robot(self, kind: type[R], item: pytest.Item, *, ur: bool = False) -> tuple[R, RobotOfTest]:
         """Make a test's robot; a robot that cannot be made fails the test with one sentence.

@@ -19,6 +19,7 @@ def bench(
     reverse: float | None = None,
     reading: float | None = None,
     fleet: int | None = None,
+    fixture: int | None = None,
     json: bool = False,
 ) -> None:
     """Measure the plant, the filter, the whole control cycle, a served robot, and how many robots one core can run.
@@ -37,8 +38,12 @@ def bench(
         fleet: Instead, connect this many simulated publishers to two routers, let a client see all their states at
             several rates for --seconds each, and report what the routers need, how late states are, and how long the
             fleet needs to be found and to come back after a router was killed.
+        fixture: Instead, compare how long the pytest fixture tvist_robot takes, in sessions of this many tests, with
+            how long tvist serve takes to start.
         json: Print one JSON object.
     """
+    if fixture is not None and fixture < 2:
+        raise Failure(f"fixture is {fixture}: must be at least 2 tests", code=2)
     _check(
         seconds,
         {"soak": soak, "reverse": reverse, "reading": reading},
@@ -57,6 +62,8 @@ def bench(
             _reverse(reverse, json)
         elif reading is not None:
             _reading(reading, json)
+        elif fixture is not None:
+            _fixture(fixture, json)
         elif soak is not None:
             _soak(soak, json)
         else:
@@ -167,6 +174,17 @@ def _reading(minutes: float, json: bool) -> None:
     formats = {key: value for key, value in result.items() if isinstance(value, dict)}
     rows = [(key, *(f"{figure:.4g}" for figure in value.values())) for key, value in formats.items()]
     table("export", ("format", "write s", "read s", "bytes", "equal"), rows)
+
+
+def _fixture(tests: int, json: bool) -> None:
+    from tvist_lab.benchmark.fixture import fixture
+
+    result = fixture(tests, tell=say)
+    if json:
+        print_json(result)
+        return
+    rows = [(key, f"{value:.4g}") for key, value in result.items()]
+    table(f"the fixture tvist_robot in sessions of {tests} tests", ("what", "figure"), rows)
 
 
 def _pairs(result: dict[str, Any], title: str) -> None:

@@ -1,0 +1,113 @@
+"""The action for other people's CI: its shell runs here, as the runner would run it."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[2]
+ACTION = ROOT / "action"
+PATIENCE = 600.0
+TESTS = """
+def test_passes(tvist_robot):
+    assert tvist_robot.state().tick == 0
+
+def test_fails(tvist_robot):
+    assert tvist_robot.advance(5) == 6
+"""
+
+pytestmark = pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Run a step in a folder of its own, with nothing of this process's environment."""
+
+    def step(*arguments, python=sys.executable):
+        kept = {name: os.environ[name] for name in ("PATH", "HOME", "LANG") if name in os.environ}
+        pip = {name: value for name, value in os.environ.items() if name.startswith(("PIP_", "UV_"))}
+        given = {
+            "PYTHON": str(python),
+            "RUNNER_TEMP": str(tmp_path),
+            "GITHUB_OUTPUT": str(tmp_path / "output"),
+        }
+        return subprocess.run(
+            ["bash", str(ACTION / "run.sh"), *map(str, arguments)],
+            env={**kept, **pip, **given},
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=False,
+        )
+
+    return step
+
+
+def outputs(folder):
+    return dict(line.split("=", 1) for line in (folder / "output").read_text().splitlines())
+
+
+def test_every_step_of_the_action_is_one_of_its_script():
+    action = yaml.safe_load((ACTION / "action.yml").read_text())
+    called = [re.search(r"run\.sh\" (\w+)", step["run"])[1] for step in action["runs"]["steps"]]
+    assert called == ["install", "serve", "test"]
+    assert all(step["shell"] == "bash" for step in action["runs"]["steps"])
+    known = {f"inputs.{name}" for name in action["inputs"]}
+    used = set(re.findall(r"inputs\.\w+", (ACTION / "action.yml").read_text()))
+    assert used == known
+
+
+@pytest.mark.slow
+def test_tests_run_and_the_recordings_of_failed_ones_are_named(run, tmp_path):
+    (tmp_path / "test_it.py").write_text(TESTS)
+    ran = run("test", "test_it.py", "-q")
+    assert (ran.returncode, "1 failed, 1 passed" in ran.stdout) == (1, True), ran.stdout + ran.stderr
+    recordings = Path(outputs(tmp_path)["recordings"])
+    assert [path.name for path in recordings.rglob("*.mcap")] == ["ur5e.mcap"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((), "the first argument is missing: must be install, serve, test or stop"),
+        (("fly",), "the first argument is fly: must be install, serve, test or stop"),
+        (("install",), "install takes one argument: a checkout, a folder with wheels, or a requirement"),
+        (("install", "/etc"), "/etc is neither a checkout of tvist nor a folder with wheels"),
+        (("stop",), "no robot is served"),
+    ],
+)
+def test_a_wrong_step_is_told_in_a_sentence(run, arguments, said):
+    ran = run(*arguments)
+    assert (ran.returncode, ran.stderr) == (1, f"tvist action: {said}\n")
+
+
+@pytest.mark.slow
+def test_a_robot_that_cannot_start_is_told(run):
+    ran = run("serve", "--payload", "500")
+    assert (ran.returncode, "payload is 500" in ran.stderr) == (1, True)
+
+
+@pytest.mark.nightly
+def test_it_installs_a_checkout_serves_and_tests_in_a_clean_environment(run, tmp_path):
+    subprocess.run([sys.executable, "-m", "venv", tmp_path / "clean"], check=True)
+    python = tmp_path / "clean" / "bin" / "python"
+    installed = run("install", ROOT, python=python)
+    assert installed.returncode == 0, installed.stderr
+    for package in ("scipy", "matplotlib", "mujoco"):
+        assert (
+            subprocess.run([python, "-c", f"import {package}"], capture_output=True, check=False).returncode
+            == 1
+        )
+    served = run("serve", "--clock", "lockstep", python=python)
+    assert served.returncode == 0, served.stderr
+    assert outputs(tmp_path)["endpoint"] == "tcp/127.0.0.1:7447"
+    assert run("stop", python=python).returncode == 0
+    (tmp_path / "test_it.py").write_text(TESTS)
+    ran = run("test", "test_it.py", "-q", python=python)
+    assert "1 failed, 1 passed" in ran.stdout, ran.stdout + ran.stderr

@@ -1,0 +1,93 @@
+"""What the assertions measure, against formulas and against the laboratory's metrics."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tvist_lab.metrics import motions, peak_after_stop
+from tvist_lab.recordings import Recording
+from tvist_testing import assert_residual_vibration_below, assert_settles_within, assert_within_limits
+from tvist_testing.measures import settling, vibration
+
+TARGET = [0.5, -3.1, 0.2, -1.6, 0.0, 0.0]
+PERIOD = 0.002
+
+
+def decaying(amplitude, rate, seconds):
+    """Rows of a tool that approaches its position exponentially."""
+    times = PERIOD * np.arange(round(seconds / PERIOD) + 1)
+    return [
+        SimpleNamespace(time=7.0 + t, pose=[0.3 + amplitude * math.exp(-rate * t), 0.1, 0.2, 0.0, 0.0, 0.0])
+        for t in times
+    ]
+
+
+def test_settling_is_that_of_an_exponential():
+    found = settling(decaying(1e-3, 30.0, 1.0), 1e-4)
+    assert found.seconds == pytest.approx(math.log(10.0) / 30.0, abs=PERIOD)
+    assert found.farthest == pytest.approx(1e-3, rel=1e-3)
+
+
+def test_a_tool_that_is_still_outside_at_the_end_has_not_settled():
+    rows = decaying(1e-3, 30.0, 1.0)
+    rows[-1].pose[2] += 1e-3
+    assert settling(rows, 1e-4).seconds == math.inf
+
+
+@pytest.mark.parametrize("rotation", [(0.0, 0.0, 0.0), (0.3, -1.2, 2.0), (math.pi, 0.0, 0.0)])
+def test_at_rest_in_any_orientation_nothing_vibrates(rotation):
+    from scipy.spatial.transform import Rotation
+
+    force = Rotation.from_rotvec(rotation).inv().apply([0.0, 0.0, 9.81])
+    rows = [SimpleNamespace(time=t, pose=[0.0, 0.0, 0.0, *rotation], acceleration=force) for t in (0.0, 0.1)]
+    assert vibration(rows, 0.3) == [(0.1, pytest.approx(0.0, abs=1e-12))]
+
+
+@pytest.mark.tvist_shaper("none")
+def test_residual_vibration_is_the_laboratorys(tvist_robot):
+    states, truths = [], []
+    tvist_robot.on_state(states.append)
+    tvist_robot.on_truth(truths.append)
+    with tvist_robot.control("me") as arm:
+        arm.move_j(TARGET)
+    value = assert_residual_vibration_below(tvist_robot, 2.0)
+    recording = Recording.from_states(states, truths=truths)
+    (motion,) = motions(recording)
+    assert value == pytest.approx(peak_after_stop(recording, motion), rel=1e-9)
+    with pytest.raises(AssertionError, match=r"residual vibration of ur5e is .* above 0.1 m/s²\n.*largest"):
+        assert_residual_vibration_below(tvist_robot, 0.1)
+    took = assert_settles_within(tvist_robot, 1.0)
+    with pytest.raises(AssertionError, match="does not settle within"):
+        assert_settles_within(tvist_robot, took - PERIOD)
+
+
+def test_limits_are_the_robots_own_unless_stricter_ones_are_given(tvist_robot):
+    with pytest.raises(AssertionError, match="no time has passed"):
+        assert_within_limits(tvist_robot)
+    with tvist_robot.control("me") as arm:
+        arm.move_j(TARGET)
+    assert_within_limits(tvist_robot)
+    with pytest.raises(AssertionError) as failed:
+        assert_within_limits(tvist_robot, speed=0.2, tool_speed=0.25)
+    assert "joint 0: speed [rad/s]" in str(failed.value)
+    assert "tool: speed [m/s]" in str(failed.value)
+    assert "joint 1" not in str(failed.value)
+    fast = max(abs(row.qd[0]) for row in tvist_robot.history.rows)
+    assert_within_limits(tvist_robot, speed=[fast, *[0.5] * 5])
+
+
+def test_a_robot_that_has_not_moved_proves_nothing(tvist_robot):
+    for check in (assert_settles_within, assert_residual_vibration_below):
+        with pytest.raises(AssertionError, match="ur5e has not moved"):
+            check(tvist_robot, 1.0)
+
+
+@pytest.mark.parametrize("wrong", [-1.0, math.nan, math.inf, "fast", True])
+def test_limits_that_are_none_are_refused(wrong):
+    robot = SimpleNamespace()
+    with pytest.raises(ValueError, match="must be a number"):
+        assert_settles_within(robot, wrong)
+    with pytest.raises(ValueError, match="must be a number"):
+        assert_residual_vibration_below(robot, wrong)

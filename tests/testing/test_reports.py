@@ -1,0 +1,229 @@
+"""What remains of a failed test: recording, log and seed, named in the report and in JUnit. Of others: nothing."""
+
+import os
+import select
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+from tvist_lab.recordings import mcap_file, read
+from tvist_lab.replay import replay_file
+
+pytest_plugins = ["pytester"]
+
+ABSENT = (
+    "scipy",
+    "matplotlib",
+    "mujoco",
+    "polars",
+    "viser",
+    "marimo",
+    "distributed",
+    "tvist_lab",
+    "tvist_view",
+)
+"""Packages that the extra `testing` does not bring."""
+HIDDEN = f"""
+import sys
+
+class Hidden:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {ABSENT!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+
+sys.meta_path.insert(0, Hidden())
+"""
+OUTCOMES = """
+import pytest
+from tvist_testing import assert_settles_within
+
+pytestmark = pytest.mark.tvist_seed(5)
+
+@pytest.fixture
+def fails_at_the_end(tvist_robot):
+    yield
+    raise OSError("too late")
+
+def test_passes(tvist_robot):
+    tvist_robot.advance(5)
+
+@pytest.mark.tvist_shaper("none")
+def test_fails(tvist_robot):
+    with tvist_robot.control("me") as arm:
+        arm.move_j([0.2, -3.1, 0.2, -1.6, 0.0, 0.0])
+    assert_settles_within(tvist_robot, 0.001)
+
+def test_fails_at_the_end(fails_at_the_end):
+    pass
+
+@pytest.mark.xfail
+def test_fails_as_expected(tvist_robot):
+    assert not tvist_robot.advance(5)
+
+def test_fails_without_a_robot():
+    assert not 1
+
+def test_two_fail(tvist_robots):
+    assert not tvist_robots(2)
+"""
+MISUSES = """
+import pytest
+pytestmark = pytest.mark.usefixtures("tvist_robot")
+mark = pytest.mark
+
+@pytest.mark.parametrize("number", [
+    pytest.param(0, marks=mark.tvist_payload(500.0)),
+    pytest.param(1, marks=mark.tvist_payload("heavy")),
+    pytest.param(2, marks=mark.tvist_shaper("nosuch")),
+    pytest.param(3, marks=mark.tvist_robot("nosuch")),
+    pytest.param(4, marks=mark.tvist_state()),
+    pytest.param(5, marks=mark.tvist_state("nosuch.toml")),
+    pytest.param(6, marks=mark.tvist_state(mode="ASLEEP")),
+    pytest.param(7, marks=mark.tvist_faults("nosuch")),
+    pytest.param(8, marks=mark.tvist_faults("torque")),
+    pytest.param(9, marks=mark.tvist_faults("reduced", after=-1.0)),
+    pytest.param(10, marks=mark.tvist_program("def go(:\\n")),
+    pytest.param(11, marks=mark.tvist_program("nosuch.script")),
+    pytest.param(12, marks=mark.tvist_seed("one")),
+    pytest.param(13, marks=mark.tvist_payload(1.0, 2.0)),
+])
+def test_it(number):
+    raise AssertionError("it began")
+"""
+SAID = [
+    "payload is 500.0: must be at most 100",
+    "tvist_payload has 'heavy': must be a mass in kg",
+    "shaper",
+    "nosuch",
+    "tvist_state has no argument",
+    "state nosuch.toml: No such file or directory",
+    "mode",
+    "tvist_faults has the fault 'nosuch': must be one of protective_stop, reduced",
+    "torque",
+    "tvist_faults has after=-1: must be at least 0 s",
+    "line:1",
+    "tvist_program has the file nosuch.script: No such file or directory",
+    "tvist_seed has 'one': must be a whole number",
+    "tvist_payload has wrong arguments, too many positional arguments: it takes kilograms",
+]
+
+
+def outcomes(path):
+    """The test cases of a JUnit file by their names."""
+    return {case.get("name"): case for case in ET.parse(path).iter("testcase")}  # noqa: S314  our own file
+
+
+def properties(case):
+    return {one.get("name"): one.get("value") for one in case.iter("property")}
+
+
+@pytest.fixture
+def light(pytester, monkeypatch):
+    """A folder whose tests see nothing of what the extra `testing` does not bring."""
+    hidden = pytester.mkdir("hidden")
+    (hidden / "sitecustomize.py").write_text(HIDDEN)
+    monkeypatch.setenv("PYTHONPATH", str(hidden))
+    return pytester
+
+
+def test_of_failed_tests_everything_is_kept_and_of_others_nothing(light):
+    light.makepyfile(test_it=OUTCOMES)
+    ran = light.runpytest_subprocess("--junitxml=report.xml", "-p", "no:cacheprovider")
+    ran.assert_outcomes(passed=2, failed=3, errors=1, xfailed=1)
+    cases = outcomes("report.xml")
+    assert properties(cases["test_passes"]) == properties(cases["test_fails_as_expected"]) == {}
+    assert sorted(path.name for path in Path("tvist-recordings").iterdir()) == [
+        "test_it.py-test_fails",
+        "test_it.py-test_fails_at_the_end",
+        "test_it.py-test_two_fail",
+    ]
+    named = properties(cases["test_fails"])
+    recording = Path(named["tvist_recording"])
+    assert recording == Path.cwd() / "tvist-recordings" / "test_it.py-test_fails" / "ur5e.mcap"
+    assert (named["tvist_seed"], Path(named["tvist_log"]).is_file()) == ("5", True)
+    ran.stdout.fnmatch_lines(
+        [
+            "*does not settle within 0.001 s",
+            "*settling time*",
+            f"recording: {recording}",
+            "seed: * 5",
+            f"next: * tvist analyze {recording}; tvist replay {recording}",
+        ]
+    )
+    assert len(read(recording)) > 100
+    assert replay_file(mcap_file.read(recording)).first_difference is None
+    assert properties(cases["test_fails_at_the_end"])["tvist_seed"] == "5"
+    two = [one.get("value") for one in cases["test_two_fail"].iter("property")]
+    assert [Path(value).name for value in two] == [
+        "ur5e-1.mcap", "ur5e-1.log", "5", "ur5e-2.mcap", "ur5e-2.log", "6",
+    ]  # fmt: skip
+
+
+def test_markers_with_wrong_arguments_fail_with_a_sentence(pytester):
+    pytester.makepyfile(MISUSES)
+    ran = pytester.runpytest_subprocess("--junitxml=report.xml", "--strict-markers")
+    ran.assert_outcomes(errors=len(SAID))
+    for number, said in enumerate(SAID):
+        error = outcomes("report.xml")[f"test_it[{number}]"].find("error")
+        text = error.text.strip()
+        assert said in text
+        assert text.startswith("the robot of this test cannot be made: ")
+        assert text.count("\n") == 0, text
+
+
+@pytest.mark.slow
+def test_two_workers_side_by_side_never_meet(pytester):
+    pytester.makepyfile("""
+        import pytest
+        @pytest.mark.parametrize("number", range(4))
+        def test_it(tvist_robots, number, record_property):
+            first, second = tvist_robots(2)
+            record_property("robots", f"{first.endpoint} {second.endpoint}")
+            for robot in (first, second):
+                assert robot.state().tick == 0
+                with robot.control("me") as arm:
+                    arm.move_j([0.1, -3.1, 0.2, -1.6, 0.0, 0.0])
+    """)
+    ran = pytester.runpytest_subprocess(
+        "-n", "2", "--tvist-keep-all", "--tvist-recordings=kept", "--junitxml=report.xml"
+    )
+    ran.assert_outcomes(passed=4)
+    kept = sorted(path.relative_to("kept") for path in Path("kept").rglob("*.mcap"))
+    assert len(kept) == 8
+    cases = outcomes("report.xml").values()
+    endpoints = [endpoint for case in cases for endpoint in properties(case)["robots"].split()]
+    assert len(endpoints) == 8
+    assert all("tvist_seed" in properties(case) for case in cases)
+
+
+@pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="needs Linux")
+def test_robots_end_with_the_process_of_the_tests(pytester):
+    """However it ends: here at once, without any clean-up."""
+    pytester.makepyfile("""
+        import os
+        def test_it(tvist_robot):
+            with open("pid", "w") as file:
+                file.write(str(tvist_robot.pid))
+            os._exit(9)
+    """)
+    assert pytester.runpytest_subprocess().ret == 9
+    try:
+        process = os.pidfd_open(int(Path("pid").read_text()))
+    except ProcessLookupError:
+        return
+    ended, _, _ = select.select([process], [], [], 60.0)
+    os.close(process)
+    assert ended
+
+
+def test_loading_the_plugin_imports_nothing_but_pytest(pytester):
+    """It is loaded for the tests of every project that has the client."""
+    pytester.makepyfile(f"""
+        import sys
+        def test_it():
+            loaded = {{name.partition(".")[0] for name in sys.modules}}
+            heavy = {{"numpy", "zenoh", "msgspec", "tvist_client", "tvist_protocol", "tvist_server", *{ABSENT!r}}}
+            assert not loaded & heavy
+    """)
+    pytester.runpytest_subprocess("-p", "no:hypothesispytest").assert_outcomes(passed=1)
