@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, ParseError, iterparse
 import numpy as np
 import numpy.typing as npt
 
-from tvist_plant.robot_tables import DescriptionError
+from tvist_plant.robot_tables import RobotFileError
 from tvist_plant.user_file import DEEPEST, UserFileError, read_text
 
 Floats = npt.NDArray[np.float64]
@@ -20,7 +20,7 @@ UPRIGHT: Final = 1e-6
 """Cosine of pitch below which roll and yaw are not unique [-]."""
 
 
-class UrdfError(DescriptionError):
+class UrdfError(RobotFileError):
     """A URDF file describes no arm that can be simulated; the message names the link or joint."""
 
 
