@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 COMMANDS = {
     "serve": "Run a robot on the network.",
+    "robots": "List the arms: what is measured, what assumed, and how well auto stills each.",
     "run": "Run a program in URScript on a robot of its own; exit code 0 if it ends by itself.",
     "check-script": "Look for errors in programs in URScript without running them.",
     "demo": "Run the paper's motions in real time, unshaped and shaped, and say what happened.",

@@ -5,6 +5,7 @@ The modules behind it may change; `tvist_lab` imports nothing else of this packa
 
 from tvist_controller.about import info_of
 from tvist_controller.ahead import resting_after
+from tvist_controller.calibrations import available as calibrations
 from tvist_controller.calibrations import default_for as default_calibration
 from tvist_controller.calibrations import estimator_of
 from tvist_controller.calibrations import load as load_calibration
@@ -69,6 +70,7 @@ __all__ = [
     "ToolKinematics",
     "Trajectory",
     "body",
+    "calibrations",
     "central_differences",
     "choose_filter",
     "default_calibration",

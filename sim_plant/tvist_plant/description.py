@@ -16,6 +16,7 @@ from tvist_plant.robot_tables import (
     Drives,
     Payload,
     RobotDescription,
+    RobotFileError,
     Tensor,
 )
 from tvist_plant.similar import completed, with_limits
@@ -71,8 +72,8 @@ def load(robot: str | Path) -> RobotDescription:
             f"robot {str(robot)!r}: must be one of {known} or a readable file ({error.strerror})"
         ) from error
     except tomllib.TOMLDecodeError as error:
-        raise DescriptionError(f"robot file {robot}: it is not valid TOML: {error}") from error
+        raise RobotFileError(f"robot file {robot}: it is not valid TOML: {error}") from error
     except msgspec.ValidationError as error:
-        raise DescriptionError(f"robot file {robot}: {in_words(error, content)}") from error
+        raise RobotFileError(f"robot file {robot}: {in_words(error, content)}") from error
     check(description, robot)
     return description

@@ -7,9 +7,9 @@ import numpy as np
 from tvist_plant.robot_tables import (
     MAX_JOINTS,
     ORIGINS,
-    DescriptionError,
     Kinematics,
     RobotDescription,
+    RobotFileError,
     Tensor,
 )
 from tvist_plant.units import check_limits
@@ -19,7 +19,7 @@ def check(description: RobotDescription, source: str | Path) -> None:
     """Check lengths, limits, bodies and names of a robot file.
 
     Raises:
-        DescriptionError: Something is wrong; the message names the file, the key and what is allowed.
+        RobotFileError: Something is wrong; the message names the file, the key and what is allowed.
         UserFileError: A limit is probably in degrees.
     """
     _check(description, source)
@@ -39,7 +39,7 @@ def _check(description: RobotDescription, source: str | Path) -> None:
     """Check what types cannot express, such as lengths that must agree and links that must exist."""
     joints = description.joints
     if not 1 <= joints <= MAX_JOINTS:
-        raise DescriptionError(
+        raise RobotFileError(
             f"robot file {source}: robot.joints has {joints} names; 1 to {MAX_JOINTS} are supported"
         )
     _check_kinematics(description.kinematics, source)
@@ -50,25 +50,25 @@ def _check(description: RobotDescription, source: str | Path) -> None:
             if table == "kinematics" and not value:
                 continue
             if isinstance(value, tuple) and len(value) != joints:
-                raise DescriptionError(
+                raise RobotFileError(
                     f"robot file {source}: {table}.{key} has {len(value)} entries; robot.joints has {joints}"
                 )
     flexible = description.link_flexibility
     if len(flexible.links) != len(flexible.stiffness):
-        raise DescriptionError(
+        raise RobotFileError(
             f"robot file {source}: link_flexibility.stiffness has {len(flexible.stiffness)} entries; "
             f"link_flexibility.links has {len(flexible.links)}"
         )
     possible = [link for link, length in enumerate(description.kinematics.a) if length != 0.0]
     if len(set(flexible.links)) < len(flexible.links) or not set(flexible.links).issubset(possible):
-        raise DescriptionError(
+        raise RobotFileError(
             f"robot file {source}: link_flexibility.links is {list(flexible.links)}; "
             f"each may occur only once and must be one of {possible}, whose length kinematics.a is not 0"
         )
     _check_collision(description, source)
     for name, pose in description.poses.items():
         if len(pose) != joints:
-            raise DescriptionError(
+            raise RobotFileError(
                 f"robot file {source}: poses.{name} has {len(pose)} entries; robot.joints has {joints}"
             )
 
@@ -77,12 +77,12 @@ def _check_kinematics(kinematics: Kinematics, source: str | Path) -> None:
     """Check that the frames of the links are given in one way."""
     given = [key for key in ("a", "d", "alpha") if getattr(kinematics, key)]
     if kinematics.placement and given:
-        raise DescriptionError(
+        raise RobotFileError(
             f"robot file {source}: kinematics has placement and {', '.join(given)}: give one or the other"
         )
     missing = [key for key in ("a", "d", "alpha") if key not in given]
     if not kinematics.placement and missing:
-        raise DescriptionError(f"robot file {source}: kinematics.{missing[0]} is missing")
+        raise RobotFileError(f"robot file {source}: kinematics.{missing[0]} is missing")
 
 
 def _check_collision(description: RobotDescription, source: str | Path) -> None:
@@ -90,19 +90,19 @@ def _check_collision(description: RobotDescription, source: str | Path) -> None:
     names = [body.name for body in description.collision.bodies]
     known = {*names, "payload"}
     if len(known) <= len(names):
-        raise DescriptionError(
+        raise RobotFileError(
             f"robot file {source}: collision.bodies has the names {names}; "
             "each may occur only once, and the names payload and floor are reserved"
         )
     for body in description.collision.bodies:
         if body.link >= description.joints:
-            raise DescriptionError(
+            raise RobotFileError(
                 f"robot file {source}: collision.bodies: {body.name} has link {body.link}; "
                 f"it must be below {description.joints}"
             )
     for pair in description.collision.apart:
         if not known.issuperset(pair):
-            raise DescriptionError(
+            raise RobotFileError(
                 f"robot file {source}: collision.apart has {list(pair)}; the bodies are {sorted(known)}"
             )
 
@@ -112,7 +112,7 @@ def _check_bodies(description: RobotDescription, source: str | Path) -> None:
     links = {f"links.inertia[{number}]": inertia for number, inertia in enumerate(description.links.inertia)}
     for key, inertia in {**links, "payload.inertia": description.payload.inertia}.items():
         if not is_real_body(inertia):
-            raise DescriptionError(
+            raise RobotFileError(
                 f"robot file {source}: {key} is {list(inertia)}; no body can have this: "
                 "a principal moment is negative or larger than the other two together"
             )
@@ -125,10 +125,10 @@ def _check_provenance(description: RobotDescription, source: str | Path) -> None
         for part in key.split("."):
             value = getattr(value, part, None)
         if value is None or key.startswith("_"):
-            raise DescriptionError(f"robot file {source}: provenance.{key}: there is no such table or key")
+            raise RobotFileError(f"robot file {source}: provenance.{key}: there is no such table or key")
         kind, colon, words = origin.partition(":")
         if kind not in ORIGINS or not colon or not words.strip():
-            raise DescriptionError(
+            raise RobotFileError(
                 f"robot file {source}: provenance.{key} is {origin!r}: "
                 f"must be one of {', '.join(ORIGINS)}, a colon and the source"
             )

@@ -7,6 +7,8 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta, Struct
 
+from tvist_plant.user_file import UserFileError
+
 Number = Annotated[float, Meta(ge=-1e7, le=1e7)]
 Positive = Annotated[float, Meta(gt=0, le=1e7)]
 NotNegative = Annotated[float, Meta(ge=0, le=1e7)]
@@ -25,6 +27,10 @@ QUIET_STEP = 2.0 * math.pi / 2**23
 
 
 class DescriptionError(ValueError):
+    """There is no such robot, or its file is invalid; the message says what is allowed."""
+
+
+class RobotFileError(DescriptionError, UserFileError):
     """A robot file is invalid; the message names the file, the key, the value and what is allowed."""
 
 

@@ -6,63 +6,34 @@ meets the height of the URDF's root link; that axis must be vertical.
 """
 
 import math
-from dataclasses import dataclass, field
-from io import BytesIO
 from pathlib import Path
 from typing import Any, Final
-from xml.etree.ElementTree import Element, ParseError, iterparse
+from xml.etree.ElementTree import Element
 
 import numpy as np
 import numpy.typing as npt
 
-from tvist_plant.robot_tables import DescriptionError
-from tvist_plant.user_file import DEEPEST, UserFileError, read_text
+from tvist_plant.urdf_elements import (
+    TURNING,
+    Body,
+    Joint,
+    UrdfError,
+    angles,
+    joint_of,
+    named,
+    numbers,
+    origin_of,
+    parsed,
+)
 
 Floats = npt.NDArray[np.float64]
 
-TURNING: Final = ("revolute", "continuous")
 FLANGES: Final = ("tool0", "flange")
 """Names of a link that stands for the flange, if it is fixed to the last joint; otherwise that joint's link does."""
 CONTINUOUS: Final = 4.0 * math.pi
 """Largest distance from zero of a joint without end stops [rad]."""
 UPRIGHT: Final = 1e-6
 """Deviation of the first axis from the vertical that still counts as rounding [-]."""
-
-
-class UrdfError(DescriptionError):
-    """A URDF file describes no arm that can be simulated; the message names the link or joint."""
-
-
-@dataclass(frozen=True)
-class _Joint:
-    name: str
-    kind: str
-    parent: str
-    child: str
-    placement: Floats
-    """Frame of the child in that of the parent, 4x4."""
-    axis: Floats
-    limit: Element | None
-
-
-@dataclass
-class _Body:
-    """Sum of rigid bodies, in one frame."""
-
-    mass: float = 0.0
-    moment: Floats = field(default_factory=lambda: np.zeros(3))
-    """Mass times centre of mass [kg m]."""
-    inertia: Floats = field(default_factory=lambda: np.zeros((3, 3)))
-    """Inertia about the frame's origin [kg m²]."""
-
-    def add(self, mass: float, com: Floats, inertia: Floats) -> None:
-        self.mass += mass
-        self.moment = self.moment + mass * com
-        self.inertia = self.inertia + inertia + mass * (com @ com * np.eye(3) - np.outer(com, com))
-
-    def about_centre(self) -> tuple[Floats, Floats]:
-        com = self.moment / self.mass
-        return com, self.inertia - self.mass * (com @ com * np.eye(3) - np.outer(com, com))
 
 
 def read_urdf(path: str | Path) -> dict[str, Any]:
@@ -74,9 +45,9 @@ def read_urdf(path: str | Path) -> dict[str, Any]:
         OSError: The file cannot be read.
     """
     where = f"robot file {path}"
-    root = _parsed(path, where)
-    links = {_named(link, where): link for link in root.findall("link")}
-    joints = [_joint(joint, where) for joint in root.findall("joint")]
+    root = parsed(path, where)
+    links = {named(link, where): link for link in root.findall("link")}
+    joints = [joint_of(joint, where) for joint in root.findall("joint")]
     for joint in joints:
         for link in (joint.parent, joint.child):
             if link not in links:
@@ -85,6 +56,7 @@ def read_urdf(path: str | Path) -> dict[str, Any]:
     return _content(str(root.get("name") or Path(path).stem), Path(path), links, joints, chain, where)
 
 
+<<<<<<< HEAD
 def _parsed(path: str | Path, where: str) -> Element:
     text = read_text(path, "robot file")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
@@ -174,6 +146,9 @@ def angles(matrix: Floats) -> tuple[float, float, float]:
 
 
 def _root(links: dict[str, Element], joints: list[_Joint], where: str) -> str:
+=======
+def _root(links: dict[str, Element], joints: list[Joint], where: str) -> str:
+>>>>>>> arms
     children = [joint.child for joint in joints]
     twice = next((name for name in children if children.count(name) > 1), None)
     if twice is not None:
@@ -184,13 +159,13 @@ def _root(links: dict[str, Element], joints: list[_Joint], where: str) -> str:
     return roots[0]
 
 
-def _chain(root: str, joints: list[_Joint], where: str) -> list[_Joint]:
+def _chain(root: str, joints: list[Joint], where: str) -> list[Joint]:
     """Return the movable joints from the base on.
 
     Raises:
         UrdfError: The chain branches, or a joint is of a kind that is not supported.
     """
-    chain: list[_Joint] = []
+    chain: list[Joint] = []
     at: str | None = root
     while at is not None:
         rigid = _rigid(at, joints)
@@ -214,7 +189,7 @@ def _chain(root: str, joints: list[_Joint], where: str) -> list[_Joint]:
     return chain
 
 
-def _rigid(link: str, joints: list[_Joint]) -> dict[str, Floats]:
+def _rigid(link: str, joints: list[Joint]) -> dict[str, Floats]:
     """Return the links that are fixed to a link, itself included, with their frames in its frame."""
     found = {link: np.eye(4)}
     waiting = [link]
@@ -228,7 +203,7 @@ def _rigid(link: str, joints: list[_Joint]) -> dict[str, Floats]:
 
 
 def _content(
-    name: str, path: Path, links: dict[str, Element], joints: list[_Joint], chain: list[_Joint], where: str
+    name: str, path: Path, links: dict[str, Element], joints: list[Joint], chain: list[Joint], where: str
 ) -> dict[str, Any]:
     turns = [_about_z(joint.axis) for joint in chain]
     frames = [_in_previous(joint, joints) for joint in chain]
@@ -283,7 +258,7 @@ def _about_z(axis: Floats) -> Floats:
     return frame
 
 
-def _in_previous(joint: _Joint, joints: list[_Joint]) -> Floats:
+def _in_previous(joint: Joint, joints: list[Joint]) -> Floats:
     """Return the frame of a joint in that of the link which the joint before it moves, or of the base."""
     placement, at = joint.placement, joint.parent
     while (
@@ -293,16 +268,16 @@ def _in_previous(joint: _Joint, joints: list[_Joint]) -> Floats:
     return placement
 
 
-def _flange(link: str, joints: list[_Joint]) -> Floats:
+def _flange(link: str, joints: list[Joint]) -> Floats:
     rigid = _rigid(link, joints)
     return next((rigid[name] for name in FLANGES if name in rigid), rigid[link])
 
 
 def _body(
-    link: str, links: dict[str, Element], joints: list[_Joint], end: Floats, back: Floats, where: str
-) -> _Body:
+    link: str, links: dict[str, Element], joints: list[Joint], end: Floats, back: Floats, where: str
+) -> Body:
     """Return the bodies that a joint moves up to the next one, in the frame at their end."""
-    whole, into = _Body(), np.linalg.inv(end) @ back
+    whole, into = Body(), np.linalg.inv(end) @ back
     for name, placement in _rigid(link, joints).items():
         inertial = links[name].find("inertial")
         if inertial is None:
@@ -311,12 +286,11 @@ def _body(
         mass, tensor = inertial.find("mass"), inertial.find("inertia")
         if mass is None or tensor is None:
             raise UrdfError(f"{here}: <inertial> has no <mass> or no <inertia>")
-        value = float(_numbers(mass, "value", (0.0,), here)[0])
+        value = float(numbers(mass, "value", (0.0,), here)[0])
         xx, xy, xz, yy, yz, zz = (
-            float(_numbers(tensor, key, (0.0,), here)[0])
-            for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+            float(numbers(tensor, key, (0.0,), here)[0]) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
         )
-        at = into @ placement @ _origin(inertial, here)
+        at = into @ placement @ origin_of(inertial, here)
         turn = at[:3, :3]
         matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         whole.add(value, at[:3, 3], turn @ matrix @ turn.T)
@@ -325,7 +299,7 @@ def _body(
     return whole
 
 
-def _limits(chain: list[_Joint], where: str) -> tuple[dict[str, Any], str]:
+def _limits(chain: list[Joint], where: str) -> tuple[dict[str, Any], str]:
     """Return the table `limits`, and what was assumed about positions."""
     position, velocity, torque, notes = [], [], [], []
     for joint in chain:
@@ -333,7 +307,7 @@ def _limits(chain: list[_Joint], where: str) -> tuple[dict[str, Any], str]:
         if joint.limit is None:
             raise UrdfError(f"{here} has no <limit>: effort and velocity are needed")
         values = {
-            key: float(_numbers(joint.limit, key, (0.0,), here)[0])
+            key: float(numbers(joint.limit, key, (0.0,), here)[0])
             for key in ("lower", "upper", "effort", "velocity")
         }
         for key in ("effort", "velocity"):

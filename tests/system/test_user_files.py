@@ -2,10 +2,12 @@
 
 import os
 from importlib import resources
+from pathlib import Path
 
 import pytest
 from tests.conformance.served import refused_to_start
 
+URDF = Path(__file__).parents[1] / "plant" / "urdf" / "seven.urdf"
 OPTIONS = ("--robot", "--config", "--state", "--calibration")
 
 
@@ -50,3 +52,27 @@ def test_a_robot_file_in_degrees_is_a_failure(tmp_path):
     assert code == 1
     assert "limits.position[0] is 360 rad" in said
     assert "degrees" in said
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "said"),
+    [
+        ("mine.toml", "[27500.0,", "[-27500.0,", "drives.gear_stiffness[0] is -27500.0: must be more than 0"),
+        ("mine.urdf", '<mass value="2.7"/>', '<mass value="0"/>', "link elbow has no <inertial> with a mass"),
+        (
+            "mine.urdf",
+            '<parent link="wrist"/>',
+            '<parent link="elbow"/>',
+            "the chain branches after link elbow",
+        ),
+    ],
+)
+def test_an_arm_that_cannot_be_simulated_is_a_failure(name, old, new, said, tmp_path):
+    path = tmp_path / name
+    shipped = resources.files("tvist_plant") / "robots" / "ur5e.toml"
+    text = shipped.read_text(encoding="utf-8") if name.endswith(".toml") else URDF.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    code, told = refused_to_start("--robot", path)
+    assert code == 1
+    assert said in told

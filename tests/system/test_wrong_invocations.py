@@ -48,6 +48,9 @@ MISUSE = [
     # commands and options
     (("dance",), ["'dance'", "--help"]),
     (("mvoe", "Q1"), ["did you mean move?"]),
+    (("robots", "--vary", "50"), ["vary needs --measure"]),
+    (("robots", "--measure", "--vary", "90"), ["vary is 90", "0 to 50 %"]),
+    (("robots", "--measure", "--random", "0"), ["random is 0", "1 to 10000"]),
     (("",), ["''"]),
     (("--colour",), ["'--colour'"]),
     (("check", "--colour"), ["tvist check has no option --colour"]),

@@ -5,8 +5,9 @@ UR5e, whose base, shoulder and elbow are of one size and whose wrist joints are 
 
 Torque constants: the currents that UR's own simulator shows in its start posture (2.14, 1.49 and 0.23 A at shoulder,
 elbow and first wrist), divided into this model's gravity torques of a UR5e in that posture (21.1, 15.0 and 1.8 N m),
-give 9.9, 10.0 and 7.9 N m/A. All other values are chosen so that a joint under its rated load stays below 80 °C, and
-settles within some twenty minutes.
+give 9.9, 10.0 and 7.9 N m/A. They grow with the largest torque, so that a joint of another arm draws the UR5e's
+current at its own largest torque. All other values are chosen so that a joint under its rated load stays below 80 °C,
+and settles within some twenty minutes.
 """
 
 from dataclasses import dataclass
@@ -51,11 +52,19 @@ def joint_ratings(description: RobotDescription) -> list[JointRating]:
 
 def _big(torque: float) -> JointRating:
     return JointRating(
-        torque_constant=10.0, resistance=0.4, thermal_resistance=1.0, thermal_time=1200.0, torque=torque
+        torque_constant=10.0 * (torque / 150.0),
+        resistance=0.4,
+        thermal_resistance=1.0,
+        thermal_time=1200.0,
+        torque=torque,
     )
 
 
 def _small(torque: float) -> JointRating:
     return JointRating(
-        torque_constant=7.9, resistance=1.2, thermal_resistance=2.0, thermal_time=900.0, torque=torque
+        torque_constant=7.9 * (torque / 28.0),
+        resistance=1.2,
+        thermal_resistance=2.0,
+        thermal_time=900.0,
+        torque=torque,
     )

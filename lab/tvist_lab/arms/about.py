@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tvist_controller.calibrations import available, load
+from tvist_controller.api import calibrations, load_calibration
 from tvist_plant.description import RobotDescription
 from tvist_plant.robot_tables import ORIGINS
 from tvist_plant.similar import stretched
@@ -16,7 +16,7 @@ def about(name: str, description: RobotDescription) -> dict[str, Any]:
         description: The arm.
     """
     limits, drives = description.limits, description.drives
-    calibrations = [load(known) for known in available()]
+    known = [load_calibration(name) for name in calibrations()]
     return {
         "name": name,
         "model": description.robot.model,
@@ -42,5 +42,5 @@ def about(name: str, description: RobotDescription) -> dict[str, Any]:
             }
             for kind in ORIGINS
         },
-        "calibrations": [one.name for one in calibrations if one.robot == description.robot.model],
+        "calibrations": [one.name for one in known if one.robot == description.robot.model],
     }

@@ -28,6 +28,8 @@ PLACES = 40
 """Number of random configurations at which modes and sag are compared."""
 MODES = 3
 """Number of modes that are compared."""
+ALONE = 4
+"""Least number of joints of an arm that auto can shape: it suppresses four modes."""
 
 
 @dataclass(frozen=True)

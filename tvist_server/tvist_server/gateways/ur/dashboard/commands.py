@@ -245,8 +245,8 @@ def _number() -> str:
 
 def _model(request: Request) -> None:
     model = request.robot.description.robot.model
-    plain = re.match(r"UR\d+", model)
-    request.answer(plain[0] if plain else model)
+    plain = re.match(r"UR\d+", model, re.IGNORECASE)
+    request.answer(plain[0].upper() if plain else model)
 
 
 def _support_file(request: Request) -> None:

@@ -73,9 +73,12 @@ def robot_state(description: RobotDescription, snapshot: Snapshot) -> bytes:
 
 
 def robot_type(description: RobotDescription) -> int:
-    """Return UR's number of a robot type, which is the same with and without the `e`; 0 if the robot is not UR's."""
-    model = re.match(r"UR\d+", description.robot.model)
-    return _TYPES.get(model[0], 0) if model else 0
+    """Return UR's number of a robot type, which is the same with and without the `e`; 0 if the robot is not UR's.
+
+    Source of the numbers: `RobotType` in UR's client library, ur_client_library/ur/datatypes.h.
+    """
+    model = re.match(r"UR\d+", description.robot.model, re.IGNORECASE)
+    return _TYPES.get(model[0].upper(), 0) if model else 0
 
 
 def _part(number: int, body: bytes) -> bytes:

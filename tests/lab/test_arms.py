@@ -1,0 +1,65 @@
+"""The arms that come with the package: each is described, calibrated, and stilled by auto."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from tvist_controller.calibrations import available
+from tvist_controller.calibrations import load as load_calibration
+from tvist_lab.arms.about import about
+from tvist_lab.arms.measure import sag_error
+from tvist_lab.arms.page import robots_page
+from tvist_plant.description import load, robots
+from tvist_plant.fingerprint import fingerprint
+
+UR = ("ur3e", "ur10e", "ur16e", "ur20", "ur30", "ur5e")
+
+
+@pytest.mark.parametrize("name", UR)
+def test_an_arm_has_a_calibration_of_its_own_springs(name):
+    arm = load(name)
+    own = [one for one in map(load_calibration, available()) if one.robot == arm.robot.model and one.modal]
+    assert [one.provenance.arm for one in own] == [fingerprint(arm)]
+
+
+@pytest.mark.parametrize("name", UR)
+def test_gears_sag_by_gravity_over_stiffness(name, measured):
+    error = sag_error(load(name), seed=0)
+    measured(f"{name}: sag off by [%]", error)
+    assert error < 1.0
+
+
+def test_every_table_of_numbers_has_an_origin():
+    for name in robots():
+        told = {key.partition(".")[0] for kind in about(name, load(name))["origins"].values() for key in kind}
+        assert {"kinematics", "links", "limits", "drives"} <= told, name
+
+
+@pytest.mark.slow
+def test_three_arms_are_stilled_by_auto_out_of_the_box(tmp_path):
+    """By the command that the reference page names, with fewer moves."""
+    page = tmp_path / "robots.md"
+    command = ("robots", "ur3e", "ur10e", "ur20", "--measure", "--random", "10", "--json", "--markdown", page)
+    ended = subprocess.run(
+        [sys.executable, "-m", "tvist_cli", *map(str, command)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert ended.returncode == 0, ended.stderr
+    for one in json.loads(ended.stdout)["robots"]:
+        (found,) = one["measured"]
+        assert found["reduction_percent"]["median"] >= 95.0, one["name"]
+        assert np.max(found["f_d_error_percent"]) < 3.0
+        assert found["sag_error_percent"] < 1.0
+        assert f"| `{one['name']}` | +0 % |" in page.read_text(encoding="utf-8")
+
+
+def test_the_page_has_a_row_for_each_arm():
+    listed = [about(name, load(name)) for name in robots()]
+    page = robots_page(listed, "tvist robots")
+    assert all(f"| `{name}` |" in page for name in robots())
