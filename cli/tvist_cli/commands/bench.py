@@ -1,6 +1,7 @@
 """`tvist bench`: measure how fast tvist runs on this machine."""
 
 import asyncio
+from collections.abc import Callable
 from typing import Any
 
 from tvist_cli.failure import Failure, interrupted, told
@@ -42,32 +43,27 @@ def bench(
             how long tvist serve takes to start.
         json: Print one JSON object.
     """
-    if fixture is not None and fixture < 2:
-        raise Failure(f"fixture is {fixture}: must be at least 2 tests", code=2)
     _check(
         seconds,
         {"soak": soak, "reverse": reverse, "reading": reading},
         {"hostile": hostile, "viewed": viewed},
     )
+    if fixture is not None and fixture < 2:
+        raise Failure(f"fixture is {fixture}: must be at least 2 tests", code=2)
     if fleet is not None and not (2 <= fleet <= MOST and seconds > 0.0):
         raise Failure(f"fleet is {fleet}: must be 2 to {MOST} publishers, and seconds more than 0", code=2)
+    studies: tuple[tuple[float | None, Callable[[], None]], ...] = (
+        (fleet, lambda: _fleet(fleet or 0, seconds, json)),
+        (hostile, lambda: _hostile(hostile or 0, seconds, json)),
+        (viewed, lambda: _viewed(viewed or 0, seconds, json)),
+        (reverse, lambda: _reverse(reverse or 0.0, json)),
+        (reading, lambda: _reading(reading or 0.0, json)),
+        (fixture, lambda: _fixture(fixture or 0, json)),
+        (soak, lambda: _soak(soak or 0.0, json)),
+        (0.0, lambda: _all(seconds, json)),
+    )
     try:
-        if fleet is not None:
-            _fleet(fleet, seconds, json)
-        elif hostile is not None:
-            _hostile(hostile, seconds, json)
-        elif viewed is not None:
-            _viewed(viewed, seconds, json)
-        elif reverse is not None:
-            _reverse(reverse, json)
-        elif reading is not None:
-            _reading(reading, json)
-        elif fixture is not None:
-            _fixture(fixture, json)
-        elif soak is not None:
-            _soak(soak, json)
-        else:
-            _all(seconds, json)
+        next(study for asked, study in studies if asked is not None)()
     except KeyboardInterrupt:
         raise interrupted("the measurements so far are lost; the served robots have stopped") from None
 
