@@ -37,7 +37,7 @@ def folder(tmp_path_factory):
     return place
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_command_works_in_its_order(folder, monkeypatch):
     monkeypatch.chdir(folder)
     before = commands()[: [words[0] for words in commands()].index("serve")]

@@ -125,6 +125,7 @@ def test_letting_the_jog_button_go_stops_the_arm(tab, wire):
     tab.get_by_text("Nobody has control.").wait_for()
 
 
+@pytest.mark.nightly
 def test_one_tab_has_control_the_other_watches_and_may_stop(chromium):
     """The robot is in slow motion, since software draws two pages slowly."""
     with (
