@@ -9,13 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.controller.robots import UR5E, cut
 
+from tvist_plant.description import load
 from tvist_protocol import commands as c
 from tvist_protocol.programs import ProgramRun, ProgramStop
 from tvist_protocol.replies import Refused
 from tvist_protocol.simulation import SimulationInject
 from tvist_protocol.stream import Event
 from tvist_server.gateways.ur import messages, version
-from tvist_server.gateways.ur.primary.packages import robot_state
+from tvist_server.gateways.ur.primary.packages import robot_state, robot_type
 from tvist_server.gateways.ur.primary.scripts import LONGEST, Intake
 from tvist_server.gateways.ur.primary.session import PrimarySession
 
@@ -597,3 +598,11 @@ def test_no_bytes_break_a_session(data):
     interface.receive(b"\npower on\nstop program\n")
     interface.closed()
     assert all(line.isprintable() and len(line) < 300 for line in reported)
+
+
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [("ur3e", 3), ("ur5e", 1), ("ur10e", 2), ("ur16e", 4), ("ur20", 7), ("ur30", 8), ("one-joint", 0)],
+)
+def test_the_robot_type_is_ur_s_number_of_the_model(name, number):
+    assert robot_type(load(name)) == number
