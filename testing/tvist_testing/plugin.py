@@ -136,6 +136,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
             else:
                 robot.discard()
         del item.stash[_ROBOTS]
+        item.stash[_TOLD] = False  # a test may run again
     return report
 
 

@@ -15,6 +15,8 @@ from tvist_testing.wanted import WantedRobot
 
 PATIENCE = 300.0
 """Longest wait for an answer of the process [s]: the first start compiles, which takes minutes on a slow machine."""
+ENDING = 30.0
+"""Longest wait for a robot to end in order [s]."""
 NEEDED = (
     "tvist_server", "tvist_shaping", "tvist_urscript",
     "numpy", "numba", "pinocchio", "ruckig", "mcap", "zstandard", "cryptography",
@@ -50,16 +52,22 @@ class ServedRobot:
         self._connection.sendall(b"state\n")
 
     def close(self) -> None:
-        """End the robot in order, so that its recording is complete; a second call does nothing."""
+        """End the robot in order, so that its recording is complete, or else at once; a second call does nothing."""
+        if self.closed:
+            return
         with contextlib.suppress(OSError):
+            os.kill(self.pid, signal.SIGCONT)  # a test may have stopped it
+            self._connection.settimeout(ENDING)
             self._connection.sendall(b"close\n")
             self._wait()
-        self._connection.close()
-        self.closed = True
+        self.kill()
 
     def kill(self) -> None:
         """End the robot at once, even if a test has stopped its process; nothing is left to be read."""
+        if self.closed:
+            return
         with contextlib.suppress(OSError):
+            self._connection.settimeout(ENDING)
             os.kill(self.pid, signal.SIGKILL)
             self._wait()
         self._connection.close()

@@ -129,3 +129,19 @@ def test_in_lockstep_no_tick_comes_by_itself_and_jobs_are_done():
     clock.close()
     assert robot.host.ticks == 0
     assert clock.punctuality(robot) is None
+
+
+def test_in_lockstep_the_state_is_repeated_however_many_jobs_come(monkeypatch):
+    """A new client gets the state although telemetry, say, comes in as often."""
+    monkeypatch.setattr("tvist_server.clock.REPEAT_EVERY", 0.01)
+    robot, repeated = Mailbox(FakeHost()), threading.Event()
+    clock = Lockstep(robot, repeated.set)
+
+    def another():
+        if not repeated.is_set():
+            robot.post(another)
+
+    robot.post(another)
+    clock.start()
+    assert repeated.wait(WAIT)
+    clock.close()

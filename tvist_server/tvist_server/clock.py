@@ -27,6 +27,8 @@ HAND_ON_EVERY = 0.0009
 switches, about as much as a tick. A single robot hands on every tick at once; several robots hand on together what
 they produced within a millisecond.
 """
+REPEAT_EVERY = 1.0
+"""Time after which a robot in lockstep publishes its last state again [s]."""
 SET_TIMER_SLACK = 29
 """Option of prctl for the timer slack: the largest delay with which a thread may be woken, in nanoseconds."""
 PRIORITY = 50
@@ -111,7 +113,7 @@ class Clock(ABC):
 
 
 class Lockstep(Clock):
-    """Time passes when a client steps; after a second without a step, the last state is published again.
+    """Time passes when a client steps; every second, the last state is published again for new clients.
 
     Each robot has a thread of its own, since a step can take long and must not delay the clients of other robots.
 
@@ -129,9 +131,13 @@ class Lockstep(Clock):
         """Return None, since a client advances time."""
 
     def _run(self) -> None:
+        # By a deadline of its own: other jobs, such as telemetry, may come in every second, too.
+        due = time.monotonic() + REPEAT_EVERY
         while self._running:
-            if not self._jobs.do_next(timeout=1.0):
+            self._jobs.do_next(timeout=max(0.0, due - time.monotonic()))
+            if self._running and time.monotonic() >= due:
                 self._repeat()
+                due = time.monotonic() + REPEAT_EVERY
 
 
 class Realtime(Clock):
