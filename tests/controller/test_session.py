@@ -2,7 +2,7 @@
 
 import pytest
 
-from tvist_controller.session import NoControlError, Session
+from tvist_controller.session import NoControlError, Session, check_token
 
 
 @pytest.fixture
@@ -112,3 +112,12 @@ def test_control_that_was_handed_over_is_not_the_giver_s_any_more(session):
     session.hand_over("b", 1.0)
     assert not session.client_gone("a", "1f")
     assert (session.lease.client, session.lease.session) == ("b", None)
+
+
+def test_a_token_of_before_a_restart_is_never_valid_again():
+    before, after = (Session(timeouts=True, instance=instance) for instance in ("1f", "2e"))
+    old = before.take("a", 30.0, 0.0).token
+    new = after.take("a", 30.0, 0.0).token
+    assert (old, new) == ("a#1f.1", "a#2e.1")
+    with pytest.raises(NoControlError, match="not that of the current lease"):
+        check_token(after.lease, old)

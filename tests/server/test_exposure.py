@@ -5,7 +5,7 @@ import socket
 import pytest
 
 from tvist_protocol.codec import MAX_BYTES
-from tvist_server.gateways.access import access_control, open_access
+from tvist_server.gateways.access import access_control, open_access, router_access
 from tvist_server.gateways.endpoints import is_local
 from tvist_server.gateways.exposure import ExposureError, guarded
 
@@ -123,7 +123,8 @@ class TestAccess:
         streams = {f"tvist/ur5e/{topic}" for topic in ("state", "event", "telemetry", "truth", "io")}
         assert self.granted(role, "egress", "put") == streams
         assert self.granted(role, "egress", "query") == set()
-        assert self.granted(role, "ingress", "declare_subscriber") == streams
+        asked = {key.replace("tvist/ur5e", "**/tvist/*") for key in streams}
+        assert self.granted(role, "ingress", "declare_subscriber") == asked
 
     def test_every_robot_served_has_its_keys_and_no_other_has(self):
         robots = ("left", "right")
@@ -132,8 +133,29 @@ class TestAccess:
             "tvist/right/setpoint",
         }
         keys = {key for rule in access_control(robots, self.ROLES)["rules"] for key in rule["key_exprs"]}
-        assert {key.split("/")[1] for key in keys} == {"left", "right", "*"}
-        assert {key for key in keys if key.split("/")[1] == "*"} == {"tvist/*/alive"}
+        many = {"state", "event", "telemetry", "truth", "io", "alive"}
+        shared = {"tvist/*/alive", *(f"**/tvist/*/{leaf}" for leaf in many)}
+        assert {key.split("/")[1] for key in keys - shared} == {"left", "right"}
+        assert shared < keys
+
+    def test_in_a_namespace_every_right_is_one_within_it(self):
+        made = access_control(["ur5e"], self.ROLES, "hall-3")
+        keys = {key for rule in made["rules"] for key in rule["key_exprs"] if "*/" not in key}
+        assert keys
+        assert all(key.startswith("hall-3/tvist/ur5e/") for key in keys)
+
+    def test_a_routers_robot_speaks_for_its_name_and_its_namespace_alone(self):
+        made = router_access({"hall-3": "robot", "anna": "operator"})
+        (policy,) = (policy for policy in made["policies"] if policy["subjects"] == ["hall-3"])
+        rules = [rule for rule in made["rules"] if rule["id"] in policy["rules"]]
+        puts = {
+            key
+            for rule in rules
+            if rule["flows"] == ["ingress"] and "put" in rule["messages"]
+            for key in rule["key_exprs"]
+        }
+        assert {key.rpartition("/")[0] for key in puts} == {"**/tvist/hall-3", "**/hall-3/tvist/*"}
+        assert not any(rule["flows"] == ["ingress"] and "query" in rule["messages"] for rule in rules)
 
     @pytest.mark.parametrize(("name", "role"), ROLES.items())
     def test_a_role_without_names_is_left_out_since_zenoh_would_take_it_for_everybody(self, name, role):
