@@ -12,8 +12,12 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tests.conformance.served import PATIENCE, Served
+
+from tvist_lab.recordings.mcap_file import read
+from tvist_protocol.modes import SafetyMode
 
 from .network_namespaces import WATCHERS, cabled, why_not
 from .routed import Router
@@ -138,12 +142,12 @@ def fleet():
                     process.stdout.close()
 
 
-def test_robots_of_a_fleet_are_found_lost_and_back_like_bare_tokens(fleet, measured):
+def test_robots_of_a_fleet_are_found_lost_and_back_like_bare_tokens(fleet, measured, tmp_path):
     near, far, router, observer, robots, bare, started = fleet
     began = time.monotonic()
     dying = robots(near, "dying", SLOW // 2, "--speed", "0.1")
     freezing = robots(near, "freezing", SLOW // 2, "--speed", "0.1")
-    fast = robots(near, "fast", FAST)
+    fast = robots(near, "fast", FAST, "--record", str(tmp_path / "fast.mcap"))
     for served in (dying, freezing, fast):
         served.wait_until_ready()
     tokens = [bare(near, "bare/dying"), bare(near, "bare/freezing")]
@@ -186,7 +190,28 @@ def test_robots_of_a_fleet_are_found_lost_and_back_like_bare_tokens(fleet, measu
     robots_s = observer.last("freezing/tvist", SLOW // 2, there=True, since=before) - before
     measured("thawed: seconds until back, robots and bare token", (robots_s, bare_s))
 
-    # The router dies and another one takes its place.
+    # The router dies while a robot moves, and another one takes its place.
+    before = time.monotonic()
+    words = (
+        "move",
+        "Q2",
+        "--endpoint",
+        ENDPOINT,
+        "--namespace",
+        "fast",
+        "--name",
+        "ur5e-1",
+        "--duration",
+        "4",
+    )
+    mover = subprocess.Popen(
+        [*far, sys.executable, "-m", "tvist_cli", *words], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    )
+    started.append(mover)
+    observer.wait(
+        lambda lines: any(line.get("kind") == "motion_started" and line["at"] > before for line in lines)
+    )
+    observer.wait(lambda lines: lines[-1]["at"] > before + 1.0 and "states" in lines[-1])
     router.process.kill()
     router.wait()
     again = Router("--insecure", endpoint=ENDPOINT, around=far)
@@ -204,3 +229,12 @@ def test_robots_of_a_fleet_are_found_lost_and_back_like_bare_tokens(fleet, measu
         assert "the connection to the router" in served.said
         assert served.end() == 0, served.said
         served.assert_quiet()
+    moved = read(tmp_path / "fast-ur5e-1.mcap")
+    kinds = [event.kind for event in moved.events if event.kind != "warning"]
+    assert kinds == ["motion_started", "lease_lost", "motion_stopped"]
+    limits = moved.info.limits
+    for name, limit in (("qd", limits.velocity), ("moment", limits.torque)):
+        used = np.max(np.abs([getattr(state, f"target_{name}") for state in moved.states]) / np.array(limit))
+        measured(f"robot that moved while its router died: target_{name} over its limit", used)
+        assert used <= 1.0
+    assert {state.safety_mode for state in moved.states} == {SafetyMode.NORMAL}

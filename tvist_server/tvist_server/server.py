@@ -117,7 +117,7 @@ class Server:
         why = (
             "is back"
             if there
-            else "was lost; the robot tries to reach it again, and keeps leases by their time"
+            else "was lost, and with it the clients behind it; the robot looks for it again"
         )
         for robot in self.robots:
             robot.warn(f"the connection to the router at {where} {why}")
