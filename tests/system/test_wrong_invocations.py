@@ -45,6 +45,30 @@ def assert_said(ended, code, words):
 
 
 MISUSE = [
+    # fleets
+    (("fleet", "stop"), ["names of robots", "--all"]),
+    (("fleet", "stop", "left", "--all"), ["not both"]),
+    (("fleet", "show", "left"), ["fleet stop"]),
+    (("fleet", "stop", "--all", "--watch"), ["--watch"]),
+    (("fleet", "dance"), ["dance"]),
+    (("fleet", "stop", "Hall/left"), ["namespace is 'Hall'", "a-z 0-9"]),
+    (("router", "--rate", "0"), ["rate is '0'", "up to 500"]),
+    (("router", "--rate", "10@"), ["10@eth1"]),
+    (("router", "--rate", "10", "--robot", "ur5e*0"), ["robot is 'ur5e*0'", "1 to 10000"]),
+    (("router", "--robot", "left"), ["--rate"]),
+    (("router", "--connect", "hall"), ["connect is 'hall'"]),
+    (("router", "--listen", "tcp/0.0.0.0:7447"), ["--security", "--insecure"]),
+    (("watch", "tvist/*/state", "tvist/a/state"), ["one endpoint and one key"]),
+    (("watch", "tvist/*/event"), ["must end in /state"]),
+    (("watch", "tvist//*/state"), ["is not a key"]),
+    (("serve", "--namespace", "Hall 3"), ["namespace", "a-z 0-9"]),
+    (("serve", "--connect", "hall"), ["connect is 'hall'"]),
+    (
+        ("serve", "--connect", "tls/hall:7447", "--listen", "tls/127.0.0.1:7447", "--security", "keys"),
+        ["leave listen out"],
+    ),
+    (("bench", "--fleet", "1"), ["fleet is 1", "2 to 2000"]),
+    (("keys", "k", "--member", "a", "--uplink", "a"), ["cannot be both robot and router"]),
     # commands and options
     (("dance",), ["'dance'", "--help"]),
     (("mvoe", "Q1"), ["did you mean move?"]),
