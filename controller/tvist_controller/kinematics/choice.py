@@ -168,7 +168,7 @@ def search(
     """Find postures of any arm by least squares, from `near` and from given starts.
 
     Args:
-        arm: Table of `arm_table`, shape (n + 1, 5).
+        arm: Table of `arm_table`, shape (n + 1, 5), or (n + 1, 17) with placements.
         starts: Further starts, shape (k, n) [rad].
         rotation: Rotation of the flange, shape (3, 3).
         position: Position of the flange, shape (3,) [m].

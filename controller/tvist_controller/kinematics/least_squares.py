@@ -102,7 +102,7 @@ def descend(
     the Jacobian is singular because the solution is one of many (Yamashita and Fukushima, 2001).
 
     Args:
-        dh: Table whose first four columns are those of `dh_table`, shape (n, 4 or more).
+        dh: Table whose first columns are those of `dh_table`, shape (n, 4), (n, 5), or (n, 17) with placements.
         rotation: Rotation to reach, shape (3, 3).
         position: Position to reach, shape (3,) [m].
         near: Joint positions to stay near to, shape (n,) [rad].
