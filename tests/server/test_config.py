@@ -268,3 +268,12 @@ def test_a_state_that_cannot_be(tmp_path, content, named):
 
 def test_a_state_that_is_not_there(tmp_path):
     assert "No such file" in sentence(config(state=str(tmp_path / "no.toml")).setup)
+
+
+def test_a_machine_without_a_temporary_folder_serves_all_the_same(monkeypatch, tmp_path):
+    def none():
+        raise FileNotFoundError
+
+    monkeypatch.setattr("tempfile.gettempdir", none)
+    monkeypatch.chdir(tmp_path)
+    assert ServeConfig().dump_folder() == tmp_path

@@ -2,7 +2,6 @@
 
 import dataclasses
 import ipaddress
-import tempfile
 import tomllib
 from pathlib import Path
 from typing import Annotated, TypeVar
@@ -24,6 +23,7 @@ from tvist_server.fleet import members
 from tvist_server.initial import read_state, shaped_by
 from tvist_server.profiles import PLAIN, PROFILES, Profile, ProfileName
 from tvist_server.program_folder import ProgramFolder
+from tvist_server.temporary import temporary_folder
 from tvist_server.ur_ports import InterfaceName, UrPorts
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -91,8 +91,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """MCAP file to record into; with several robots, each has a file of its own that ends with its name."""
     keep: str | None = None
     """Duration that the recording keeps at least, such as "10min"; it forgets what was before. Default: all of it."""
-    dump: str = tempfile.gettempdir()
-    """Folder to save the last second before a failure of the simulated arm to."""
+    dump: str | None = None
+    """Folder to save the last second before a failure of the simulated arm to. Default: the system's temporary one."""
     truth: bool = False
     """Publish what a real robot cannot measure, too."""
     quiet: bool | None = None
@@ -156,6 +156,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         Raises:
             ConfigError: `dump` is not a folder, so that this second would be lost.
         """
+        if self.dump is None:
+            return temporary_folder()
         if not Path(self.dump).is_dir():
             raise ConfigError(f"dump is {self.dump!r}: must be a folder that exists")
         return Path(self.dump)
