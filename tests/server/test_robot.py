@@ -9,6 +9,7 @@ from tvist_protocol.io import Io, SetIo
 from tvist_protocol.programs import ProgramLoad, ProgramPlay
 from tvist_protocol.replies import Done
 from tvist_protocol.simulation import SimulationStep
+from tvist_protocol.stream import State
 from tvist_server.robot import ServedRobot
 
 
@@ -63,3 +64,23 @@ def test_the_recording_has_inputs_and_outputs_from_the_first_tick_on(tmp_path):
     content = read(tmp_path / "run.mcap")
     assert [(io.tick, io.actual_digital_output_bits) for io in content.io] == [(1, 0), (4, 2)]
     assert content.recording["actual_digital_output_bits"].tolist() == [0, 0, 0, 2, 2]
+
+
+def test_a_robot_that_is_stepped_does_not_say_a_state_twice(tmp_path):
+    robot, told = ServedRobot(setup(clock="lockstep"), None, tmp_path), []
+
+    class StateGateway(IoGateway):
+        def publish(self, _topic, message, _data):
+            if isinstance(message, State):
+                told.append(message.tick)
+
+    robot.open([StateGateway()])
+    token = robot.request(c.TakeControl(client="a")).token
+    for now in (1, 2):
+        robot.request(SimulationStep(token=token, ticks=1))
+        robot.repeat()
+        robot.hand_on()
+        assert told == list(range(1, now + 1))
+    robot.repeat()
+    robot.hand_on()
+    assert told == [1, 2, 2]

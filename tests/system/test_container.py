@@ -198,7 +198,7 @@ def test_on_a_processor_of_any_name_nothing_is_compiled(engine, options, command
     with Contained(engine, *talk, *options, command=command) as robot:
         drive(robot.endpoint)
         cache = engine("logs", robot.name)
-        code, _ = robot.end()
+        code = robot.end()
     assert code == 0
     assert "data loaded" in cache
     assert "saved" not in cache

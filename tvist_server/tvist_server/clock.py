@@ -28,7 +28,7 @@ switches, about as much as a tick. A single robot hands on every tick at once; s
 they produced within a millisecond.
 """
 REPEAT_EVERY = 1.0
-"""Time after which a robot in lockstep publishes its last state again [s]."""
+"""Time after which a robot in lockstep publishes its last state again, if there was no step meanwhile [s]."""
 SET_TIMER_SLACK = 29
 """Option of prctl for the timer slack: the largest delay with which a thread may be woken, in nanoseconds."""
 PRIORITY = 50
@@ -113,13 +113,13 @@ class Clock(ABC):
 
 
 class Lockstep(Clock):
-    """Time passes when a client steps; every second, the last state is published again for new clients.
+    """Time passes when a client steps; every second, the robot may publish its last state again for new clients.
 
     Each robot has a thread of its own, since a step can take long and must not delay the clients of other robots.
 
     Args:
         robot: The robot.
-        repeat: Publishes the robot's last state again.
+        repeat: Publishes the robot's last state again, unless time has passed since the call before.
     """
 
     def __init__(self, robot: Mailbox, repeat: Do) -> None:

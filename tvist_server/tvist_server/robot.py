@@ -81,6 +81,7 @@ class ServedRobot:
             )
         black_box = BlackBox(dump, lambda: info_of(self.controller), setup.to_builtins())
         self._publisher = Publisher(lossless=lockstep)
+        self._looked_at = self.controller.latest.tick
         sinks: list[Sink] = [] if self.recorder is None else [self.recorder]
         sinks += [] if observe is None else [observe(self.controller)]
         self.sockets = ProgramSockets(self._hear, self.warn, hosts)
@@ -124,8 +125,13 @@ class ServedRobot:
         self._publisher.hand_on()
 
     def repeat(self) -> None:
-        """Publish the state again for new clients while no time passes; called in the controller's thread."""
-        self._publisher.repeat(self.controller.latest, self.controller.io())
+        """Publish the state again for new clients, unless time has passed; in the controller's thread."""
+        state = self.controller.latest
+        if (
+            state.tick == self._looked_at
+        ):  # otherwise new clients have had newer ones, and others take it for a tick
+            self._publisher.repeat(state, self.controller.io())
+        self._looked_at = state.tick
 
     def _carry_out(self, admitted: Admitted, answer: Answer) -> None:
         client = admitted.client
