@@ -1,7 +1,6 @@
 """The screen of `tvist watch` with wildcards: one line for each robot."""
 
 import asyncio
-import contextlib
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,8 +8,9 @@ from typing import TYPE_CHECKING
 from rich.live import Live
 from rich.table import Table
 
-from tvist_cli.failure import interrupted, told
+from tvist_cli.failure import told
 from tvist_cli.output import out, print_json
+from tvist_cli.watching import watch_for
 
 if TYPE_CHECKING:
     from tvist_client.many_states import ManyStates
@@ -57,14 +57,7 @@ def watch_many(
                     now, since = time.monotonic() - since, time.monotonic()
                     live.update(_table(states, now), refresh=True)
 
-    began = time.monotonic()
-    with told(), contextlib.suppress(TimeoutError):
-        try:
-            asyncio.run(asyncio.wait_for(run(), seconds))
-        except KeyboardInterrupt:
-            raise interrupted(
-                f"watched for {time.monotonic() - began:.1f} s; the robots keep running"
-            ) from None
+    watch_for(seconds, run(), "the robots keep running")
 
 
 async def _print(states: "ManyStates") -> None:

@@ -8,19 +8,18 @@ import asyncio
 import re
 from collections.abc import Callable, Collection
 from functools import partial
-from types import TracebackType
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import msgspec
 import zenoh
 from zenoh.handlers import Callback
 
+from tvist_client.across import Across
 from tvist_client.errors import ClientError, NotConnectedError
 from tvist_client.readiness import readiness
 from tvist_client.robot import ENDPOINT
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.inbox import wake
-from tvist_client.transports.session import close_session, open_session
 from tvist_client.understood import understood
 from tvist_protocol import keys
 from tvist_protocol.codec import decode_info, decode_reply, decode_telemetry, encode
@@ -40,7 +39,7 @@ _DIGITS = re.compile(r"(\d+)")
 
 
 class Place(NamedTuple):
-    """Where a robot is: its namespace, empty if it has none, and its name."""
+    """A robot's namespace, which is empty if it has none, and its name."""
 
     namespace: str
     robot: str
@@ -78,7 +77,7 @@ class FleetRobot(msgspec.Struct, frozen=True):
     control: str | None
     """Client that has control; null if there is none."""
     ready: bool
-    """Whether it answers and may be moved."""
+    """True if the robot answers and may be moved."""
     ticks_per_second: float | None
     """Control periods in its last second [1/s]; null for a robot that has sent no telemetry, as in lockstep."""
     silent_s: float | None
@@ -101,7 +100,7 @@ class StopReport(msgspec.Struct, frozen=True):
     said: str
 
 
-class Fleet:
+class Fleet(Across):
     """Robots on a network, by one session. Use as an asynchronous context.
 
     Args:
@@ -116,22 +115,13 @@ class Fleet:
     def __init__(
         self, endpoint: str = ENDPOINT, *, security: Folder | None = None, namespace: str = ""
     ) -> None:
-        self._endpoint, self._security = endpoint, security
-        self._within = keys.check_namespace(namespace) if namespace else ""
-        self._session: zenoh.Session
-        self._loop: asyncio.AbstractEventLoop
+        super().__init__(endpoint, security=security, namespace=namespace)
         self._told: dict[Place, tuple[float, Telemetry]] = {}
         self.places: set[Place] = set()
         """Robots whose liveliness tokens are there now."""
 
-    async def __aenter__(self) -> Self:
-        """Connect, and let the tokens arrive.
-
-        Raises:
-            NotConnectedError: Nobody listens there, or the certificate is rejected.
-        """
-        self._loop = asyncio.get_running_loop()
-        self._session = await asyncio.to_thread(open_session, self._endpoint, self._security)
+    async def _subscribe(self) -> None:
+        """Subscribe to tokens and telemetry, and let the tokens arrive."""
         self._session.liveliness().declare_subscriber(
             keys.within(self._within, keys.ANYWHERE_ALIVE),
             Callback(self._on_token, indirect=False),
@@ -142,12 +132,6 @@ class Fleet:
             Callback(self._on_telemetry, indirect=False),
         )
         await asyncio.sleep(SETTLE_S)
-        return self
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        await asyncio.to_thread(close_session, self._session)
 
     async def listen(self) -> None:
         """Wait until every robot in real time has published its telemetry."""

@@ -1,19 +1,17 @@
 """The newest states of many robots, by one subscription with wildcards."""
 
-import asyncio
 from functools import partial
-from types import TracebackType
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import zenoh
 from zenoh.handlers import Callback
 
+from tvist_client.across import Across
 from tvist_client.errors import MisuseError
 from tvist_client.fleet import Place
 from tvist_client.robot import ENDPOINT
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.inbox import wake
-from tvist_client.transports.session import close_session, open_session
 from tvist_protocol import keys
 from tvist_protocol.codec import decode_state
 from tvist_protocol.errors import ProtocolError
@@ -30,7 +28,7 @@ class Newest(NamedTuple):
     """Time at which it came, on the loop's clock [s]."""
 
 
-class ManyStates:
+class ManyStates(Across):
     """States of all robots that a key selects. Use as an asynchronous context.
 
     Only the newest state of each robot is kept, and decoded when it is looked at.
@@ -57,27 +55,13 @@ class ManyStates:
             zenoh.KeyExpr(selector)
         except zenoh.ZError as error:
             raise MisuseError(f"{selector} is not a key: write tvist/*{leaf}, or tvist/NAME{leaf}") from error
-        self._key = keys.within(keys.check_namespace(namespace) if namespace else "", selector)
-        self._endpoint, self._security = endpoint, security
-        self._session: zenoh.Session
-        self._loop: asyncio.AbstractEventLoop
+        super().__init__(endpoint, security=security, namespace=namespace)
+        self._key = keys.within(self._within, selector)
         self._newest: dict[Place, tuple[bytes, int, float]] = {}
 
-    async def __aenter__(self) -> Self:
-        """Connect and subscribe.
-
-        Raises:
-            NotConnectedError: Nobody listens there, or the certificate is rejected.
-        """
-        self._loop = asyncio.get_running_loop()
-        self._session = await asyncio.to_thread(open_session, self._endpoint, self._security)
+    async def _subscribe(self) -> None:
+        """Subscribe to the key."""
         self._session.declare_subscriber(self._key, Callback(self._on_sample, indirect=False))
-        return self
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        await asyncio.to_thread(close_session, self._session)
 
     def look(self) -> dict[Place, Newest]:
         """Return the newest state of each robot that has ever sent one."""

@@ -30,7 +30,7 @@ class Stream(AsyncIterator[M], Generic[M]):
 
     @property
     def ready(self) -> bool:
-        """Whether the next message, or the end, is there without waiting."""
+        """True if the next message, or the end, is there already."""
         return bool(self._waiting) or self._finished or self._error is not None
 
     def push(self, message: M) -> None:

@@ -155,7 +155,7 @@ LONG: Final = 0.2
 def completed(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the content of a robot file with springs and drives by the rule, if it has no table `drives`.
 
-    What is wrong with the content is left as it is, for the checks that follow.
+    Wrong content stays unchanged; the checks that follow report it.
     """
     whole = dict(content)
     if "drives" in whole:

@@ -19,6 +19,7 @@ from tvist_server.config import from_mapping
 from tvist_server.ending import Ending
 from tvist_server.gateways.base import GatewayError
 from tvist_server.server import Server
+from tvist_server.ur_ports import UrPorts
 from tvist_testing.preparation import Preparation
 from tvist_testing.wanted import WantedRobot
 
@@ -35,9 +36,7 @@ def serve(wanted: WantedRobot, connection: socket.socket) -> int:
     """
     _log_into(wanted.log)
     ending = Ending()
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # Control+C is for the test's process, which then ends this one
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the test's process is to hear it, and then ends this one
     preparation = Preparation(wanted)
     try:
         server, place = _listening(wanted, preparation)
@@ -66,7 +65,7 @@ def _listening(wanted: WantedRobot, preparation: Preparation) -> tuple[Server, d
         place: dict[str, Any] = {"endpoint": endpoint}
         if wanted.ur:
             usual = address != "127.0.0.1"
-            ports = {} if usual else {name: _free_port(address) for name in _interfaces()}
+            ports = {} if usual else {name: _free_port(address) for name in UrPorts.__struct_fields__}
             options |= {"ur": True, "ur_address": address, "ur_ports": ports}
         config = from_mapping(options, "robot")
         try:
@@ -87,12 +86,6 @@ def _own_address() -> str:
     if sys.platform != "linux":  # elsewhere only 127.0.0.1 is there
         return "127.0.0.1"
     return f"127.{1 + secrets.randbelow(254)}.{secrets.randbelow(256)}.{1 + secrets.randbelow(254)}"
-
-
-def _interfaces() -> tuple[str, ...]:
-    from tvist_server.ur_ports import UrPorts
-
-    return UrPorts.__struct_fields__
 
 
 def _free_port(address: str) -> int:

@@ -26,7 +26,7 @@ class Row:
         self.time = state.timestamp
         """Simulation time [s]."""
         self.moving = state.runtime_state != RuntimeState.STOPPED
-        """Whether the shaped reference moves."""
+        """True while the shaped reference moves."""
         self.q = array("d", state.actual_q)
         """Measured joint angles [rad]."""
         self.qd = array("d", state.actual_qd)

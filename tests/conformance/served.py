@@ -65,7 +65,7 @@ class Served:
         self._reader.start()
 
     def needs_the_machine(self, options):
-        """Whether time passes by itself in this process."""
+        """True if time passes by itself in this process."""
         return "lockstep" not in options
 
     def wait_until_ready(self):

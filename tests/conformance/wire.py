@@ -1,12 +1,11 @@
 """A client of the wire alone, as somebody would write it who has read only INTERFACE: eclipse-zenoh and msgpack."""
 
-import json
 import math
 import threading
 from contextlib import contextmanager
 
 import msgpack
-import zenoh
+from tests.conformance.session import plain_session
 from zenoh.handlers import Callback
 
 PATIENCE = 100.0
@@ -31,19 +30,11 @@ class Wire:
     """A Zenoh session with one robot. Keeps every message of the topics it listens to."""
 
     def __init__(self, endpoint, robot="ur5e", settings=()):
-        config = zenoh.Config()
-        for path, value in {
-            "mode": "client",
-            "connect/endpoints": [endpoint],
-            "scouting/multicast/enabled": False,
-            **dict(settings),
-        }.items():
-            config.insert_json5(path, json.dumps(value))
         self.robot = robot
         self.received = {}
         self._news = threading.Condition()
         self._declared = []
-        self.session = zenoh.open(config)
+        self.session = plain_session(endpoint, settings)
 
     def __enter__(self):
         return self

@@ -1,5 +1,6 @@
 """The distributions: what is in each, and that one command installs it where nothing else is."""
 
+import functools
 import os
 import re
 import shutil
@@ -54,15 +55,21 @@ def wheels(tmp_path_factory):
 @pytest.fixture
 def fresh(tmp_path, wheels):
     """Install what a line names into an environment of its own, for a Python of this machine; its python."""
+    return functools.partial(install, tmp_path, wheels)
 
-    def install(what, version=None):
-        base = sys.executable if version is None else f"python{version}"
-        run(base, "-m", "venv", tmp_path / "venv")
-        python = tmp_path / "venv" / "bin" / "python"
-        run(python, "-m", "pip", "install", "--quiet", "--find-links", wheels, what)
-        return python
 
-    return install
+@pytest.fixture(scope="module")
+def client(tmp_path_factory, wheels):
+    """The python of an environment with `tvist`, without extras."""
+    return install(tmp_path_factory.mktemp("client"), wheels, "tvist")
+
+
+def install(folder, wheels, what, version=None):
+    base = sys.executable if version is None else f"python{version}"
+    run(base, "-m", "venv", folder / "venv")
+    python = folder / "venv" / "bin" / "python"
+    run(python, "-m", "pip", "install", "--quiet", "--find-links", wheels, what)
+    return python
 
 
 def imports(python, name):
@@ -117,10 +124,9 @@ class TestFresh:
         assert not imports(python, "zenoh")
         assert imports(python, "numpy") == (name == "tvist-shaping")
 
-    def test_the_client_is_light_and_moves_a_robot(self, fresh):
-        python = fresh("tvist")
-        assert not imports(python, "numpy")
-        site = Path(run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))").strip())
+    def test_the_client_is_light_and_moves_a_robot(self, client):
+        assert not imports(client, "numpy")
+        site = Path(run(client, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))").strip())
         tools = {"pip", "setuptools", "pkg_resources", "_distutils_hack"}
         files = [path for path in site.rglob("*") if path.is_file()]
         ours = [path for path in files if path.relative_to(site).parts[0].split("-")[0] not in tools]
@@ -128,13 +134,13 @@ class TestFresh:
         readme = (ROOT / "clients" / "README.md").read_text(encoding="utf-8")
         blocking = next(text for kind, text in FENCE.findall(readme) if "tvist_client.blocking" in text)
         with Served("--clock", "lockstep") as served:
-            assert "ok" in run(python, "-m", "tvist_client", "check", served.endpoint)
+            assert "ok" in run(client, "-m", "tvist_client", "check", served.endpoint)
             program = blocking.replace("tcp/127.0.0.1:7447", served.endpoint)
-            assert re.fullmatch(r"\d+ \d+\n", run(python, "-c", program))
+            assert re.fullmatch(r"\d+ \d+\n", run(client, "-c", program))
 
-    def test_the_program_says_what_to_install(self, fresh):
+    def test_the_program_says_what_to_install(self, client):
         ended = subprocess.run(
-            [fresh("tvist").parent / "tvist", "serve"], capture_output=True, text=True, check=False
+            [client.parent / "tvist", "serve"], capture_output=True, text=True, check=False
         )
         assert ended.returncode == 1
         assert ended.stderr.count("\n") == 1

@@ -1,21 +1,13 @@
 """A process with one liveliness token that does nothing; with a rate, it also puts 4 kB as often as that a second."""
 
-import json
 import sys
 import time
 
-import zenoh
+from tests.conformance.session import plain_session
 
 
 def main(endpoint, key, rate):
-    config = zenoh.Config()
-    for path, value in {
-        "mode": "client",
-        "connect/endpoints": [endpoint],
-        "scouting/multicast/enabled": False,
-    }.items():
-        config.insert_json5(path, json.dumps(value))
-    session = zenoh.open(config)
+    session = plain_session(endpoint)
     token = session.liveliness().declare_token(f"{key}/alive")
     sys.stdout.write("under way\n")
     sys.stdout.flush()

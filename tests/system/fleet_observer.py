@@ -13,6 +13,7 @@ from collections import defaultdict
 
 import msgpack
 import zenoh
+from tests.conformance.session import plain_session
 from zenoh.handlers import Callback
 
 _lock = threading.Lock()
@@ -39,14 +40,7 @@ def on_event(sample):
 
 
 def main(endpoint, seconds):
-    config = zenoh.Config()
-    for path, value in {
-        "mode": "client",
-        "connect/endpoints": [endpoint],
-        "scouting/multicast/enabled": False,
-    }.items():
-        config.insert_json5(path, json.dumps(value))
-    session = zenoh.open(config)
+    session = plain_session(endpoint)
     declared = [
         session.liveliness().declare_subscriber("**/alive", Callback(on_token, indirect=False), history=True),
         session.declare_subscriber("**/tvist/*/state", Callback(on_state, indirect=False)),

@@ -26,7 +26,7 @@ pytestmark = [pytest.mark.nightly, pytest.mark.realtime]
 
 ENDPOINT = f"tcp/{WATCHERS}:7447"
 SLOW, FAST = 20, 3
-HERE = Path(__file__).parent
+ROOT = Path(__file__).parents[2]
 RUN_S = 240
 QUIET_S = 8.0
 """Time in which gaps between states are measured [s]."""
@@ -42,8 +42,8 @@ class Observer:
         self.lines = []
         self._news = threading.Condition()
         self.process = subprocess.Popen(
-            [*around, sys.executable, str(HERE / "fleet_observer.py"), ENDPOINT, str(RUN_S)],
-            stdout=subprocess.PIPE, text=True,
+            [*around, sys.executable, "-m", "tests.system.fleet_observer", ENDPOINT, str(RUN_S)],
+            stdout=subprocess.PIPE, text=True, cwd=ROOT,
         )  # fmt: skip
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -114,8 +114,9 @@ def fleet():
 
     def bare(around, key, rate=0):
         process = subprocess.Popen(
-            [*around, sys.executable, str(HERE / "bare_token.py"), ENDPOINT, key, str(rate)],
+            [*around, sys.executable, "-m", "tests.system.bare_token", ENDPOINT, key, str(rate)],
             stdout=subprocess.PIPE,
+            cwd=ROOT,
         )
         started.append(process)
         assert process.stdout.readline() == b"under way\n"
@@ -175,20 +176,19 @@ def test_robots_of_a_fleet_are_found_lost_and_back_like_bare_tokens(fleet, measu
     robots_s = observer.last("dying/tvist", SLOW // 2, there=False, since=before) - before
     measured("killed: seconds until noticed, robots and bare token", (robots_s, bare_s))
 
+    def signalled(number, *, there):
+        """How long after a signal to a robot's process and a bare token's both were noticed [s]."""
+        before = time.monotonic()
+        for process in (tokens[1], freezing.process):
+            os.kill(process.pid, number)
+        bare_s = observer.last("bare/freezing", 1, there=there, since=before) - before
+        return observer.last("freezing/tvist", SLOW // 2, there=there, since=before) - before, bare_s
+
     # Frozen, both at once: each is noticed after the lease that it announced.
-    before = time.monotonic()
-    for process in (tokens[1], freezing.process):
-        os.kill(process.pid, signal.SIGSTOP)
-    bare_s = observer.last("bare/freezing", 1, there=False, since=before) - before
-    robots_s = observer.last("freezing/tvist", SLOW // 2, there=False, since=before) - before
+    robots_s, bare_s = signalled(signal.SIGSTOP, there=False)
     measured("frozen: seconds until noticed, robots and bare token", (robots_s, bare_s))
     assert robots_s < TWICE * bare_s
-    before = time.monotonic()
-    for process in (tokens[1], freezing.process):
-        os.kill(process.pid, signal.SIGCONT)
-    bare_s = observer.last("bare/freezing", 1, there=True, since=before) - before
-    robots_s = observer.last("freezing/tvist", SLOW // 2, there=True, since=before) - before
-    measured("thawed: seconds until back, robots and bare token", (robots_s, bare_s))
+    measured("thawed: seconds until back, robots and bare token", signalled(signal.SIGCONT, there=True))
 
     # The router dies while a robot moves, and another one takes its place.
     before = time.monotonic()

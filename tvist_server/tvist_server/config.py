@@ -204,7 +204,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
     @property
     def place(self) -> str:
-        """Where clients reach the robots, for people."""
+        """The place at which clients reach the robots, in words."""
         places = [f"on {', '.join(self.endpoints)}"] if self.endpoints else []
         places += [f"through the router at {', '.join(self.connect)}"] if self.connect else []
         return " and ".join(places) + (f" in namespace {self.namespace}" if self.namespace else "")

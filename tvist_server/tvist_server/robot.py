@@ -127,9 +127,8 @@ class ServedRobot:
     def repeat(self) -> None:
         """Publish the state again for new clients, unless time has passed; in the controller's thread."""
         state = self.controller.latest
-        if (
-            state.tick == self._looked_at
-        ):  # otherwise new clients have had newer ones, and others take it for a tick
+        # A robot that is stepped publishes newer ones by itself, and to its clients an old one would look like a tick.
+        if state.tick == self._looked_at:
             self._publisher.repeat(state, self.controller.io())
         self._looked_at = state.tick
 

@@ -1,4 +1,4 @@
-"""Where files go that nobody asked for."""
+"""The folder for files that nobody asked for."""
 
 import tempfile
 from pathlib import Path

@@ -1,5 +1,6 @@
 """`tvist robots`: the arms that there are, what is known of them, and how well their vibration is suppressed."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -71,7 +72,7 @@ def _measured(
 ) -> list[dict[str, Any]]:
     """Measure an arm as its file describes it, and stiffer and softer; empty if it has too few joints for auto."""
     from tvist_controller.calibrations import load
-    from tvist_lab.arms.measure import ALONE, as_json, measure
+    from tvist_lab.arms.measure import ALONE, measure
     from tvist_lab.identification.identify import IdentificationError
 
     if description.joints < ALONE:
@@ -92,7 +93,7 @@ def _measured(
                     progress=lambda n: bar(n, None),
                 )
             )
-    return [as_json(one) for one in found]
+    return [asdict(one) for one in found]
 
 
 def _print(listed: list[dict[str, Any]], *, in_full: bool) -> None:

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,8 +10,9 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from tvist_cli.failure import Failure, interrupted, told
+from tvist_cli.failure import Failure
 from tvist_cli.output import out, print_json
+from tvist_cli.watching import watch_for
 
 if TYPE_CHECKING:
     from tvist_client.robot import Robot
@@ -71,14 +71,7 @@ def watch(
                         print_json(state)
                     await asyncio.sleep(0.1)
 
-    began = time.monotonic()
-    with told(), contextlib.suppress(TimeoutError):
-        try:
-            asyncio.run(asyncio.wait_for(run(), seconds))
-        except KeyboardInterrupt:
-            raise interrupted(
-                f"watched for {time.monotonic() - began:.1f} s; the robot keeps running"
-            ) from None
+    watch_for(seconds, run(), "the robot keeps running")
 
 
 def _places(where: tuple[str, ...], default: str) -> tuple[str | None, str]:

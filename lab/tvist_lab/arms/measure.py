@@ -3,11 +3,9 @@
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from msgspec.structs import replace
 
 from tvist_controller.api import Setup, body, modal_estimator, paper_payload
 from tvist_lab.evaluation.conditions import AS_KNOWN, torque_share
@@ -142,8 +140,7 @@ def sag_error(arm: RobotDescription, seed: int) -> float:
     Returns:
         Largest difference, relative to the largest twist in its pose [%]; 0 if gravity loads no joint.
     """
-    still_arm = replace(arm.clean(), sensors=replace(arm.sensors, accelerometer_noise=0.0))
-    plant, rigid = FlexibleArm(still_arm, arm.payload), rigid_model(arm, arm.payload)
+    plant, rigid = FlexibleArm(arm.clean(), arm.payload), rigid_model(arm, arm.payload)
     data, stiffness = rigid.createData(), np.array(arm.drives.gear_stiffness)
     zero, worst = np.zeros(arm.joints), 0.0
     for q in free_configurations(arm, (paper_payload(arm),), PLACES, ModalPlan(seed=seed)):
@@ -158,8 +155,3 @@ def sag_error(arm: RobotDescription, seed: int) -> float:
 
 TWIST = 1e-7
 """Twist below which gravity loads no gear [rad]."""
-
-
-def as_json(measured: Measured) -> dict[str, Any]:
-    """Return a measurement as `tvist robots --measure --json` gives it."""
-    return {key: getattr(measured, key) for key in Measured.__dataclass_fields__}

@@ -1,7 +1,8 @@
 """The arms and how well their vibration is suppressed, as a page of the documentation."""
 
-from collections.abc import Sequence
 from typing import Any
+
+from tvist_lab.markdown_table import markdown_table
 
 
 def robots_page(listed: list[dict[str, Any]], command: str) -> str:
@@ -35,7 +36,7 @@ The springs and drives of the UR5e were fitted to measured modes. Nobody has mea
 
 def _arms(listed: list[dict[str, Any]]) -> str:
     head = ("name", "model", "joints", "length m", "payload kg", "largest torques N m", "calibrations")
-    return _table(
+    return markdown_table(
         head,
         [
             (
@@ -52,11 +53,6 @@ def _arms(listed: list[dict[str, Any]]) -> str:
     )
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [f"| {' | '.join(row)} |" for row in rows]
-    return "\n".join([f"| {' | '.join(head)} |", "|" + "---|" * len(head), *lines])
-
-
 def _origins(listed: list[dict[str, Any]]) -> str:
     rows = [
         (f"`{one['name']}`", f"`{key}`", kind, source)
@@ -64,7 +60,7 @@ def _origins(listed: list[dict[str, Any]]) -> str:
         for kind, keys in one["origins"].items()
         for key, source in keys.items()
     ]
-    return "## Where the numbers come from\n\n" + _table(("arm", "table or key", "", "source"), rows)
+    return "## Where the numbers come from\n\n" + markdown_table(("arm", "table or key", "", "source"), rows)
 
 
 MEASURED = """## Vibration with the shaper `auto`
@@ -108,7 +104,7 @@ def _measurements(listed: list[dict[str, Any]]) -> str:
         "arm", "springs", "calibration", "f_d off by %", "moves", "too weak", "less % median", "p5", "delay ms",
         "sag off by %",
     )  # fmt: skip
-    return MEASURED.format(table=_table(head, rows))
+    return MEASURED.format(table=markdown_table(head, rows))
 
 
 def _said(value: float | None) -> str:

@@ -1,9 +1,9 @@
 """The page about the bound."""
 
-from collections.abc import Sequence
 from typing import Any
 
 from tvist_lab.bound.report import SUMMARY, TERMS, move_columns, move_rows, summary_rows
+from tvist_lab.markdown_table import markdown_table
 
 PAGE = """# How far from what is possible
 
@@ -53,18 +53,13 @@ def page(result: dict[str, Any]) -> str:
     tables = "\n\n".join(
         (
             f"## {len(result['moves'])} moves",
-            _table(SUMMARY, summary_rows(result)),
+            markdown_table(SUMMARY, summary_rows(result)),
             RANGE.format(**least),
             "\n".join(f"- **{term}**: {words}" for term, words in TERMS.items()),
             "## Each move",
-            _table(move_columns(result), move_rows(result)),
+            markdown_table(move_columns(result), move_rows(result)),
         )
     )
     return PAGE.format(
         command=result["command"], calibration=result["calibration"], plant=result["plant"], tables=tables
     )
-
-
-def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [columns, ["---"] * len(columns), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -8,6 +8,7 @@ import numpy as np
 from tvist_lab.evaluation.evaluate import WORTH, interval
 from tvist_lab.evaluation.path_shaping import JOINTS, WAYS
 from tvist_lab.evaluation.paths import Followed, JudgedPath
+from tvist_lab.markdown_table import markdown_table
 
 COLUMNS = (
     "shaper", "shaped", "less %", "p5", "min", "delay ms", "in motion", "off mm", "max", "turned mrad", "q̇ max",
@@ -144,7 +145,7 @@ def page(result: dict[str, Any]) -> str:
     low, high = result["payload_kg"]
     terms = "\n".join(f"- *{word}*: {meaning}." for word, meaning in TERMS.items())
     tables = "\n\n".join(
-        f"**{title_of(kind, group)}**\n\n{_table(COLUMNS, rows(group))}"
+        f"**{title_of(kind, group)}**\n\n{markdown_table(COLUMNS, rows(group), left=2)}"
         for kind, group in result["summary"].items()
         if kind != "all"
     )
@@ -186,11 +187,6 @@ def circle_in_words(circle: dict[str, Any]) -> str:
         f"circle itself would lose {circle['predicted_mm']:.2f} mm of its radius. Along the path it is left by "
         f"{1e6 * largest['along']:.0f} nm."
     )
-
-
-def _table(columns: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
-    rule = " | ".join(["---", "---", *["---:"] * (len(columns) - 2)])
-    return "\n".join(f"| {line} |" for line in (" | ".join(columns), rule, *map(" | ".join, lines)))
 
 
 def _said(value: float | None, digits: int) -> str:

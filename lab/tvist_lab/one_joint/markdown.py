@@ -1,9 +1,8 @@
 """The lesson as a page of the documentation."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
+from tvist_lab.markdown_table import markdown_table
 from tvist_lab.one_joint.lesson import ANGLES, MASSES, TURNS, WAYS, Lesson
 
 HEAD = """\
@@ -94,12 +93,12 @@ def page(lesson: Lesson, command: str) -> str:
     )
     return head + TABLES.format(
         mass=lesson.description.payload.mass,
-        modes=_table(MODES, modes(lesson)),
+        modes=markdown_table(MODES, modes(lesson)),
         turns=len(TURNS),
         first=np.degrees(TURNS[0]),
         last=np.degrees(TURNS[-1]),
-        left=_table(("", *_angles(lesson)), left(lesson)),
-        delays=_table(("", *_angles(lesson)), delays(lesson)),
+        left=markdown_table(("", *_angles(lesson)), left(lesson)),
+        delays=markdown_table(("", *_angles(lesson)), delays(lesson)),
     )
 
 
@@ -143,8 +142,3 @@ def delays(lesson: Lesson) -> list[tuple[str, ...]]:
 
 def _angles(lesson: Lesson) -> list[str]:
     return [f"ends at q = {np.degrees(result.mode.elbow):.0f}°" for result in lesson.poses.values()]
-
-
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

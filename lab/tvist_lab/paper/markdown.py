@@ -1,8 +1,8 @@
 """The experiment as a page of the documentation."""
 
-from collections.abc import Sequence
 from typing import Any
 
+from tvist_lab.markdown_table import markdown_table
 from tvist_lab.paper.origins import MEANINGS, origins
 from tvist_lab.paper.published import published
 
@@ -55,7 +55,7 @@ def page(result: dict[str, Any], command: str) -> str:
         ),
         "## Origin of each figure",
         *(f"- **{word}**: {meaning}" for word, meaning in MEANINGS.items()),
-        _table(("figure", "paper", "here", "origin", "remark"), origins(result)),
+        markdown_table(("figure", "paper", "here", "origin", "remark"), origins(result)),
     ]
     return "\n\n".join(parts).replace("\n\n- **", "\n- **") + "\n"
 
@@ -75,7 +75,7 @@ def _table_2(table: dict[str, Any]) -> str:
                 for key in ("stabilisation", "cycle", "overshoot", "residual_vibration")
             )
             rows.append((motion, f"impact, {who}", "", *percents))
-    return _table(("motion", "", *(name for name, _ in COLUMNS.values())), rows)
+    return markdown_table(("motion", "", *(name for name, _ in COLUMNS.values())), rows)
 
 
 def _methods(result: dict[str, Any], rows: dict[str, dict[str, float | None]]) -> str:
@@ -87,13 +87,8 @@ def _methods(result: dict[str, Any], rows: dict[str, dict[str, float | None]]) -
         label = "waiting, unshaped" if name == "unshaped" else result["methods"][name]
         values = (_form(row[key], form) for key, (_, form) in METHOD_COLUMNS.items())
         lines.append((f"**{label}**" if row["still_after_ms"] == first else label, *values))
-    return _table(("method", *(name for name, _ in METHOD_COLUMNS.values())), lines)
+    return markdown_table(("method", *(name for name, _ in METHOD_COLUMNS.values())), lines)
 
 
 def _form(value: float | None, form: str) -> str:
     return "–" if value is None else form.format(value)
-
-
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from tvist_lab.markdown_table import markdown_table
 from tvist_lab.tracking.study import UNSHAPED, Tracked, speed_at
 from tvist_lab.tracking.ways import APPROACH, CONSTANT, DISTANCE, RAMP, WayName
 
@@ -129,8 +130,4 @@ speeds as well. A simulator without dynamics, such as UR's, has no such error.
 
 
 def _table(result: dict[str, Any], way: WayName) -> str:
-    titles = columns(result, way)
-    rule = " | ".join(["---", *["---:"] * (len(titles) - 1)])
-    return "\n".join(
-        f"| {line} |" for line in (" | ".join(titles), rule, *map(" | ".join, rows(result, way)))
-    )
+    return markdown_table(columns(result, way), rows(result, way), left=1)

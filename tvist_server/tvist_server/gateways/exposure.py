@@ -66,10 +66,9 @@ def guarded(
     Raises:
         ExposureError: An endpoint is none, other machines could reach an unprotected one, or the folder is incomplete.
     """
-    secured, tls = _protected(listen, security, insecure=insecure)
-    if security is not None:
-        return secured, {**tls, "access_control": access_control(robots, _roles(security), namespace)}
-    return secured, {**tls, "access_control": open_access(robots, namespace)}
+    secured, settings, roles = _protected(listen, security, insecure=insecure)
+    access = open_access(robots, namespace) if roles is None else access_control(robots, roles, namespace)
+    return secured, {**settings, "access_control": access}
 
 
 def guarded_router(
@@ -85,8 +84,8 @@ def guarded_router(
     Raises:
         ExposureError: See `guarded`.
     """
-    secured, tls = _protected(listen, security, insecure=insecure)
-    return secured, tls if security is None else {**tls, "access_control": router_access(_roles(security))}
+    secured, settings, roles = _protected(listen, security, insecure=insecure)
+    return secured, settings if roles is None else {**settings, "access_control": router_access(roles)}
 
 
 def check_endpoints(what: str, endpoints: Sequence[str]) -> None:
@@ -108,13 +107,14 @@ def check_endpoints(what: str, endpoints: Sequence[str]) -> None:
 
 def _protected(
     listen: Sequence[str], security: str | None, *, insecure: bool
-) -> tuple[list[str], dict[str, Any]]:
-    """Return endpoints and the settings of their transport."""
+) -> tuple[list[str], dict[str, Any], dict[str, Role] | None]:
+    """Return endpoints, the settings of their transport, and the roles by name if there are certificates."""
     check_endpoints("listen", listen)
     if security is not None:
         if insecure:
             raise ExposureError("security and insecure exclude each other: leave one out")
-        return [_secured(endpoint) for endpoint in listen], {**LIMITS, **_settings(security)}
+        secured, roles = [_secured(endpoint) for endpoint in listen], _roles(security)
+        return secured, {**LIMITS, **_settings(security)}, roles
     for endpoint in listen:
         if protocol(endpoint) in {"tls", "quic"} and not options(endpoint):
             raise ExposureError(
@@ -126,7 +126,7 @@ def _protected(
             f"listen is {exposed[0]}, which other machines can reach: add --security DIR (made by `tvist keys`) and "
             "listen on tls/…, or add --insecure to let anyone move the robot"
         )
-    return list(listen), dict(LIMITS) if exposed else {}
+    return list(listen), dict(LIMITS) if exposed else {}, None
 
 
 def guarded_interfaces(address: str, *, insecure: bool) -> None:
@@ -194,7 +194,6 @@ def _roles(security: str) -> dict[str, Role]:
 
 def _settings(security: str) -> dict[str, Any]:
     folder = Path(security).absolute()
-    _roles(security)
     _check_pair(folder)
     return {
         "transport/link/tls/enable_mtls": True,

@@ -3,7 +3,6 @@
 It acts as a router to which clients connect, or connects to a router of a fleet as a client, or both.
 """
 
-import contextlib
 import json
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -146,15 +145,9 @@ def _connected(
 
     It is no router, since each router keeps a map of all others, and a fleet has many robots.
     """
-    here = {"mode": "peer", "listen/endpoints": list(listen)} if listen else {"mode": "client"}
-    where, mode = ", ".join(connect), here
-    shown = {**CONNECT, "connect/endpoints": list(connect)}
+    mode = {"mode": "peer", "listen/endpoints": list(listen)} if listen else {"mode": "client"}
     try:
-        for endpoint in connect:
-            shown |= certificate_for(endpoint, security)
-        return _session({**settings, **mode, **shown})
-    except NotConnectedError as error:
-        raise GatewayError(str(error)) from error
+        return _session({**settings, **mode, **CONNECT, **_towards(connect, security)})
     except zenoh.ZError as error:
         if "listen" in str(error):
             raise GatewayError(_explain(error, ", ".join(listen))) from error
@@ -162,7 +155,7 @@ def _connected(
             (why for endpoint in connect if security and (why := why_refused(endpoint, security, "router"))),
             f"no router answers within {CONNECT_S} s: check that it is running and listens there (`tvist router`)",
         )
-        raise GatewayError(f"no connection to {where}: {refused}") from error
+        raise GatewayError(f"no connection to {', '.join(connect)}: {refused}") from error
 
 
 def open_router(
@@ -179,19 +172,19 @@ def open_router(
     Raises:
         GatewayError: The router cannot listen on an endpoint, or the certificate is missing.
     """
-    shown: dict[str, Any] = {"connect/endpoints": list(connect), "connect/retry": CONNECT["connect/retry"]}
+    retry = {"connect/retry": CONNECT["connect/retry"]}
+    return _open(listen, {**settings, **retry, **_towards(connect, security)})
+
+
+def _towards(connect: Sequence[str], security: str | None) -> dict[str, Any]:
+    """Return the settings of a session that connects to routers: their endpoints, and the certificate to show."""
+    shown: dict[str, Any] = {"connect/endpoints": list(connect)}
     try:
         for endpoint in connect:
             shown |= certificate_for(endpoint, security)
     except NotConnectedError as error:
         raise GatewayError(str(error)) from error
-    return _open(listen, {**settings, **shown})
-
-
-def close_session(session: zenoh.Session) -> None:
-    """Close a session; one that breaks meanwhile is closed, too."""
-    with contextlib.suppress(zenoh.ZError):
-        session.close()  # type: ignore[no-untyped-call]
+    return shown
 
 
 def _session(settings: Mapping[str, Any]) -> zenoh.Session:

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, Self
 
 from tvist_client.fleet import Place, place_of
+from tvist_client.transports.session import close_session
 from tvist_protocol import keys
 from tvist_server.gateways.exposure import check_endpoints, guarded_router
-from tvist_server.gateways.network import REALTIME, close_session, open_router
+from tvist_server.gateways.network import REALTIME, open_router
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 SESSIONS = 4096

@@ -1,6 +1,5 @@
 """The dashboard's commands and their answers, which clients compare word by word."""
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
@@ -9,6 +8,7 @@ from tvist_protocol.modes import RobotMode, SafetyMode
 from tvist_protocol.replies import Refused
 from tvist_server.gateways.ur import messages, power, version
 from tvist_server.gateways.ur.base import ControllerAccess
+from tvist_server.gateways.ur.model import series
 from tvist_server.gateways.ur.robot import NO_MODE, UrRobot
 
 UNNAMED: Final = "<unnamed>"
@@ -245,8 +245,7 @@ def _number() -> str:
 
 def _model(request: Request) -> None:
     model = request.robot.description.robot.model
-    plain = re.match(r"UR\d+", model, re.IGNORECASE)
-    request.answer(plain[0].upper() if plain else model)
+    request.answer(series(model) or model)
 
 
 def _support_file(request: Request) -> None:

@@ -4,7 +4,6 @@ int32 length, uint8 16, then the parts. Each part has a uint32 length (which inc
 body; all numbers are big-endian. The order and lengths of the parts are those of a controller with software 5.
 """
 
-import re
 from struct import Struct
 from typing import Final
 
@@ -12,6 +11,7 @@ from tvist_controller.instruments.snapshot import Snapshot
 from tvist_plant.description import RobotDescription
 from tvist_protocol.modes import RuntimeState, SafetyMode
 from tvist_server.gateways.ur import messages
+from tvist_server.gateways.ur.model import series
 
 ROBOT_STATE: Final = 16
 JOINTS: Final = 6
@@ -77,8 +77,7 @@ def robot_type(description: RobotDescription) -> int:
 
     Source of the numbers: `RobotType` in UR's client library, ur_client_library/ur/datatypes.h.
     """
-    model = re.match(r"UR\d+", description.robot.model, re.IGNORECASE)
-    return _TYPES.get(model[0].upper(), 0) if model else 0
+    return _TYPES.get(series(description.robot.model) or "", 0)
 
 
 def _part(number: int, body: bytes) -> bytes:
