@@ -42,6 +42,8 @@ class LinearPart:
     """Springs and position gains, shape (N+n, N+n) [N m/rad]."""
     damping: Floats
     """Dampers, velocity gains and the slope of friction at rest, shape (N+n, N+n) [N m s/rad]."""
+    gear_damping: Floats
+    """D_g, shape (n,) [N m s/rad]."""
     rotor_inertia: Floats
     """B, shape (n,) [kg m^2]."""
     velocity_gain: Floats
@@ -74,6 +76,7 @@ class LinearPart:
         return cls(
             stiffness=stiffness,
             damping=damping,
+            gear_damping=gear_damping,
             rotor_inertia=np.array(drives.rotor_inertia),
             velocity_gain=K_d,
             position_gain=K_d * (K_p + K_i),

@@ -7,18 +7,22 @@ import numpy as np
 import pinocchio as pin
 
 from tvist_plant._compiled import is_cached
+from tvist_plant.arm_memory import ENCODER_STEP, GRAVITY, LAST, NOW, SUBSTEPS, memory_for, parts
+from tvist_plant.arm_memory import PERIOD as PERIOD_AT
+from tvist_plant.arm_tick import evaluate, move, tick
+from tvist_plant.chain import chain_of
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand, LinearPart, Nonlinear
 from tvist_plant.imperfections import GearLaw, Imperfections, on_base
-from tvist_plant.integrator import LAST, NOW, advance, balance, parts
+from tvist_plant.integrator import rows
 from tvist_plant.joint_parameters import packed
 from tvist_plant.model import FlexibleModel, Floats, flexible_model
 from tvist_plant.modes import Modes, modes
 from tvist_plant.outside import Outside
 from tvist_plant.plant import PERIOD, Measurement, PlantError, PlantTruth
-from tvist_plant.sensors import Accelerometer, Encoders, gear_phases
+from tvist_plant.sensors import Accelerometer, gear_phases
 
-SUBSTEPS = 4
+SUBSTEPS_OF_A_PERIOD = 4
 """Substeps per period. From Q1 to Q3, four agree with eight to within 0.02 m/s² of tool acceleration, two to within
 0.09; most of that is the ripple of the gears.
 """
@@ -26,7 +30,7 @@ SUBSTEPS = 4
 
 def is_compiled() -> bool:
     """Return whether the arm's equations are compiled; otherwise the first tick compiles them, for seconds."""
-    return is_cached(advance) and is_cached(balance)
+    return is_cached(tick)
 
 
 class FlexibleArm:
@@ -48,7 +52,7 @@ class FlexibleArm:
         *,
         imperfections: Imperfections | None = None,
         period: float = PERIOD,
-        substeps: int = SUBSTEPS,
+        substeps: int = SUBSTEPS_OF_A_PERIOD,
     ) -> None:
         self.description = description
         self.period = period
@@ -58,9 +62,9 @@ class FlexibleArm:
         self._nonlinear = Nonlinear.of(description.drives)
         n = description.joints
         self._phase = np.zeros(n)
+        self._width = 3 * n + 3
         self._load(payload)
         self._accelerometer = Accelerometer(description.sensors.accelerometer_noise, 0)
-        self._encoders = Encoders(description.sensors.encoder_step)
 
     @property
     def payload(self) -> Payload:
@@ -74,20 +78,20 @@ class FlexibleArm:
         self._flexible: FlexibleModel = flexible if base is None else on_base(flexible, base)
         self._outside = Outside(self._flexible)
         self._data: pin.Data = self._flexible.model.createData()
-        self._scratch: pin.Data = self._flexible.model.createData()
-        self._gravity: Floats = np.array(self._flexible.model.gravity.linear)
-        self._linear = LinearPart.of(self._flexible, self.description.drives)
+        self._linear = linear = LinearPart.of(self._flexible, self.description.drives)
         links, n = self._flexible.model.nv, self.description.joints
-        self._springs = np.array([self._linear.stiffness, self._linear.damping])
-        self._parameters = packed(self._linear, self._nonlinear, self._law, self._phase)
-        self._state = np.zeros((5, links + n))
-        y, v, self._a, self._s, self._z = parts(self._state, n)
+        self.memory = memory_for(links, n)
+        """Memory of the kernels in `arm_tick`; see `arm_memory`."""
+        self.memory[[PERIOD_AT, SUBSTEPS]] = self.period, self._substeps
+        self.memory[GRAVITY] = -self._flexible.model.gravity.linear[2]
+        self.memory[ENCODER_STEP] = self.description.sensors.encoder_step
+        arm = parts(self.memory)
+        arm.chain[:] = chain_of(self._flexible.model, self._flexible.flange)
+        arm.springs[:] = np.diag(linear.stiffness), np.diag(linear.damping)
+        arm.joints[:] = packed(self._flexible.joints, linear, self._nonlinear, self._law, self._phase)
+        y, v, _, self._s, self._z = rows(arm.state, n)
         self._q, self._qd, self._motor, self._speed = y[:links], v[:links], y[links:], v[links:]
-        self._commands = np.zeros((2, 3, n))
-        self._q_r, self._qd_r, self._torque = self._commands[NOW]
-        self._dynamics = np.zeros((2, links + 1, links))
-        self._M, self._bias = self._dynamics[NOW, :links], self._dynamics[NOW, links]
-        self._qdd, self._moment = np.zeros(links), np.zeros(n)
+        self._arm = arm
 
     def reset(self, command: DriveCommand, *, payload: Payload | None = None, seed: int = 0) -> Measurement:
         """Put the arm at rest in static equilibrium under a command, with preloaded integrators and restarted noise.
@@ -101,12 +105,16 @@ class FlexibleArm:
             self._load(payload)
         self._outside.clear()
         self._phase = gear_phases(self.description.joints, seed)
-        self._parameters = packed(self._linear, self._nonlinear, self._law, self._phase)
+        self._arm.joints[:] = packed(
+            self._flexible.joints, self._linear, self._nonlinear, self._law, self._phase
+        )
         self._accelerometer = Accelerometer(self.description.sensors.accelerometer_noise, seed)
-        self._encoders = Encoders(self.description.sensors.encoder_step)
-        self._commands[:] = command.q, command.qd, command.torque
+        self._arm.commands[:] = command.q, command.qd, command.torque
+        self._arm.readings[:], self._arm.pushed[:] = math.nan, 0.0
         self._settle(command)
-        return self._measure()
+        measured = self._evaluate()
+        self._arm.dynamics[LAST] = self._arm.dynamics[NOW]
+        return measured
 
     def _settle(self, command: DriveCommand) -> None:
         """Find static equilibrium by fixed-point iteration; gravity hardly depends on the small deflections."""
@@ -123,13 +131,11 @@ class FlexibleArm:
             q = new
             if moved < 1e-15:
                 break
-        self._state[:] = 0.0
+        self._arm.state[:] = 0.0
         self._q[:], self._motor[:] = q, command.q
         wanted = gravity[joints] - command.torque
         gain = self._linear.integral_gain
         self._s[:] = np.divide(wanted, gain, out=np.zeros_like(wanted), where=gain > 0.0)
-        self._evaluate()
-        self._dynamics[LAST] = self._dynamics[NOW]
 
     def _gear_error(self, motor: Floats) -> Floats:
         """Kinematic errors of the gears at motor angles [rad]."""
@@ -139,8 +145,7 @@ class FlexibleArm:
     def _static_deflections(self) -> tuple[Floats, Floats]:
         """Deflections of gears and of links that remain where the arm rests as it stands now [rad]."""
         joints, flexes = self._flexible.joints, self._flexible.flexes
-        # In data of its own: that of the present state still has velocities and accelerations.
-        gravity = pin.computeGeneralizedGravity(self._flexible.model, self._scratch, self._q)
+        gravity = pin.computeGeneralizedGravity(self._flexible.model, self._data, self._q)
         gears = self._gear_error(self._motor) - self._law.twist(gravity[joints])
         return gears, -gravity[flexes] / self._flexible.flex_stiffness
 
@@ -150,14 +155,15 @@ class FlexibleArm:
         Raises:
             PlantError: The state is no longer finite.
         """
-        self._q_r[:], self._qd_r[:], self._torque[:] = command.q, command.qd, command.torque
-        advance(
-            self._state, self._commands, self._dynamics,
-            self._springs, self._parameters, self._flexible.joints,
-            self.period, self._substeps,
-        )  # fmt: skip
-        self._evaluate()
-        return self._measure()
+        if self._outside.rests:
+            out = np.empty(self._width)
+            finite = tick(self.memory, command.q, command.qd, command.torque, out)
+            return self._measured(out, finite)
+        move(self.memory, command.q, command.qd, command.torque)
+        self._arm.pushed[:] = self._outside.generalized_force(self._q)
+        measured = self._evaluate()
+        self._arm.pushed[:] = 0.0
+        return measured
 
     def push(self, torque: Floats) -> None:
         """Apply external torques to the joints, until they are changed or the arm is reset.
@@ -206,52 +212,31 @@ class FlexibleArm:
         """Make the state NaN as a fault, which the next step detects."""
         self._speed[:] = math.nan
 
-    def _evaluate(self) -> None:
-        """Compute mass matrix, bias, link accelerations and motor torques at the present state."""
-        model, data = self._flexible.model, self._data
-        self._M[:] = pin.crba(model, data, self._q)
-        self._bias[:] = pin.nonLinearEffects(model, data, self._q, self._qd)
-        pushed = self._outside.generalized_force(self._q)
-        if pushed is not None:
-            self._bias -= pushed
-        balance(
-            self._state, self._commands, self._dynamics,
-            self._springs, self._parameters, self._flexible.joints,
-            self._qdd, self._moment,
-        )  # fmt: skip
-        if not math.isfinite(self._qdd.dot(self._qdd)):
+    def _evaluate(self) -> Measurement:
+        """Compute the dynamics at the present state, and measure."""
+        out = np.empty(self._width)
+        return self._measured(out, evaluate(self.memory, out))
+
+    def _measured(self, out: Floats, finite: bool) -> Measurement:
+        if not finite:
             raise PlantError("the arm's state is no longer finite")
-
-    def _measure(self) -> Measurement:
-        joints = self._flexible.joints
-        self._specific_force = self._feel()
+        n = self.description.joints
+        self._specific_force = out[3 * n :]
         return Measurement(
-            q=self._encoders.read(self._q[joints]),
-            qd=self._qd[joints],
-            moment=self._moment.copy(),
-            accelerometer=self._accelerometer.read(self._specific_force),
+            out[:n], out[n : 2 * n], out[2 * n : 3 * n], self._accelerometer.read(self._specific_force)
         )
-
-    def _feel(self) -> Floats:
-        """Return the specific force in the flange frame, shape (3,) [m/s^2]."""
-        model, data, flange = self._flexible.model, self._data, self._flexible.flange
-        pin.forwardKinematics(model, data, self._q, self._qd, self._qdd)
-        placement = pin.updateFramePlacement(model, data, flange)
-        acceleration = pin.getFrameClassicalAcceleration(model, data, flange, pin.LOCAL).linear
-        return np.asarray(acceleration - self._gravity.dot(placement.rotation))
 
     def truth(self) -> PlantTruth:
         """Return what a real robot cannot measure, at the present state."""
-        placement = self._data.oMf[self._flexible.flange]
-        joints = self._flexible.joints
+        joints, flange = self._flexible.joints, self._arm.bodies[-1]
         static_gears, static_links = self._static_deflections()
         return PlantTruth(
             motor_q=self._motor.copy(),
             motor_qd=self._speed.copy(),
             gear_deflection=self._q[joints] - self._motor,
             link_deflection=self._q[self._flexible.flexes],
-            flange_position=placement.translation.copy(),
-            flange_rotation=placement.rotation.copy(),
+            flange_position=flange[9:12].copy(),
+            flange_rotation=flange[:9].reshape(3, 3).copy(),
             specific_force=self._specific_force,
             static_gear_deflection=static_gears,
             static_link_deflection=static_links,

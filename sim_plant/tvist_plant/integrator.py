@@ -9,51 +9,55 @@ of
 is used for all substeps of the period (h one substep, M_b = diag(M(q), B), G_i the integral gains). Each substep
 solves for the mean acceleration, and moves y by the mean velocity. The method is of second order, and stable for the
 fast poles of light lumps between stiff springs (about -5e4 1/s), for which explicit methods need steps below 0.04 ms.
+
+Each motor is coupled to the link of its joint only, so S has an arrow's form: the motors are eliminated first, and only
+the matrix of the links is factorised,
+
+    S_ll - Σ_j c_j² / S_mm,j at the joint's link,    c_j = -(h/2 D_g + h²/4 K_g).
 """
 
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from tvist_plant._compiled import compiled
+from tvist_plant.arm_memory import LAST, NOW, PERIOD, SUBSTEPS, ArmMemory
 from tvist_plant.joint_parameters import JointParameters, of_joint
-from tvist_plant.model import Floats, Integers
-
-LAST, NOW = 0, 1
-"""Indices of the commands and dynamics of the last and the current tick."""
+from tvist_plant.model import Floats
 
 
 @compiled
 def cholesky(S: Floats) -> None:
-    """Replace the lower triangle of a positive definite matrix by its Cholesky factor; the rest is not changed."""
+    """Replace the lower triangle of a positive definite matrix by its Cholesky factor with inverse diagonal.
+
+    The rest is not changed.
+    """
     for j in range(S.shape[0]):
         pivot = S[j, j]
         for k in range(j):
             pivot -= S[j, k] * S[j, k]
-        pivot = np.sqrt(pivot)
+        pivot = 1.0 / math.sqrt(pivot)
         S[j, j] = pivot
         for i in range(j + 1, S.shape[0]):
             value = S[i, j]
             for k in range(j):
                 value -= S[i, k] * S[j, k]
-            S[i, j] = value / pivot
+            S[i, j] = value * pivot
 
 
 @compiled
 def solve(L: Floats, x: Floats) -> None:
-    """Replace x by (L Lᵀ)⁻¹ x."""
+    """Replace x, or the first part of a longer one, by (L Lᵀ)⁻¹ x, with L as `cholesky` returns it."""
     n = L.shape[0]
     for i in range(n):
         value = x[i]
         for k in range(i):
             value -= L[i, k] * x[k]
-        x[i] = value / L[i, i]
+        x[i] = value * L[i, i]
     for i in range(n - 1, -1, -1):
-        value = x[i]
-        for k in range(i + 1, n):
-            value -= L[k, i] * x[k]
-        x[i] = value / L[i, i]
+        value = x[i] * L[i, i]
+        x[i] = value
+        for k in range(i):
+            x[k] -= L[i, k] * value
 
 
 class ArmState(NamedTuple):
@@ -72,7 +76,7 @@ class ArmState(NamedTuple):
 
 
 @compiled
-def parts(state: Floats, n: int) -> ArmState:
+def rows(state: Floats, n: int) -> ArmState:
     """Return the rows of a state, shape (5, N+n), by name, as views."""
     return ArmState(state[0], state[1], state[2], state[3, :n], state[4, :n])
 
@@ -118,73 +122,71 @@ def dragged(joint: JointParameters, z: float, twist: float) -> float:
 
 
 @compiled
-def factor(S: Floats, dynamics: Floats, springs: Floats, parameters: Floats, h: float) -> None:
-    """Compute in S the Cholesky factor for all substeps of a period, of h [s] each."""
-    stiffness, damping = springs[0], springs[1]
-    size, n, links = S.shape[0], parameters.shape[1], dynamics.shape[2]
-    M, last_M = dynamics[NOW], dynamics[LAST]
-    for i in range(size):
-        for j in range(i + 1):
-            S[i, j] = 0.5 * h * damping[i, j] + 0.25 * h * h * stiffness[i, j]
+def coupling(joint: JointParameters, h: float) -> float:
+    """Entry c_j of S between a motor and the link of its joint."""
+    return float(-0.5 * h * joint.gear_damping - 0.25 * h * h * joint.gear_stiffness)
+
+
+@compiled
+def of_motor(joint: JointParameters, springs: Floats, m: int, h: float) -> float:
+    """Entry of S on the diagonal at a motor, with index m."""
+    implicit = 0.5 * h * springs[1, m] + 0.25 * h * h * springs[0, m]
+    return float(joint.rotor_inertia + implicit + 0.125 * h * h * h * joint.integral_gain)
+
+
+@compiled
+def factorise(arm: ArmMemory, h: float) -> None:
+    """Compute the Cholesky factor for all substeps of a period, of h [s] each."""
+    S, springs, n, links = arm.factor, arm.springs, arm.joints.shape[1], arm.qdd.shape[0]
+    M, last_M = arm.dynamics[NOW], arm.dynamics[LAST]
     for i in range(links):
         for j in range(i + 1):
-            S[i, j] += 1.5 * M[j, i] - 0.5 * last_M[j, i]
+            S[i, j] = 1.5 * M[j, i] - 0.5 * last_M[j, i]
+        S[i, i] += 0.5 * h * springs[1, i] + 0.25 * h * h * springs[0, i]
     for j in range(n):
-        joint = of_joint(parameters, j)
-        S[links + j, links + j] += joint.rotor_inertia + 0.125 * h * h * h * joint.integral_gain
+        joint = of_joint(arm.joints, j)
+        l, c = int(joint.link), coupling(joint, h)
+        S[l, l] -= c * c / of_motor(joint, springs, links + j, h)
     cholesky(S)
 
 
 @compiled
-def advance(  # noqa: C901 - one kernel: its branches are the loops over rows and joints
-    state: Floats,
-    commands: Floats,
-    dynamics: Floats,
-    springs: Floats,
-    parameters: Floats,
-    joints: Integers,
-    period: float,
-    substeps: int,
-) -> None:
+def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901 - one kernel: its branches are the loops over rows and joints
     """Advance the state in place by one period; afterwards the LAST entries contain those of the present tick.
 
     Args:
-        state: Rows of `ArmState`, shape (5, N+n).
-        commands: Rows q_r, q̇_r, τ_ff of the last command and of this one, shape (2, 3, n); LAST becomes this one.
-        dynamics: Mass matrix, upper triangle [kg m^2], and below it a row with the bias [N m]: Coriolis, centrifugal
-            and gravity torques minus external ones; one period earlier and at the start, shape (2, N+1, N); LAST
-            becomes that of the start.
-        springs: Stiffness and damping of `LinearPart`, shape (2, N+n, N+n).
-        parameters: Rows of `JointParameters`, shape (16, n).
-        joints: Indices of the n joints among the N link angles.
-        period: Control period [s].
-        substeps: Number of substeps.
+        arm: The arm; its state, and the LAST entries of commands and dynamics are changed.
+        head: Single numbers at the front of its memory.
     """
-    n, size, links = parameters.shape[1], state.shape[1], dynamics.shape[2]
-    y, v, a, s, z = parts(state, n)
-    bias, last_bias = dynamics[NOW, links], dynamics[LAST, links]
-    stiffness, damping = springs[0], springs[1]
+    n, links = arm.joints.shape[1], arm.qdd.shape[0]
+    size, period, substeps = links + n, head[PERIOD], int(head[SUBSTEPS])
+    y, v, a, s, z = rows(arm.state, n)
+    bias, last_bias = arm.dynamics[NOW, links], arm.dynamics[LAST, links]
+    springs, f = arm.springs, arm.force
     h = period / substeps
-    S, f = np.empty((size, size)), np.empty(size)
-    factor(S, dynamics, springs, parameters, h)
-
+    factorise(arm, h)
     for step in range(substeps):
         middle = (step + 0.5) / substeps
         for i in range(links):
             f[i] = -bias[i] - middle * (bias[i] - last_bias[i])
         for j in range(n):
-            joint, m, l = of_joint(parameters, j), links + j, joints[j]
-            q_r, qd_r, torque = set_points(commands, j, middle)
+            joint, m = of_joint(arm.joints, j), links + j
+            l = int(joint.link)
+            q_r, qd_r, torque = set_points(arm.commands, j, middle)
             speed = v[m] + 0.5 * h * a[m]
             angle = y[m] + 0.5 * h * speed
             rise = 1.0
             if joint.breakaway != 1.0:
-                fall = np.exp(-((speed / joint.stribeck_speed) ** 2))
+                fall = math.exp(-((speed / joint.stribeck_speed) ** 2))
                 rise = 1.0 + (joint.breakaway - 1.0) * fall
-            # Friction's slope at rest is implicit in `damping`; the part that saturates is corrected here.
-            steep = speed / joint.friction_width
-            slack = joint.friction * (steep - rise * np.tanh(steep))
-            swing = np.sin(joint.gear_waves * angle + joint.gear_phase)
+            # Friction's slope at rest is implicit in `springs`; the part that saturates is corrected here.
+            slack = 0.0
+            if joint.friction > 0.0:
+                steep = speed / joint.friction_width
+                slack = joint.friction * (steep - rise * math.tanh(steep))
+            swing = 0.0
+            if joint.gear_error > 0.0:
+                swing = math.sin(joint.gear_waves * angle + joint.gear_phase)
             wave = joint.gear_stiffness * joint.gear_error * swing
             more = 0.0
             if joint.softness != 0.0 or joint.hysteresis > 0.0:
@@ -195,58 +197,52 @@ def advance(  # noqa: C901 - one kernel: its branches are the loops over rows an
             f[m] += joint.integral_gain * (s[j] + 0.5 * h * q_r) + more
             f[l] += wave - more
         for i in range(size):
-            value = f[i]
-            for j in range(size):
-                value -= damping[i, j] * v[j] + stiffness[i, j] * (y[j] + 0.5 * h * v[j])
-            a[i] = value
+            a[i] = f[i] - springs[1, i] * v[i] - springs[0, i] * (y[i] + 0.5 * h * v[i])
         for j in range(n):
-            joint, m = of_joint(parameters, j), links + j
-            a[m] -= 0.5 * h * joint.integral_gain * (y[m] + 0.5 * h * v[m])
-        solve(S, a)
+            joint, m = of_joint(arm.joints, j), links + j
+            l = int(joint.link)
+            middle_y, middle_l = y[m] + 0.5 * h * v[m], y[l] + 0.5 * h * v[l]
+            a[l] += joint.gear_damping * v[m] + joint.gear_stiffness * middle_y
+            a[m] += joint.gear_damping * v[l] + joint.gear_stiffness * middle_l
+            a[m] -= 0.5 * h * joint.integral_gain * middle_y
+            a[l] -= coupling(joint, h) / of_motor(joint, springs, m, h) * a[m]
+        solve(arm.factor, a)
         for j in range(n):
-            joint, m, l = of_joint(parameters, j), links + j, joints[j]
-            q_r, _, _ = set_points(commands, j, middle)
+            joint, m = of_joint(arm.joints, j), links + j
+            l = int(joint.link)
+            a[m] = (a[m] - coupling(joint, h) * a[l]) / of_motor(joint, springs, m, h)
+            q_r, _, _ = set_points(arm.commands, j, middle)
             s[j] += h * (q_r - (y[m] + 0.5 * h * (v[m] + 0.5 * h * a[m])))
-            twisted = h * (v[l] - v[m] + 0.5 * h * (a[l] - a[m]))
-            z[j] = dragged(joint, z[j], twisted)
+            if joint.hysteresis > 0.0:
+                z[j] = dragged(joint, z[j], h * (v[l] - v[m] + 0.5 * h * (a[l] - a[m])))
         for i in range(size):
             y[i] += h * (v[i] + 0.5 * h * a[i])
             v[i] += h * a[i]
-    shift(commands)
-    shift(dynamics)
+    shift(arm.commands)
+    shift(arm.dynamics)
 
 
 @compiled
-def balance(
-    state: Floats,
-    commands: Floats,
-    dynamics: Floats,
-    springs: Floats,
-    parameters: Floats,
-    joints: Integers,
-    qdd: Floats,
-    moment: Floats,
-) -> None:
-    """Link accelerations `qdd`, shape (N,) [rad/s^2], and motor torques `moment`, shape (n,) [N m], at a state.
+def balance(arm: ArmMemory, moment: Floats) -> None:
+    """Link accelerations and motor torques at a state, from the present commands and dynamics.
 
-    The other arguments are as in `advance`; only the present commands and dynamics are used.
+    Args:
+        arm: The arm; its `qdd` is changed.
+        moment: Motor torques, shape (n,) [N m].
     """
-    n, size, links = parameters.shape[1], state.shape[1], dynamics.shape[2]
-    y, v, _, s, z = parts(state, n)
-    command, M = commands[NOW], dynamics[NOW]
-    stiffness, damping = springs[0], springs[1]
-    S = np.empty((links, links))
+    n, links, qdd = arm.joints.shape[1], arm.qdd.shape[0], arm.qdd
+    y, v, _, s, z = rows(arm.state, n)
+    command, M, springs, S = arm.commands[NOW], arm.dynamics[NOW], arm.springs, arm.factor
     for i in range(links):
-        value = -M[links, i]
-        for j in range(size):
-            value -= stiffness[i, j] * y[j] + damping[i, j] * v[j]
-        qdd[i] = value
+        qdd[i] = -M[links, i] - springs[0, i] * y[i] - springs[1, i] * v[i]
         for j in range(i + 1):
             S[i, j] = M[j, i]
     for j in range(n):
-        joint, m, l = of_joint(parameters, j), links + j, joints[j]
-        swing = np.sin(joint.gear_waves * y[m] + joint.gear_phase)
-        qdd[l] += joint.gear_stiffness * joint.gear_error * swing
+        joint, m = of_joint(arm.joints, j), links + j
+        l, swing = int(joint.link), 0.0
+        if joint.gear_error > 0.0:
+            swing = math.sin(joint.gear_waves * y[m] + joint.gear_phase)
+        qdd[l] += joint.gear_damping * v[m] + joint.gear_stiffness * (y[m] + joint.gear_error * swing)
         qdd[l] -= z[j] + softened(joint, y[l] - y[m] - joint.gear_error * swing)
         moment[j] = command[2, j] + joint.velocity_gain * (command[1, j] - v[m])
         moment[j] += joint.position_gain * (command[0, j] - y[m]) + joint.integral_gain * s[j]

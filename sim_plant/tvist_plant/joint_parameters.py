@@ -1,8 +1,6 @@
 """Parameters of each joint's drive and gear for the kernel: one array, whose columns get names in the kernel.
 
-A kernel should have few arguments, since numba checks the type of each at every call: 20 arrays take twice as long as
-8, and a NamedTuple takes longer than its arrays separately. So the parameters are passed in one array, and get their
-names back in the kernel, where a NamedTuple of numbers costs nothing.
+In the kernel, a NamedTuple of numbers costs nothing.
 """
 
 from typing import NamedTuple
@@ -12,7 +10,7 @@ import numpy as np
 from tvist_plant._compiled import compiled
 from tvist_plant.drives import LinearPart, Nonlinear
 from tvist_plant.imperfections import GearLaw
-from tvist_plant.model import Floats
+from tvist_plant.model import Floats, Integers
 
 
 class JointParameters(NamedTuple):
@@ -34,8 +32,12 @@ class JointParameters(NamedTuple):
     """F_s/F_c [-]."""
     stribeck_speed: float
     """v_s [rad/s]."""
+    link: float
+    """Index of its link among the links, as a float [-]."""
     gear_stiffness: float
     """K [N m/rad]."""
+    gear_damping: float
+    """D [N m s/rad]."""
     gear_error: float
     """Amplitude ε of the gear's kinematic error [rad]."""
     gear_waves: float
@@ -52,6 +54,10 @@ class JointParameters(NamedTuple):
     """z_max [N m]."""
 
 
+ROWS = len(JointParameters._fields)
+"""Number of parameters of a joint."""
+
+
 @compiled
 def of_joint(parameters: Floats, j: int) -> JointParameters:
     """Return the parameters of joint j from the array that `packed` created."""
@@ -60,13 +66,17 @@ def of_joint(parameters: Floats, j: int) -> JointParameters:
         parameters[4, j], parameters[5, j], parameters[6, j], parameters[7, j],
         parameters[8, j], parameters[9, j], parameters[10, j], parameters[11, j],
         parameters[12, j], parameters[13, j], parameters[14, j], parameters[15, j],
+        parameters[16, j], parameters[17, j],
     )  # fmt: skip
 
 
-def packed(linear: LinearPart, nonlinear: Nonlinear, law: GearLaw, gear_phase: Floats) -> Floats:
-    """Return one array of all parameters, one row each in the order of `JointParameters`, shape (16, n).
+def packed(
+    joints: Integers, linear: LinearPart, nonlinear: Nonlinear, law: GearLaw, gear_phase: Floats
+) -> Floats:
+    """Return one array of all parameters, one row each in the order of `JointParameters`, shape (18, n).
 
     Args:
+        joints: Indices of the joints among the links, shape (n,).
         linear: Gains and rotors.
         nonlinear: Friction and gear errors.
         law: Imperfections of friction and gears.
@@ -81,7 +91,9 @@ def packed(linear: LinearPart, nonlinear: Nonlinear, law: GearLaw, gear_phase: F
         "friction_width": nonlinear.friction_width,
         "breakaway": law.breakaway,
         "stribeck_speed": law.stribeck_speed,
+        "link": joints,
         "gear_stiffness": nonlinear.gear_stiffness,
+        "gear_damping": linear.gear_damping,
         "gear_error": nonlinear.gear_error,
         "gear_waves": nonlinear.gear_waves,
         "gear_phase": gear_phase,

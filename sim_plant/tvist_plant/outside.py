@@ -80,14 +80,17 @@ class Outside:
             at = placement.act(vectors["point"])
             self._wrenches[body] = _Wrench(joint, at, vectors["force"], vectors["moment"])
 
-    def generalized_force(self, q: Floats) -> Floats | None:
-        """Return the sum of all torques and wrenches, as torques on all N links; None if there are none.
+    @property
+    def rests(self) -> bool:
+        """Whether there are no torques and no wrenches."""
+        return self._torque is None and not self._wrenches
+
+    def generalized_force(self, q: Floats) -> Floats:
+        """Return the sum of all torques and wrenches, as torques on all N links, shape (N,) [N m].
 
         Args:
             q: Angles of the links, shape (N,) [rad].
         """
-        if self._torque is None and not self._wrenches:
-            return None
         sum_ = np.zeros(self._flexible.model.nv)
         if self._torque is not None:
             sum_[self._flexible.joints] = self._torque

@@ -1,4 +1,4 @@
-"""The arm's sensors: a MEMS accelerometer in the flange, and encoders in its joints."""
+"""The arm's sensors: the noise of a MEMS accelerometer in the flange, and the phases of the gears' errors."""
 
 import numpy as np
 
@@ -29,28 +29,6 @@ class Accelerometer:
             self._drawn = iter(self._noise * self._random.standard_normal((512, 3)))
             sample = next(self._drawn)
         return np.asarray(specific_force + sample)
-
-
-class Encoders:
-    """Angles with steps: a reading is updated when the angle has moved by a step.
-
-    This is hysteresis, since rounding would flicker if an angle rests between two steps.
-
-    Args:
-        step: Size of a step [rad]; 0 to return angles unchanged.
-    """
-
-    def __init__(self, step: float) -> None:
-        self._step = step
-        self._told: Floats | None = None
-
-    def read(self, q: Floats) -> Floats:
-        """Return the readings of the angles, shape (n,) [rad]."""
-        if self._step == 0.0:
-            return q
-        told = q if self._told is None else np.where(np.abs(q - self._told) >= self._step, q, self._told)
-        self._told = told
-        return told
 
 
 def gear_phases(joints: int, seed: int) -> Floats:

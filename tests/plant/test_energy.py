@@ -6,9 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tvist_plant.arm_memory import GRAVITY, LAST, NOW
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.integrator import LAST, NOW
 
 from .arms import changed, conservative
 
@@ -21,13 +21,14 @@ def limp(description, period, gravity):
     plant = FlexibleArm(arm, arm.payload, period=period)
     if not gravity:
         plant._flexible.model.gravity.linear = np.zeros(3)
+        plant.memory[GRAVITY] = 0.0
     q = np.array(arm.poses["Q1"]) + np.array([0.0, 0.6, 0.5, 0.0, 0.3, 0.2])
     command = DriveCommand(q, np.zeros(6), np.zeros(6))
     plant.reset(command)
     if not gravity:
         plant._qd[plant._flexible.joints] = plant._speed[:] = [0.6, 0.4, -0.8, 0.5, 0.5, -0.5]
         plant._evaluate()
-        plant._dynamics[LAST] = plant._dynamics[NOW]
+        plant._arm.dynamics[LAST] = plant._arm.dynamics[NOW]
     return plant, command
 
 

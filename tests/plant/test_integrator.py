@@ -6,11 +6,12 @@ import sys
 import numpy as np
 import pytest
 
-from tvist_plant import _compiled, flexible_arm, integrator
+from tvist_plant import _compiled, arm_memory, arm_tick, chain, integrator, joint_parameters
+from tvist_plant.arm_tick import tick
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.imperfections import Imperfections, YieldingBase
-from tvist_plant.integrator import advance, balance, cholesky, solve
+from tvist_plant.integrator import cholesky, solve
 
 from .arms import quiet
 from .reference import commands, runge_kutta
@@ -63,56 +64,54 @@ def test_cholesky_and_solve_are_those_of_numpy():
     for size in (1, 2, 7, 16, 18):
         root = random.standard_normal((size, size))
         S = root @ root.T + np.eye(size)
-        x = random.standard_normal(size)
+        x = random.standard_normal(size + 2)
         L = np.where(np.tri(size, dtype=bool), S, np.nan)  # what is above the diagonal must not matter
         solution = x.copy()
         cholesky(L)
         solve(L, solution)
-        np.testing.assert_allclose(np.tril(L), np.linalg.cholesky(S), atol=1e-12)
-        np.testing.assert_allclose(solution, np.linalg.solve(S, x), atol=1e-11)
+        np.testing.assert_allclose(np.tril(L, -1), np.tril(np.linalg.cholesky(S), -1), atol=1e-12)
+        np.testing.assert_allclose(1.0 / np.diag(L), np.diag(np.linalg.cholesky(S)), atol=1e-12)
+        np.testing.assert_allclose(solution[:size], np.linalg.solve(S, x[:size]), atol=1e-11)
+        np.testing.assert_array_equal(solution[size:], x[size:])
 
 
-def copies(arguments):
-    return [
-        argument.copy(order="K") if isinstance(argument, np.ndarray) else argument for argument in arguments
-    ]
-
-
-def call_in_motion(arm, drive, monkeypatch, name, imperfections):
-    """Arguments of a kernel's call in mid-motion, friction saturated and gears with an error."""
-    calls = []
-    kernel = getattr(flexible_arm, name)
-
-    def spy(*arguments):
-        calls.append(copies(arguments))
-        kernel(*arguments)
-
+def in_motion(arm, drive, imperfections):
+    """The arm in mid-motion, friction saturated and gears with an error."""
     simulated = FlexibleArm(arm, arm.payload, imperfections=imperfections)
     simulated.reset(drive[0], seed=4)
     for command in drive[1:600]:
         simulated.step(command)
-    monkeypatch.setattr(flexible_arm, name, spy)
-    simulated.step(drive[600])
-    return calls[-1]
+    return simulated
 
 
 @pytest.mark.parametrize("imperfections", [None, ALL], ids=["described", "imperfect"])
-@pytest.mark.parametrize(
-    ("kernel", "changed"), [(advance, {0, 1, 2}), (balance, {6, 7})], ids=["advance", "balance"]
-)
-def test_compiled_kernel_is_its_python_source(ur5e, drive, monkeypatch, kernel, changed, imperfections):
-    arguments = call_in_motion(ur5e, drive, monkeypatch, kernel.__name__, imperfections)
-    compiled, plain = copies(arguments), copies(arguments)
-    kernel(*compiled)
-    for name, function in vars(integrator).copy().items():
-        if hasattr(function, "py_func"):
-            monkeypatch.setattr(integrator, name, function.py_func)
-    kernel.py_func(*plain)
-    for number, (before, a, b) in enumerate(zip(arguments, compiled, plain, strict=True)):
-        if isinstance(a, np.ndarray):
-            scale = max(1.0, np.max(np.abs(b)))
-            np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-12 * scale)
-            assert (not np.array_equal(before, a)) == (number in changed)
+def test_compiled_tick_is_its_python_source(ur5e, drive, monkeypatch, imperfections):
+    simulated, command = in_motion(ur5e, drive, imperfections), drive[600]
+    memory, out = simulated.memory.copy(), np.zeros((2, 21))
+    assert tick(simulated.memory, command.q, command.qd, command.torque, out[0])
+    for module in (arm_memory, arm_tick, chain, integrator, joint_parameters):
+        for name, function in vars(module).copy().items():
+            if hasattr(function, "py_func"):
+                monkeypatch.setattr(module, name, function.py_func)
+    assert arm_tick.tick(memory, command.q, command.qd, command.torque, out[1])
+    scale = np.maximum(np.abs(memory), 1.0)
+    np.testing.assert_allclose(simulated.memory / scale, memory / scale, rtol=0.0, atol=1e-11)
+    np.testing.assert_allclose(out[0], out[1], rtol=0.0, atol=1e-9)
+
+
+def test_the_matrix_of_a_substep_is_that_of_the_equations(ur5e, drive):
+    """Motors eliminated first: the links' part of the inverse is that of the whole matrix."""
+    simulated = in_motion(ur5e, drive, None)
+    arm, h, linear = arm_memory.parts(simulated.memory), 0.0005, simulated._linear
+    links, n = 10, 6
+    M = 1.5 * arm.dynamics[arm_memory.NOW, :links] - 0.5 * arm.dynamics[arm_memory.LAST, :links]
+    S = 0.5 * h * linear.damping + 0.25 * h**2 * linear.stiffness
+    S[:links, :links] += np.triu(M) + np.triu(M, 1).T
+    motors = links + np.arange(n)
+    S[motors, motors] += linear.rotor_inertia + 0.125 * h**3 * linear.integral_gain
+    integrator.factorise(arm, h)
+    L = np.tril(arm.factor, -1) + np.diag(1.0 / np.diag(arm.factor))
+    np.testing.assert_allclose(np.linalg.inv(L @ L.T), np.linalg.inv(S)[:links, :links], rtol=1e-9)
 
 
 def test_without_numba_the_python_function_serves(monkeypatch):

@@ -1,0 +1,93 @@
+"""Memory of a simulated arm for the kernels: one array, whose parts get names in a kernel and in Python alike.
+
+A kernel should have few arguments, since numba checks the type of each at every call: a dozen arrays take longer than
+much of what the kernel computes.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tvist_plant._compiled import compiled
+from tvist_plant.chain import SCRATCH, WIDTH
+from tvist_plant.joint_parameters import ROWS
+from tvist_plant.model import Floats
+
+LAST, NOW = 0, 1
+"""Indices of the commands and dynamics of the last and the current tick."""
+LINKS, JOINTS, PERIOD, SUBSTEPS, GRAVITY, ENCODER_STEP, HEAD = range(7)
+"""Places of the single numbers at the front of the memory; their number."""
+
+
+class ArmMemory(NamedTuple):
+    """Parts of the memory of an arm with N links and n motors, all of them views."""
+
+    state: Floats
+    """Rows of `ArmState`, shape (5, N+n)."""
+    commands: Floats
+    """Rows q_r, q̇_r, τ_ff of the last command and of this one, shape (2, 3, n)."""
+    dynamics: Floats
+    """Mass matrix, upper triangle [kg m^2], and below it a row with the bias [N m]: Coriolis, centrifugal and gravity
+    torques minus external ones; of the last tick and of this one, shape (2, N+1, N)."""
+    springs: Floats
+    """Stiffness [N m/rad] and damping [N m s/rad] of each link and motor by itself, shape (2, N+n)."""
+    joints: Floats
+    """Rows of `JointParameters`, shape (18, n)."""
+    chain: Floats
+    """Parameters of the links, see `chain_of`, shape (N+1, 22)."""
+    bodies: Floats
+    """Scratch of `sweep`; in its last row the flange, shape (N+1, 28)."""
+    pushed: Floats
+    """External torques, shape (N,) [N m]."""
+    qdd: Floats
+    """Accelerations of the links, shape (N,) [rad/s^2]."""
+    readings: Floats
+    """Readings of the encoders, NaN before the first, shape (n,) [rad]."""
+    factor: Floats
+    """Scratch: a factorised matrix, shape (N, N)."""
+    force: Floats
+    """Scratch: torques that do not depend on the state, shape (N+n,) [N m]."""
+
+
+def shapes(N: int, n: int) -> ArmMemory:
+    """Shapes of the parts."""
+    sizes = (
+        (5, N + n), (2, 3, n), (2, N + 1, N), (2, N + n), (ROWS, n), (N + 1, WIDTH), (N + 1, SCRATCH),
+        (N,), (N,), (n,), (N, N), (N + n,),
+    )  # fmt: skip
+    return ArmMemory(*sizes)  # type: ignore[arg-type]
+
+
+def memory_for(N: int, n: int) -> Floats:
+    """Return memory for an arm with N links and n motors, full of zeros."""
+    memory = np.zeros(HEAD + sum(int(np.prod(shape)) for shape in shapes(N, n)))
+    memory[LINKS], memory[JOINTS] = N, n
+    return memory
+
+
+@compiled
+def parts(memory: Floats) -> ArmMemory:
+    """Return the parts of a memory by name, as views."""
+    N, n = int(memory[LINKS]), int(memory[JOINTS])
+    a = HEAD + 5 * (N + n)
+    b = a + 6 * n
+    c = b + 2 * (N + 1) * N
+    d = c + 2 * (N + n)
+    e = d + ROWS * n
+    f = e + (N + 1) * WIDTH
+    g = f + (N + 1) * SCRATCH
+    h = g + 2 * N + n
+    return ArmMemory(
+        memory[HEAD:a].reshape(5, N + n),
+        memory[a:b].reshape(2, 3, n),
+        memory[b:c].reshape(2, N + 1, N),
+        memory[c:d].reshape(2, N + n),
+        memory[d:e].reshape(ROWS, n),
+        memory[e:f].reshape(N + 1, WIDTH),
+        memory[f:g].reshape(N + 1, SCRATCH),
+        memory[g : g + N],
+        memory[g + N : g + 2 * N],
+        memory[g + 2 * N : h],
+        memory[h : h + N * N].reshape(N, N),
+        memory[h + N * N :],
+    )

@@ -1,0 +1,96 @@
+"""One control period of the simulated arm, compiled: it moves, its dynamics are evaluated, and its sensors are read."""
+
+import math
+
+from tvist_plant._compiled import compiled
+from tvist_plant.arm_memory import ENCODER_STEP, GRAVITY, NOW, ArmMemory, parts
+from tvist_plant.chain import collect_inertia, collect_torques, sweep
+from tvist_plant.integrator import advance, balance, rows
+from tvist_plant.joint_parameters import of_joint
+from tvist_plant.model import Floats
+
+
+@compiled
+def move(memory: Floats, q: Floats, qd: Floats, torque: Floats) -> None:
+    """Move the arm by one period, while its drives go linearly from the previous command to this one.
+
+    Args:
+        memory: Memory of the arm, see `arm_memory`.
+        q: Position q_r at the end of the period, shape (n,) [rad].
+        qd: Velocity q̇_r, shape (n,) [rad/s].
+        torque: Feed-forward torque, shape (n,) [N m].
+    """
+    arm = parts(memory)
+    now = arm.commands[NOW]
+    for j in range(q.shape[0]):
+        now[0, j], now[1, j], now[2, j] = q[j], qd[j], torque[j]
+    advance(arm, memory)
+
+
+@compiled
+def evaluate(memory: Floats, out: Floats) -> bool:
+    """Compute mass matrix, bias, accelerations and measurements at the present state.
+
+    Args:
+        memory: Memory of the arm; its `pushed` contains the external torques at this state.
+        out: Result, shape (3n+3,): joint angles read by the encoders [rad], joint velocities [rad/s], motor torques
+            [N m], and the specific force in the flange frame without noise [m/s^2].
+
+    Returns:
+        Whether the state is finite.
+    """
+    arm = parts(memory)
+    links, n = arm.qdd.shape[0], arm.joints.shape[1]
+    y, v, _, _, _ = rows(arm.state, n)
+    q, qd, M, qdd = y[:links], v[:links], arm.dynamics[NOW, :links], arm.qdd
+    bias = arm.dynamics[NOW, links]
+    for i in range(links):
+        qdd[i] = 0.0
+    sweep(arm.chain, q, qd, qdd, memory[GRAVITY], arm.bodies)
+    collect_torques(arm.bodies, bias)
+    collect_inertia(arm.bodies, M)
+    for i in range(links):
+        bias[i] -= arm.pushed[i]
+    balance(arm, out[2 * n : 3 * n])
+    read(arm, memory[ENCODER_STEP], out)
+    total = 0.0
+    for i in range(links):
+        total += qdd[i] * qdd[i]
+    return math.isfinite(total)
+
+
+@compiled
+def read(arm: ArmMemory, step: float, out: Floats) -> None:
+    """Read encoders and accelerometer; arguments as in `evaluate`.
+
+    A reading is updated when the angle has moved by a step. This is hysteresis, since rounding would flicker if an
+    angle rests between two steps.
+    """
+    links, n, qdd = arm.qdd.shape[0], arm.joints.shape[1], arm.qdd
+    y, v, _, _, _ = rows(arm.state, n)
+    for j in range(n):
+        l = int(of_joint(arm.joints, j).link)
+        if not abs(y[l] - arm.readings[j]) < step:  # True for NaN
+            arm.readings[j] = y[l]
+        out[j], out[n + j] = arm.readings[j], v[l]
+    end = arm.bodies[links]
+    # The sweep left V, and A without accelerations of the joints, which add S q̈.
+    A = end[22:28]
+    for i in range(links):
+        for k in range(6):
+            A[k] += arm.bodies[i, k] * qdd[i]
+    a, b, c, x, y_, z = end[16], end[17], end[18], end[9], end[10], end[11]
+    # Acceleration of the flange's origin: A + α x p + ω x (v + ω x p), with gravity as an acceleration upwards.
+    u, w, t = end[19] + b * z - c * y_, end[20] + c * x - a * z, end[21] + a * y_ - b * x
+    f0 = A[3] + A[1] * z - A[2] * y_ + b * t - c * w
+    f1 = A[4] + A[2] * x - A[0] * z + c * u - a * t
+    f2 = A[5] + A[0] * y_ - A[1] * x + a * w - b * u
+    for k in range(3):
+        out[3 * n + k] = end[k] * f0 + end[3 + k] * f1 + end[6 + k] * f2
+
+
+@compiled
+def tick(memory: Floats, q: Floats, qd: Floats, torque: Floats, out: Floats) -> bool:
+    """Compute one period of an arm on which nothing pushes: `move`, then `evaluate`."""
+    move(memory, q, qd, torque)
+    return evaluate(memory, out)
