@@ -9,6 +9,7 @@ from tvist_controller.control.differentiator import Differentiator, Floats, Targ
 from tvist_controller.control.drive_feed_forward import DriveFeedForward, MotorReference
 from tvist_controller.control.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.control.inverse_dynamics import SLEW, InverseDynamics
+from tvist_controller.control.line_tick import SIGNALS, to_drives
 from tvist_controller.control.shaped_reference import ShapedReference
 from tvist_controller.control.unshaped_reference import UnshapedReference
 from tvist_controller.line_filter import LineFilter
@@ -26,6 +27,7 @@ from tvist_controller.trajectory import (
     quickest_motion,
 )
 from tvist_plant.description import Payload, RobotDescription
+from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD, Measurement, Plant, check_measurement
 from tvist_shaping.base import Filter
@@ -152,19 +154,30 @@ class ControlCycle:
         alike, unshaped = x_star is x or x_star.tobytes() == x.tobytes(), None
         if not alike or self._unshaped.apart is not None:
             unshaped = self._unshaped.update(reference, self._shaped.joints, alike=alike)
-        target = self._shaped.update(x_star, reference if alike else None)  # q*, q̇*, q̈* a tick earlier
+        self._shaped.push(x_star, reference if alike else None)
         self.inverse_dynamics.advance()
-        torque = self.inverse_dynamics.torque(target.q, target.qd, target.qdd)  # τ* [N m]
-        gravity = self.inverse_dynamics.gravity(target.q)
+        target, torque, gravity, plain = self._to_drives()  # q*, q̇*, q̈* a tick earlier, τ* [N m]
         carried = self.inverse_dynamics.carried
         command = self._feed_forward.command(
-            target, torque, gravity, carried,
+            target, torque, gravity, carried, plain,
             may_begin=not (self.unshaped or self.line_filter.fading), may_go_on=not self.unshaped or self.stopping,
         )  # fmt: skip
         measured = self._plant.step(command)
         self._settle(reference, target)
         motors = self._feed_forward.reference
         return Sample(reference, target, torque, command.torque, measured, unshaped, motors)
+
+    def _to_drives(self) -> tuple[Target, Floats, Floats, DriveCommand]:
+        """Return the target, its torque, the part of that which balances gravity, and the command for it."""
+        dynamics = self.inverse_dynamics
+        before, middle, last = self._shaped.joints.window
+        signals = np.empty((SIGNALS, len(middle)))
+        to_drives(
+            before, middle, last, PERIOD, dynamics.chain, dynamics.gravitation, dynamics.scratch,
+            self._feed_forward.rows, signals,
+        )  # fmt: skip
+        qd, qdd, torque, gravity, q_r, qd_r, torque_ff = signals
+        return Target(middle, qd, qdd), torque, gravity, DriveCommand(q_r, qd_r, torque_ff)
 
     def _give_up(self, error: StuckError) -> Floats:
         """Return the first reference of the stop from the last shaped one, since the trajectory cannot go on."""
@@ -310,14 +323,11 @@ class ControlCycle:
         self.line_filter.begin(self.tvist, q)
         self._shaped.reset(q)
         self._unshaped.join()
-        still = np.zeros_like(q)
-        torque = self.inverse_dynamics.gravity(q)
-        self._feed_forward.reset(torque)
-        command = self._feed_forward.command(
-            Target(q, still, still), torque, torque, self.inverse_dynamics.carried
-        )
+        self._feed_forward.reset(self.inverse_dynamics.gravity(q))
+        target, torque, gravity, plain = self._to_drives()
+        command = self._feed_forward.command(target, torque, gravity, self.inverse_dynamics.carried, plain)
         measured = self._plant.reset(command, payload=carried, seed=seed)
-        self.standing = Sample(q, Target(q, still, still), torque, command.torque, measured)
+        self.standing = Sample(q, target, torque, command.torque, measured)
         """Signals to report before the first tick from there."""
 
     def declare(self, payload: Payload, ticks: int = SLEW) -> None:

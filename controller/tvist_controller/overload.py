@@ -4,12 +4,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tvist_controller._compiled import compiled
 from tvist_controller.control.differentiator import Floats
 from tvist_plant.plant import PERIOD
 
 ALLOWED = 0.01
 """How long a drive may exceed its limit [s]."""
 TICKS = round(ALLOWED / PERIOD)
+
+
+@compiled
+def exceeds(values: Floats, limits: Floats) -> bool:
+    """Return whether a magnitude exceeds its limit, each argument of shape (n,)."""
+    for j in range(limits.shape[0]):  # noqa: SIM110  numba has no generators
+        if abs(values[j]) > limits[j]:
+            return True
+    return False
 
 
 class Overload:
@@ -30,12 +40,11 @@ class Overload:
         Args:
             moment: Total torque of each drive, shape (n,) [N m].
         """
-        beyond = np.abs(moment) > self.limits
-        if not np.count_nonzero(beyond):  # much faster than any()
+        if not exceeds(moment, self.limits):
             if self._any:
                 self.forget()
             return None
-        self._any = True
+        beyond, self._any = np.abs(moment) > self.limits, True
         self._beyond = np.where(beyond, self._beyond + 1, 0)
         joint = int(np.argmax(self._beyond))
         return joint if self._beyond[joint] > TICKS else None

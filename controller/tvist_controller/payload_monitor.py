@@ -71,7 +71,7 @@ class PayloadMonitor:
     def reset(self) -> None:
         """Discard past measurements, since the arm was placed elsewhere, its power was off, or something pushed it."""
         self._wait = 0
-        self._ticks, self._sum = 0, np.zeros(len(self._friction))
+        self._torques: list[tuple[Floats, Floats]] = []
         self._time = self._yy = self._yr = self._bound = 0.0
         self._warned = False
 
@@ -97,13 +97,12 @@ class PayloadMonitor:
         if self._wait > 0:
             self._wait -= 1
             return None
-        self._sum += moment
-        self._sum -= expected
-        self._ticks += 1
-        if self._ticks < EVERY:
+        self._torques.append((moment, expected))
+        if len(self._torques) < EVERY:
             return None
-        feedback, self._sum = self._sum / EVERY, np.zeros_like(self._sum)
-        self._ticks = 0
+        moments, feed_forward = np.sum(self._torques, axis=0) / EVERY
+        feedback = moments - feed_forward
+        self._torques.clear()
         per_kg = pin.rnea(self._model, self._data, target.q, target.qd, target.qdd)
         weighted = self._weight * per_kg
         fade = self._fade

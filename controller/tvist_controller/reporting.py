@@ -1,7 +1,5 @@
 """Conversion of a tick's signals into messages for clients."""
 
-from msgspec.structs import replace
-
 from tvist_controller.control.kinematics import ForwardKinematics, rotation_vector
 from tvist_controller.cycle import Sample
 from tvist_plant.description import RobotDescription
@@ -57,12 +55,12 @@ class Reporter:
         """
         target, measured, unshaped, motors = sample.target, sample.measured, sample.unshaped, sample.motors
         pose, tool_speed = self._kinematics.tool(measured.q, measured.qd)
-        state = State(
+        return State(
             tick=tick,
             timestamp=tick * PERIOD,
-            robot_mode=robot_mode.value,
-            safety_mode=safety_mode.value,
-            runtime_state=runtime.value,
+            robot_mode=int(robot_mode),
+            safety_mode=int(safety_mode),
+            runtime_state=int(runtime),
             setpoint_sequence=setpoint_sequence,
             reference_q=sample.reference.tolist(),
             target_q=target.q.tolist(),
@@ -81,23 +79,14 @@ class Reporter:
             shaper_delay=tvist.delay + drive_delay,
             missed_ticks=missed_ticks,
             shaper_clipped=tvist.clipped,
+            unshaped_q=None if unshaped is None else unshaped.q.tolist(),
+            unshaped_qd=None if unshaped is None else unshaped.qd.tolist(),
+            unshaped_qdd=None if unshaped is None else unshaped.qdd.tolist(),
+            motor_qd=None if motors is None else motors.qd.tolist(),
+            motor_qdd=None if motors is None else motors.qdd.tolist(),
+            motor_moment=None if motors is None else motors.torque.tolist(),
+            motor_limited=motors is not None and motors.limited,
         )
-        if unshaped is not None:
-            state = replace(
-                state,
-                unshaped_q=unshaped.q.tolist(),
-                unshaped_qd=unshaped.qd.tolist(),
-                unshaped_qdd=unshaped.qdd.tolist(),
-            )
-        if motors is not None:
-            state = replace(
-                state,
-                motor_qd=motors.qd.tolist(),
-                motor_qdd=motors.qdd.tolist(),
-                motor_moment=motors.torque.tolist(),
-                motor_limited=motors.limited,
-            )
-        return state
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:
         """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""

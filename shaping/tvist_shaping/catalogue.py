@@ -13,7 +13,7 @@ SHAPERS: Mapping[str, Shaper] = MappingProxyType(
     {
         entry.name: entry
         for entry in (
-            Shaper("none", "no shaping", impulses.none, 0.0),
+            Shaper("none", "no shaping", impulses.none, 0.0, train=impulses.NONE),
             Shaper(
                 "um_zv",
                 "unity magnitude: shorter than zv, up to 3 times the acceleration",
@@ -22,9 +22,19 @@ SHAPERS: Mapping[str, Shaper] = MappingProxyType(
                 unity.UM_ZV.zeta_max,
                 peak=3.0,
             ),
-            Shaper("zv", "zero vibration: the shortest that keeps the limits, the paper's", impulses.zv, 0.5),
             Shaper(
-                "mzv", "modified zero vibration: slightly longer and more robust than zv", impulses.mzv, 0.75
+                "zv",
+                "zero vibration: the shortest that keeps the limits, the paper's",
+                impulses.zv,
+                0.5,
+                train=impulses.ZV,
+            ),
+            Shaper(
+                "mzv",
+                "modified zero vibration: slightly longer and more robust than zv",
+                impulses.mzv,
+                0.75,
+                train=impulses.MZV,
             ),
             Shaper(
                 "um_zvd",
@@ -35,9 +45,15 @@ SHAPERS: Mapping[str, Shaper] = MappingProxyType(
                 peak=5.0,
             ),
             Shaper(
-                "zvd", "zero vibration and derivative: tolerates frequency errors of 14 %", impulses.zvd, 1.0
+                "zvd",
+                "zero vibration and derivative: tolerates frequency errors of 14 %",
+                impulses.zvd,
+                1.0,
+                train=impulses.ZVD,
             ),
-            Shaper("ei", "extra-insensitive: as long as zvd, tolerates 20 %", impulses.ei, 1.0),
+            Shaper(
+                "ei", "extra-insensitive: as long as zvd, tolerates 20 %", impulses.ei, 1.0, train=impulses.EI
+            ),
             Shaper(
                 "ei_exact",
                 "ei with 5 % at f_d for any damping: more robust there",
@@ -48,8 +64,16 @@ SHAPERS: Mapping[str, Shaper] = MappingProxyType(
             si_of(
                 0.75, 1.25, name="si", description="specified insensitivity: the shortest that tolerates 25 %"
             ),
-            Shaper("zvdd", "zero vibration and two derivatives: tolerates 24 %", impulses.zvdd, 1.5),
-            Shaper("ei2", "two-hump extra-insensitive: tolerates 36 %", impulses.ei2, 1.5),
+            Shaper(
+                "zvdd",
+                "zero vibration and two derivatives: tolerates 24 %",
+                impulses.zvdd,
+                1.5,
+                train=impulses.ZVDD,
+            ),
+            Shaper(
+                "ei2", "two-hump extra-insensitive: tolerates 36 %", impulses.ei2, 1.5, train=impulses.EI2
+            ),
             Shaper(
                 "ei2_exact",
                 "ei2 with humps of 5 % for any damping",
@@ -57,8 +81,16 @@ SHAPERS: Mapping[str, Shaper] = MappingProxyType(
                 exact.EI2.duration_periods,
                 exact.EI2.zeta_max,
             ),
-            Shaper("zvddd", "zero vibration and three derivatives: tolerates 31 %", impulses.zvddd, 2.0),
-            Shaper("ei3", "three-hump extra-insensitive: tolerates 48 %", impulses.ei3, 2.0),
+            Shaper(
+                "zvddd",
+                "zero vibration and three derivatives: tolerates 31 %",
+                impulses.zvddd,
+                2.0,
+                train=impulses.ZVDDD,
+            ),
+            Shaper(
+                "ei3", "three-hump extra-insensitive: tolerates 48 %", impulses.ei3, 2.0, train=impulses.EI3
+            ),
             Shaper(
                 "ei3_exact",
                 "ei3 with humps of 5 % for any damping",

@@ -50,11 +50,12 @@ def gather(buffer: Floats, newest: int, A: Floats, delays: Floats, first: Floats
         w1 = s * (s - 2.0) * (s - 3.0) / 2.0
         w2 = -s * (s - 1.0) * (s - 3.0) / 2.0
         w3 = s * (s - 1.0) * (s - 2.0) / 6.0
-        near = (newest - whole) % capacity
-        n0 = (newest - start) % capacity
-        n1 = (newest - start - 1) % capacity
-        n2 = (newest - start - 2) % capacity
-        n3 = (newest - start - 3) % capacity
+        near, n0 = newest - whole, newest - start
+        near += capacity if near < 0 else 0
+        n0 += capacity if n0 < 0 else 0
+        n1 = n0 - 1 if n0 > 0 else capacity - 1
+        n2 = n1 - 1 if n1 > 0 else capacity - 1
+        n3 = n2 - 1 if n2 > 0 else capacity - 1
         for k in range(joints):
             x = buffer[near, k]
             if delay != whole:
@@ -81,12 +82,18 @@ class DelayLine:
         capacity: Number of samples in the buffer.
         max_delay: Longest delay that can be read [ticks].
         still: Number of newest samples that are equal to the last bit, at least 1. It may exceed the capacity.
+        ring: Ring buffer of samples, shape (capacity, joints).
+        head: Row of the newest sample in it.
+        scratch: Scratch of `gather`, shape (joints,).
     """
 
     joints: int
     capacity: int
     max_delay: int
     still: int
+    ring: Floats
+    head: int
+    scratch: Floats
 
     def __init__(self, joints: int, capacity: int) -> None:
         """Create a line filled with zeros.
@@ -105,10 +112,10 @@ class DelayLine:
         self.joints = joints
         self.capacity = capacity
         self.max_delay = capacity - _MARGIN
-        self._buffer: Floats = np.zeros((capacity, joints))
-        self._first: Floats = np.zeros(joints)
-        self._newest = 0
-        self.fill(self._first)
+        self.ring = np.zeros((capacity, joints))
+        self.scratch = np.zeros(joints)
+        self.head = 0
+        self.fill(self.scratch)
 
     def __repr__(self) -> str:
         return f"DelayLine(joints={self.joints}, capacity={self.capacity})"
@@ -123,7 +130,7 @@ class DelayLine:
             ShapingError: q has another shape.
         """
         sample = self._sample(q)
-        self._buffer[:] = sample
+        self.ring[:] = sample
         self.still, self._bits = self.capacity, sample.tobytes()
 
     def push(self, q: npt.ArrayLike) -> None:
@@ -136,8 +143,8 @@ class DelayLine:
             ShapingError: q has another shape.
         """
         sample = self._sample(q)
-        self._newest = (self._newest + 1) % self.capacity
-        self._buffer[self._newest] = sample
+        self.head = (self.head + 1) % self.capacity
+        self.ring[self.head] = sample
         bits = sample.tobytes()  # the fastest comparison
         self.still = self.still + 1 if bits == self._bits else 1
         self._bits = bits
@@ -145,7 +152,7 @@ class DelayLine:
     def newest(self, count: int) -> Floats:
         """The latest samples, oldest first, shape (count, joints); count is at most the capacity."""
         ages = np.arange(count - 1, -1, -1)
-        return self._buffer[(self._newest - ages) % self.capacity]
+        return self.ring[(self.head - ages) % self.capacity]
 
     def take_over(self, other: "DelayLine") -> None:
         """Copy the content of another line; if that is shorter, its oldest sample fills the rest.
@@ -159,8 +166,8 @@ class DelayLine:
         kept = min(self.capacity, other.capacity)
         samples = other.newest(kept)
         self.fill(samples[0])
-        self._buffer[:kept] = samples
-        self._newest = kept - 1
+        self.ring[:kept] = samples
+        self.head = kept - 1
         self._bits = other._bits  # noqa: SLF001  one of its own kind
         self.still = other.still if other.still < other.capacity else max(other.still, self.capacity)
 
@@ -188,12 +195,12 @@ class DelayLine:
         Raises:
             DelayError: A delay is outside that range or not a number; `out` is not changed.
         """
-        refused = gather(self._buffer, self._newest, A, delays, self._first, out)
+        refused = gather(self.ring, self.head, A, delays, self.scratch, out)
         if refused >= 0:
             raise DelayError(float(delays[refused]), self.max_delay)
 
     def _part(self) -> None:
-        self._buffer, self._first = self._buffer.copy(), np.empty_like(self._first)
+        self.ring, self.scratch = self.ring.copy(), np.empty_like(self.scratch)
 
     def _sample(self, q: npt.ArrayLike) -> Floats:
         sample = np.asarray(q, dtype=float)

@@ -2,13 +2,61 @@
 
 import math
 
+import numpy as np
+
+from tvist_shaping._compiled import compiled
 from tvist_shaping._types import Floats
 from tvist_shaping.base import Filter
+from tvist_shaping.delay_line import gather
 from tvist_shaping.errors import FilterError, ShaperFailureError
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.failures import FAILURES, ROUNDING, failure
-from tvist_shaping.impulses import UNSHAPED, Impulses, product
+from tvist_shaping.impulses import F_D_RANGE, UNSHAPED, Impulses, decay, product
 from tvist_shaping.shaper import Shaper
+
+LOWEST, HIGHEST = F_D_RANGE
+
+
+@compiled
+def shape(
+    f_d: Floats,
+    zeta: Floats,
+    zeta_max: float,
+    longest: float,
+    period: float,
+    train: Floats,
+    impulses: Floats,
+    ring: Floats,
+    head: int,
+    scratch: Floats,
+    out: Floats,
+) -> bool:
+    """Compute the impulses of a mode, and apply them to a delay line.
+
+    Args:
+        f_d: Damped frequency [Hz], shape (1,).
+        zeta: Damping ratio [-], shape (1,).
+        zeta_max: Exclusive upper limit of ζ [-].
+        longest: Longest delay [s].
+        period: Tick [s].
+        train: Amplitudes without damping [-] and times in damped periods [-], shape (2, N).
+        impulses: Result: amplitudes [-], times [s] and times in ticks, shape (3, N).
+        ring: `DelayLine.ring`.
+        head: `DelayLine.head`.
+        scratch: `DelayLine.scratch`.
+        out: Result: the shaped sample, shape (joints,).
+
+    Returns:
+        Whether the mode is in range and the delays are short enough; otherwise `out` is not changed.
+    """
+    f, z = f_d[0], zeta[0]
+    if not (LOWEST <= f <= HIGHEST and 0.0 <= z < zeta_max):
+        return False
+    A, tau, delays = impulses[0], impulses[1], impulses[2]
+    decay(train[0], train[1], f, z, A, tau)
+    for j in range(delays.shape[0]):
+        delays[j] = tau[j] / period
+    return tau[-1] <= longest and gather(ring, head, A, delays, scratch, out) < 0
 
 
 class TvistFilter(Filter):
@@ -43,7 +91,6 @@ class TvistFilter(Filter):
     max_delay: float
     f_d: Floats
     zeta: Floats
-    impulses: Impulses
 
     def __init__(
         self,
@@ -96,7 +143,10 @@ class TvistFilter(Filter):
         self._longest = longest
         self.shaper = shaper
         self.max_delay = max_delay
-        self.impulses = UNSHAPED
+        self._impulses: Impulses | None = UNSHAPED
+        train = shaper.train if estimator.modes == 1 else None
+        self._train = None if train is None else np.array(train)
+        self._work: Floats = np.zeros((3, 1 if train is None else len(train.a)))
         self.reset(self._q_star)
         self._check_made()
 
@@ -107,9 +157,16 @@ class TvistFilter(Filter):
         )
 
     @property
+    def impulses(self) -> Impulses:
+        """Impulses of the last tick."""
+        if self._impulses is None:
+            self._impulses = Impulses(self._work[0], self._work[1])
+        return self._impulses
+
+    @property
     def delay(self) -> float:
         """Time of the last tick's last impulse [s], by which the shaped reference ends later."""
-        return self.impulses.duration
+        return self._work.item(1, -1) if self._impulses is None else self._impulses.duration
 
     @property
     def mean_delay(self) -> float:
@@ -154,13 +211,13 @@ class TvistFilter(Filter):
         self.f_d, self.zeta = modes
         self.clipped = self.estimator.clipped
         try:
-            self.impulses = self._train()
+            self._impulses = self._computed()
         except FAILURES as error:
             self.fault = failure(error, self.f_d, self.zeta)
         else:
             self.fault = None
 
-    def _train(self) -> Impulses:
+    def _computed(self) -> Impulses:
         """Compute the shaper's impulses for the present modes."""
         give, f_d, zeta = self.shaper.impulses, self.f_d, self.zeta
         if len(f_d) == 1:  # the usual case, faster without lists
@@ -175,5 +232,17 @@ class TvistFilter(Filter):
 
     def _weigh(self) -> None:
         """Compute this tick's impulses for the modes at the last shaped reference (z⁻¹ in Figure 8), and apply them."""
-        self._suppress(self._modes())
-        self._line.gather(self.impulses.A, self.impulses.tau / self.period, self._q_star)
+        modes, line = self._modes(), self._line
+        if self._train is not None and shape(
+            *modes, self.shaper.zeta_max, self._longest * (1.0 + ROUNDING), self.period,
+            self._train, self._work, line.ring, line.head, line.scratch, self._q_star,
+        ):  # fmt: skip
+            self.f_d, self.zeta = modes
+            self.clipped, self.fault, self._impulses = self.estimator.clipped, None, None
+            return
+        self._suppress(modes)
+        line.gather(self.impulses.A, self.impulses.tau / self.period, self._q_star)
+
+    def _part(self) -> None:
+        super()._part()
+        self._work = self._work.copy()

@@ -13,9 +13,11 @@ leave V.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from tvist_shaping._compiled import compiled
 from tvist_shaping._types import Floats
 from tvist_shaping.amplitudes import modified, ripple
 from tvist_shaping.errors import ImpulseError, ShaperRangeError
@@ -102,7 +104,8 @@ def check_mode(f_d: float, zeta: float, zeta_max: float = 1.0, instead: str = ""
         raise ShaperRangeError("zeta", zeta, f"{limit}: beyond it {instead}" if instead else limit)
 
 
-def damped(a: Floats, periods: Floats, f_d: float, zeta: float) -> Impulses:
+@compiled
+def decay(a: Floats, periods: Floats, f_d: float, zeta: float, A: Floats, tau: Floats) -> None:
     """Apply damping to the amplitudes of an undamped shaper: each decays as the mode does until then.
 
     Args:
@@ -110,24 +113,55 @@ def damped(a: Floats, periods: Floats, f_d: float, zeta: float) -> Impulses:
         periods: Times in damped periods [-], shape (N,), ascending from 0.
         f_d: Damped frequency of the mode [Hz], checked.
         zeta: Damping ratio of the mode [-], checked.
-
-    Returns:
-        A_j = a_j exp(-2π ζ/√(1-ζ²) τ_j f_d), normalised, and τ_j.
+        A: Result: A_j = a_j exp(-2π ζ/√(1-ζ²) τ_j f_d), normalised [-], shape (N,).
+        tau: Result: τ_j [s], shape (N,).
     """
-    A = a * np.exp(-2.0 * math.pi * zeta / math.sqrt(1.0 - zeta * zeta) * periods)
-    return Impulses._by_construction(A / A.sum(), periods / f_d)  # noqa: SLF001  both come from this package
+    rate = -2.0 * math.pi * zeta / math.sqrt(1.0 - zeta * zeta)
+    total = 0.0
+    for j in range(a.shape[0]):
+        A[j] = a[j] * math.exp(rate * periods[j])
+        total += A[j]
+    for j in range(a.shape[0]):
+        A[j] /= total
+        tau[j] = periods[j] / f_d
 
 
-def _train(a: Sequence[float], distance: float, f_d: float, zeta: float) -> Impulses:
-    """Impulses a_j K^j, normalised, `distance` damped periods apart; the formula is in the module's docstring."""
-    check_mode(f_d, zeta)
-    K = math.exp(-2.0 * math.pi * distance * zeta / math.sqrt(1.0 - zeta * zeta))
-    decayed = [a_j * K**j for j, a_j in enumerate(a)]
-    total = sum(decayed)
-    return Impulses._by_construction(  # noqa: SLF001  this module makes the trains, checked above
-        np.array([A_j / total for A_j in decayed]),
-        np.array([j * distance / f_d for j in range(len(decayed))]),
-    )
+class Train(NamedTuple):
+    """A shaper without damping, of which `decay` makes the impulses of a mode."""
+
+    a: Floats
+    """Amplitudes [-], shape (N,), sum positive."""
+    periods: Floats
+    """Times in damped periods [-], shape (N,), ascending from 0."""
+
+    @classmethod
+    def spaced(cls, a: Sequence[float], distance: float) -> "Train":
+        """Return the train of impulses a_j that are `distance` damped periods apart."""
+        return cls(np.array(a, dtype=float), distance * np.arange(len(a)))
+
+    def of(self, f_d: float, zeta: float) -> Impulses:
+        """Return the impulses of a mode that is checked: its damped frequency [Hz] and damping ratio [-]."""
+        A, tau = np.empty((2, len(self.a)))
+        decay(self.a, self.periods, f_d, zeta, A, tau)
+        return Impulses._by_construction(A, tau)  # noqa: SLF001  both come from this package
+
+    def at(self, f_d: float, zeta: float) -> Impulses:
+        """Return the impulses of a mode.
+
+        Raises:
+            ShaperRangeError: See `check_mode`.
+        """
+        check_mode(f_d, zeta)
+        return self.of(f_d, zeta)
+
+
+NONE = Train.spaced((1.0,), 0.0)
+ZV = Train.spaced((1.0, 1.0), 0.5)
+ZVD = Train.spaced((1.0, 2.0, 1.0), 0.5)
+ZVDD = Train.spaced((1.0, 3.0, 3.0, 1.0), 0.5)
+ZVDDD = Train.spaced((1.0, 4.0, 6.0, 4.0, 1.0), 0.5)
+MZV = Train.spaced(modified(3, 0.75).tolist(), 0.375)
+EI, EI2, EI3 = (Train.spaced(ripple(humps, V).tolist(), 0.5) for humps in (1, 2, 3))
 
 
 def none(f_d: float, zeta: float) -> Impulses:
@@ -143,7 +177,7 @@ def none(f_d: float, zeta: float) -> Impulses:
     Raises:
         ShaperRangeError: f_d or ζ is outside the range above.
     """
-    return _train((1.0,), 0.0, f_d, zeta)
+    return NONE.at(f_d, zeta)
 
 
 def zv(f_d: float, zeta: float) -> Impulses:
@@ -162,7 +196,7 @@ def zv(f_d: float, zeta: float) -> Impulses:
     Raises:
         ShaperRangeError: f_d or ζ is outside the range above.
     """
-    return _train((1.0, 1.0), 0.5, f_d, zeta)
+    return ZV.at(f_d, zeta)
 
 
 def zvd(f_d: float, zeta: float) -> Impulses:
@@ -180,7 +214,7 @@ def zvd(f_d: float, zeta: float) -> Impulses:
     Raises:
         ShaperRangeError: f_d or ζ is outside the range above.
     """
-    return _train((1.0, 2.0, 1.0), 0.5, f_d, zeta)
+    return ZVD.at(f_d, zeta)
 
 
 def zvdd(f_d: float, zeta: float) -> Impulses:
@@ -196,7 +230,7 @@ def zvdd(f_d: float, zeta: float) -> Impulses:
     Raises:
         ShaperRangeError: f_d or ζ is outside the range above.
     """
-    return _train((1.0, 3.0, 3.0, 1.0), 0.5, f_d, zeta)
+    return ZVDD.at(f_d, zeta)
 
 
 def zvddd(f_d: float, zeta: float) -> Impulses:
@@ -213,7 +247,7 @@ def zvddd(f_d: float, zeta: float) -> Impulses:
     Raises:
         ShaperRangeError: f_d or ζ is outside the range above.
     """
-    return _train((1.0, 4.0, 6.0, 4.0, 1.0), 0.5, f_d, zeta)
+    return ZVDDD.at(f_d, zeta)
 
 
 def mzv(f_d: float, zeta: float) -> Impulses:
@@ -232,11 +266,7 @@ def mzv(f_d: float, zeta: float) -> Impulses:
     Raises:
         ShaperRangeError: f_d or ζ is outside the range above.
     """
-    return _train(_MZV, 0.375, f_d, zeta)
-
-
-_MZV = tuple(modified(3, 0.75).tolist())
-_EI, _EI2, _EI3 = (tuple(ripple(humps, V).tolist()) for humps in (1, 2, 3))
+    return MZV.at(f_d, zeta)
 
 
 def ei(f_d: float, zeta: float) -> Impulses:
@@ -256,7 +286,7 @@ def ei(f_d: float, zeta: float) -> Impulses:
     Raises:
         ShaperRangeError: f_d or ζ is outside the range above.
     """
-    return _train(_EI, 0.5, f_d, zeta)
+    return EI.at(f_d, zeta)
 
 
 def ei2(f_d: float, zeta: float) -> Impulses:
@@ -276,7 +306,7 @@ def ei2(f_d: float, zeta: float) -> Impulses:
     Raises:
         ShaperRangeError: f_d or ζ is outside the range above.
     """
-    return _train(_EI2, 0.5, f_d, zeta)
+    return EI2.at(f_d, zeta)
 
 
 def ei3(f_d: float, zeta: float) -> Impulses:
@@ -295,7 +325,7 @@ def ei3(f_d: float, zeta: float) -> Impulses:
     Raises:
         ShaperRangeError: f_d or ζ is outside the range above.
     """
-    return _train(_EI3, 0.5, f_d, zeta)
+    return EI3.at(f_d, zeta)
 
 
 def product(trains: Sequence[Impulses]) -> Impulses:

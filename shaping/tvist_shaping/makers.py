@@ -6,11 +6,10 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from tvist_shaping._types import Floats
 from tvist_shaping.amplitudes import modified, ripple
 from tvist_shaping.errors import DesignError
 from tvist_shaping.exact import exact as exact_humps
-from tvist_shaping.impulses import Impulses, V, check_mode, damped
+from tvist_shaping.impulses import Impulses, Train, V, check_mode
 from tvist_shaping.sensitivity import residual
 from tvist_shaping.shaper import Shaper
 from tvist_shaping.specified import specified
@@ -31,9 +30,9 @@ def mzv_of(n: int = 3, t: float = 0.75, *, name: str = "", description: str = ""
     Raises:
         DesignError: n or t is out of range, or an amplitude would be negative.
     """
-    a, periods = modified(n, t), np.linspace(0.0, t, n)
+    train = Train(modified(n, t), np.linspace(0.0, t, n))
     what = description or f"modified zero vibration, {n} impulses in {t:g} periods"
-    return Shaper(name or f"mzv({n},{t:g})", what, partial(_decayed, a, periods, 1.0), t)
+    return Shaper(name or f"mzv({n},{t:g})", what, train.at, t, train=train)
 
 
 def ei_of(
@@ -62,8 +61,8 @@ def ei_of(
         made = exact_humps(humps, V)
         return Shaper(name or f"ei_exact({humps},{V:g})", what, made, made.duration_periods, made.zeta_max)
     duration = (humps + 1) / 2.0
-    periods = np.linspace(0.0, duration, humps + 2)
-    return Shaper(name or f"ei({humps},{V:g})", what, partial(_decayed, a, periods, 1.0), duration)
+    train = Train(a, np.linspace(0.0, duration, humps + 2))
+    return Shaper(name or f"ei({humps},{V:g})", what, train.at, duration, train=train)
 
 
 def si_of(
@@ -89,16 +88,17 @@ def si_of(
         raise DesignError("low", low, "above 0 and at most 1, the assumed frequency")
     if not 1.0 <= high < math.inf:
         raise DesignError("high", high, "at least 1, the assumed frequency")
-    a, periods = specified(low, high, V)
+    train = Train(*specified(low, high, V))
     zeta_max, f = 0.0, np.linspace(low, high, 301)
     for zeta in np.linspace(0.0, 0.99, 100):
-        if residual(f, zeta, damped(a, periods, 1.0, zeta)).max() > V * (1.0 + SMALL):
+        if residual(f, zeta, train.of(1.0, zeta)).max() > V * (1.0 + SMALL):
             break
         zeta_max = float(zeta)
     zeta_max = 1.0 if zeta_max > 0.985 else zeta_max
     what = description or f"specified insensitivity: at most {100.0 * V:g} % from {low:g} to {high:g}"
-    function = partial(_decayed, a, periods, zeta_max)
-    return Shaper(name or f"si({low:g},{high:g},{V:g})", what, function, float(periods[-1]), zeta_max)
+    function = partial(_checked, train, zeta_max)
+    duration = float(train.periods[-1])
+    return Shaper(name or f"si({low:g},{high:g},{V:g})", what, function, duration, zeta_max, train=train)
 
 
 def custom(
@@ -142,9 +142,9 @@ def custom(
     )
 
 
-def _decayed(a: Floats, periods: Floats, zeta_max: float, f_d: float, zeta: float) -> Impulses:
-    """Apply `damped` to a mode after checking it."""
+def _checked(train: Train, zeta_max: float, f_d: float, zeta: float) -> Impulses:
+    """Return the impulses of a mode after checking it."""
     check_mode(
         f_d, zeta, zeta_max, "" if zeta_max == 1.0 else "more than V is left: take a higher V or ei_of"
     )
-    return damped(a, periods, f_d, zeta)
+    return train.of(f_d, zeta)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from tvist_shaping.errors import ShaperFailureError
-from tvist_shaping.impulses import Impulses
+from tvist_shaping.impulses import Impulses, Train
 from tvist_shaping.sensitivity import band
 
 
@@ -20,6 +20,8 @@ class Shaper:
         zeta_max: Damping ratios must stay below this [-].
         peak: Σ|A_j|, the largest factor by which it may exceed its reference's velocity and acceleration while f_d
             and ζ are constant; 1 for positive impulses [-].
+        train: The impulses without damping, if `function` only applies damping to them; then a filter computes them in
+            compiled code instead.
     """
 
     name: str
@@ -28,6 +30,7 @@ class Shaper:
     duration_periods: float
     zeta_max: float = 1.0
     peak: float = 1.0
+    train: Train | None = None
 
     def impulses(self, f_d: float, zeta: float) -> Impulses:
         """Call `function`, and check that it returns impulses, since it may be the user's.

@@ -236,6 +236,16 @@ def collect_torques(scratch: Floats, torque: Floats) -> None:
 
 
 @compiled
+def collect_gravity(scratch: Floats, gravity: float, torque: Floats) -> None:
+    """Torques on the joints that balance gravity, after a sweep with any velocities, shape (N,) [N m]."""
+    m = x = y = 0.0
+    for j in range(torque.shape[0] - 1, -1, -1):
+        row = scratch[j]
+        m, x, y = m + row[6], x + row[7], y + row[8]
+        torque[j] = gravity * (row[0] * y - row[1] * x + row[5] * m)
+
+
+@compiled
 def collect_inertia(scratch: Floats, M: Floats) -> None:
     """Upper triangle of the mass matrix after a sweep, shape (N, N) [kg m^2]; inertias are then those from there on."""
     W = np.empty(6)

@@ -151,7 +151,7 @@ def factorise(arm: ArmMemory, h: float) -> None:
 
 
 @compiled
-def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901 - one kernel: its branches are the loops over rows and joints
+def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0915 - one kernel: its branches are the loops over rows and joints
     """Advance the state in place by one period; afterwards the LAST entries contain those of the present tick.
 
     Args:

@@ -42,19 +42,11 @@ class Watched:
             description, tvist, q=q, declared=disc(declared), carried=disc(carried), seed=seed
         )
         self.monitor = PayloadMonitor(description, disc(declared))
-        self.fed = None
-        command = self.cycle._feed_forward._plain.command
-
-        def watched(target, torque, gravity):
-            self.fed = command(target, torque, gravity)
-            return self.fed
-
-        self.cycle._feed_forward._plain.command = watched
         self.worst = 0.0
 
     def step(self):
         sample = self.cycle.step()
-        said = self.monitor.update(sample.target, self.fed.torque, sample.measured.moment)
+        said = self.monitor.update(sample.target, sample.fed_forward, sample.measured.moment)
         mass, bound = self.monitor.excess
         if self.monitor._time > 1.0 and np.isfinite(bound):
             self.worst = max(self.worst, abs(mass) / (TOLERATED + bound))

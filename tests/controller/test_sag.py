@@ -36,13 +36,13 @@ def line(description=UR5E, mass=5.0, q=Q1, *, compensated=True, name="none", **c
 
 def commands_of(cycle):
     """Commands to the drives from now on, and the references that they belong to."""
-    found, made = [], cycle._feed_forward._plain.command
+    found, made = [], cycle._feed_forward.command
 
-    def watched(target, torque, gravity):
-        found.append((made(target, torque, gravity), target))
+    def watched(target, *arguments, **options):
+        found.append((made(target, *arguments, **options), target))
         return found[-1][0]
 
-    cycle._feed_forward._plain.command = watched
+    cycle._feed_forward.command = watched
     return found
 
 

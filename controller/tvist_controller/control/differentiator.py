@@ -7,6 +7,8 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
 
+from tvist_controller._compiled import compiled
+
 Floats = npt.NDArray[np.float64]
 
 
@@ -36,6 +38,24 @@ def central_differences(references: Floats, period: float) -> tuple[Floats, Floa
     return references[1:-1], qd, qdd
 
 
+@compiled
+def differentiate(before: Floats, middle: Floats, last: Floats, period: float, rates: Floats) -> None:
+    """Central differences at the middle one of three references, each of shape (n,) [rad].
+
+    Args:
+        before: First reference.
+        middle: Second reference.
+        last: Third reference.
+        period: Tick [s].
+        rates: Velocity [rad/s] and acceleration [rad/s^2], shape (2, n).
+    """
+    for j in range(middle.shape[0]):
+        # Take differences of neighbours first, so that rounding does not grow with the position.
+        rise, fall = last[j] - middle[j], middle[j] - before[j]
+        rates[0, j] = (rise + fall) / (2.0 * period)
+        rates[1, j] = (rise - fall) / (period * period)
+
+
 class Differentiator:
     """Central differences: q̇ᵢ = (qᵢ₊₁ - qᵢ₋₁)/2h and q̈ᵢ = (qᵢ₊₁ - 2qᵢ + qᵢ₋₁)/h².
 
@@ -60,20 +80,24 @@ class Differentiator:
 
     def update(self, q: Floats) -> Target:
         """Take the reference of this tick and return the target of the previous tick."""
-        before, middle = self._middle, self._last
-        self._before, self._middle, self._last = before, middle, q
-        return self._central(before, middle, q)
+        self.push(q)
+        return self.published
+
+    def push(self, q: Floats) -> None:
+        """Take the reference of this tick."""
+        self._before, self._middle, self._last = self._middle, self._last, q
+
+    @property
+    def window(self) -> tuple[Floats, Floats, Floats]:
+        """The last three references, the oldest first, each of shape (n,) [rad]."""
+        return self._before, self._middle, self._last
 
     @property
     def published(self) -> Target:
         """State of motion one tick before the newest reference, where central differences are accurate to order h²."""
-        return self._central(self._before, self._middle, self._last)
-
-    def _central(self, before: Floats, middle: Floats, last: Floats) -> Target:
-        h = self._period
-        # Take differences of neighbours first, so that rounding does not grow with the position.
-        rise, fall = last - middle, middle - before
-        return Target(q=middle, qd=(rise + fall) / (2.0 * h), qdd=(rise - fall) / (h * h))
+        rates = np.empty((2, len(self._middle)))
+        differentiate(self._before, self._middle, self._last, self._period, rates)
+        return Target(self._middle, *rates)
 
     @property
     def position(self) -> Floats:

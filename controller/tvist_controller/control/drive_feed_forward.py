@@ -38,14 +38,14 @@ class DriveFeedForward:
     """
 
     def __init__(self, description: RobotDescription, period: float, *, compensate_sag: bool = False) -> None:
-        self._plain = JointControllers(description, period, compensate_sag=compensate_sag)
+        self._joints = JointControllers(description, period, compensate_sag=compensate_sag)
+        self.rows = self._joints.rows
+        """Parameters and state of the paper's joint controllers, see `joint_controllers`."""
         self.wanted: ElasticFeedForward | None = None
         """The elastic feed-forward in use, or about to be; None for that of the paper's controller."""
         self._elastic: ElasticFeedForward | None = None
         self._share, self._rising = 0, False
         self._rate = 1.0 / (FADE * period)
-        self._skipped: tuple[Target, Floats, Floats] | None = None
-        """Arguments for which the plain command was not computed at the last tick."""
         self.reference: MotorReference | None = None
         """Motion of the motors in the last command; None without elastic feed-forward."""
 
@@ -72,8 +72,7 @@ class DriveFeedForward:
         Args:
             gravity: Torque that balances gravity there, shape (n,) [N m].
         """
-        self._plain.reset(gravity)
-        self._skipped = None
+        self._joints.reset(gravity)
         self._begin()
         self._share = self._full
 
@@ -83,6 +82,7 @@ class DriveFeedForward:
         torque: Floats,
         gravity: Floats,
         carried: Floats,
+        plain: DriveCommand,
         *,
         may_begin: bool = True,
         may_go_on: bool = True,
@@ -94,6 +94,7 @@ class DriveFeedForward:
             torque: τ* of the rigid arm, shape (n,) [N m].
             gravity: The part of the torque that balances gravity, shape (n,) [N m].
             carried: Inertial parameters of the payload, see `InverseDynamics.carried`.
+            plain: Command of the paper's joint controllers for the target.
             may_begin: Whether the reference is smooth enough to begin with elastic feed-forward.
             may_go_on: Whether it is smooth enough to go on with it, as a stop is.
         """
@@ -101,12 +102,10 @@ class DriveFeedForward:
         elastic = self._elastic
         if elastic is None or self._share == 0:
             self.reference = None
-            return self._continued(target, torque, gravity)
-        command = elastic.command(target, torque, carried, self._plain.sag(gravity))
+            return plain
+        command = elastic.command(target, torque, carried, self._joints.sag(gravity))
         if self._share < FADE:
-            command = self._blend(self._continued(target, torque, gravity), command)
-        else:
-            self._skipped = (target, torque, gravity)
+            command = self._blend(plain, command)
         self.reference = MotorReference(command.qd, elastic.qdd, command.torque, elastic.limited)
         return command
 
@@ -131,13 +130,6 @@ class DriveFeedForward:
         if self._share in {0, FADE}:
             self._rising = rises
         self._share = min(max(self._share + (1 if self._rising else -1), 0), FADE)
-
-    def _continued(self, target: Target, torque: Floats, gravity: Floats) -> DriveCommand:
-        """Plain command, which differentiates the wind-up from tick to tick."""
-        if self._skipped is not None:
-            self._plain.command(*self._skipped)
-            self._skipped = None
-        return self._plain.command(target, torque, gravity)
 
     def _blend(self, plain: DriveCommand, elastic: DriveCommand) -> DriveCommand:
         """Mixture of both commands, whose velocity is the derivative of its position."""

@@ -1,14 +1,24 @@
 """Torques that a motion of the rigid arm needs."""
 
 import numpy as np
-import pinocchio as pin
 
+from tvist_controller._compiled import compiled
 from tvist_controller.control.differentiator import Floats
+from tvist_plant.chain import BODY, SCRATCH, chain_of, collect_inertia, sweep, torques
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, payload_inertia, rigid_model
 
 SLEW = 250
 """Ticks over which a new payload is phased in."""
+
+
+@compiled
+def torques_of(
+    chain: Floats, q: Floats, qd: Floats, qdd: Floats, gravity: float, bodies: Floats, found: Floats
+) -> None:
+    """Torques for k states of motion, each of shape (k, n); other arguments as in `tvist_plant.chain.torques`."""
+    for k in range(q.shape[0]):
+        torques(chain, q[k], qd[k], qdd[k], gravity, bodies, found[k])
 
 
 class InverseDynamics:
@@ -24,11 +34,16 @@ class InverseDynamics:
     """
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
-        self._model = rigid_model(description, Payload())
-        self._data = self._model.createData()
-        flange = self._model.frames[self._model.getFrameId(FLANGE)]
-        self._last, self._flange = flange.parentJoint, flange.placement
-        self._bare = self._model.inertias[self._last].toDynamicParameters()
+        model = rigid_model(description, Payload())
+        flange = model.getFrameId(FLANGE)
+        self.chain = chain_of(model, flange)
+        """Parameters of the links, with the payload in use, see `tvist_plant.chain`, shape (n+1, 22)."""
+        self.scratch = np.zeros((description.joints + 1, SCRATCH))
+        """Scratch of `tvist_plant.chain`, shape (n+1, 28)."""
+        self.gravitation = -float(model.gravity.linear[2])
+        """Gravitational acceleration along the base's negative z axis [m/s^2]."""
+        self._flange = model.frames[flange].placement
+        self._bare = self.chain[-2, BODY:].copy()
         self._before = self._present = self._after = self._bare
         self._ticks_left, self._slew = 0, SLEW
         self.carried = np.zeros_like(self._bare)
@@ -88,29 +103,32 @@ class InverseDynamics:
 
     def torque(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
         """τ = M(q) q̈ + C(q, q̇) q̇ + g(q), shape (n,) [N m]."""
-        return np.array(pin.rnea(self._model, self._data, q, qd, qdd))
+        found = np.empty(len(q))
+        torques(self.chain, q, qd, qdd, self.gravitation, self.scratch, found)
+        return found
 
     def torques(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
         """Torques for k states of motion, each argument of shape (k, n): shape (k, n) [N m]."""
         found = np.empty_like(q)
-        for number in range(len(q)):
-            found[number] = pin.rnea(self._model, self._data, q[number], qd[number], qdd[number])
+        torques_of(self.chain, q, qd, qdd, self.gravitation, self.scratch, found)
         return found
 
     def gravities(self, q: Floats) -> Floats:
         """g(q) at k postures, shape (k, n) [N m]."""
-        found = np.empty_like(q)
-        for number in range(len(q)):
-            found[number] = pin.computeGeneralizedGravity(self._model, self._data, q[number])
-        return found
+        still = np.zeros_like(q)
+        return self.torques(q, still, still)
 
     def gravity(self, q: Floats) -> Floats:
         """g(q), shape (n,) [N m]."""
-        return np.array(pin.computeGeneralizedGravity(self._model, self._data, q))
+        still = np.zeros(len(q))
+        return self.torque(q, still, still)
 
     def inertia(self, q: Floats) -> Floats:
         """M(q), shape (n, n) [kg m^2]."""
-        return np.array(pin.crba(self._model, self._data, q, pin.Convention.WORLD))
+        still, M = np.zeros(len(q)), np.zeros((len(q), len(q)))
+        sweep(self.chain, q, still, still, 0.0, self.scratch)
+        collect_inertia(self.scratch, M)
+        return np.asarray(M + np.triu(M, 1).T)
 
     def effort(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
         """Largest |τ| over all of `bodies`, shape (n,) [N m]: while a payload is phased in, either one may be right."""
@@ -127,4 +145,4 @@ class InverseDynamics:
         """Set the inertial parameters of the last link with its payload in place, since building a model takes long."""
         self._present = parameters
         self.carried = parameters - self._bare
-        self._model.inertias[self._last] = pin.Inertia.FromDynamicParameters(parameters)
+        self.chain[-2, BODY:] = parameters

@@ -44,17 +44,23 @@ class ShapedReference:
         """Return the joint positions that a sample stands for, shape (n,) [rad]."""
         return sample if self.posture_of is None else self.posture_of(sample)
 
-    def update(self, sample: Floats, posture: Floats | None = None) -> Target:
-        """Take the sample of this tick and return the target of the previous tick.
+    def push(self, sample: Floats, posture: Floats | None = None) -> None:
+        """Take the sample of this tick.
 
         Args:
             sample: Sample, shape (m,) or (n,) [rad].
             posture: The joint positions that it stands for, if they are known, shape (n,) [rad].
         """
         if self.posture_of is None:
-            return self.joints.update(sample)
-        self.along.update(sample)
-        return self.joints.update(self.posture_of(sample) if posture is None else posture)
+            self.joints.push(sample)
+            return
+        self.along.push(sample)
+        self.joints.push(self.posture_of(sample) if posture is None else posture)
+
+    def update(self, sample: Floats, posture: Floats | None = None) -> Target:
+        """Take the sample of this tick, as `push` does, and return the target of the previous tick."""
+        self.push(sample, posture)
+        return self.joints.published
 
     def fork(self) -> Self:
         """Return an independent copy of the present state."""

@@ -48,7 +48,8 @@ def evaluate(
     multiples: npt.NDArray[np.int64],
     coefficients: Floats,
     ranges: Floats,
-) -> tuple[float, float, bool]:
+    modes: Floats,
+) -> bool:
     """Evaluate both polynomials at one configuration.
 
     Args:
@@ -60,9 +61,10 @@ def evaluate(
         multiples: `BasisFunctions.multiples`, shape (rows, k).
         coefficients: Coefficients of f_d and ζ, shape (2, terms).
         ranges: Range of f_d and range of ζ, shape (2, 2).
+        modes: Result: f_d [Hz] and ζ [-], shape (2, 1).
 
     Returns:
-        f_d [Hz], ζ [-], and whether one of them was clamped to its range.
+        Whether one of them was clamped to its range.
     """
     f_d = 0.0
     zeta = 0.0
@@ -91,7 +93,9 @@ def evaluate(
             zeta += coefficients[1, term] * monomial
             term += 1
     inside = ranges[0, 0] <= f_d <= ranges[0, 1] and ranges[1, 0] <= zeta <= ranges[1, 1]
-    return saturate(f_d, ranges[0, 0], ranges[0, 1]), saturate(zeta, ranges[1, 0], ranges[1, 1]), not inside
+    modes[0, 0] = saturate(f_d, ranges[0, 0], ranges[0, 1])
+    modes[1, 0] = saturate(zeta, ranges[1, 0], ranges[1, 1])
+    return not inside
 
 
 class Polynomial(Estimator):
@@ -192,7 +196,8 @@ class Polynomial(Estimator):
         """
         if q.shape[0] < self._joints_needed:
             raise EstimatorError("q", q.shape, f"of at least {self._joints_needed} joints")
-        f_d, zeta, self.saturating = evaluate(
+        modes = np.empty((2, 1))
+        self.saturating = evaluate(
             q,
             self._joints,
             self._trigonometric,
@@ -201,8 +206,9 @@ class Polynomial(Estimator):
             self._multiples,
             self._coefficients,
             self._ranges,
+            modes,
         )
-        return np.array([f_d]), np.array([zeta])
+        return modes[0], modes[1]
 
     def _row(self, name: str, coefficients: npt.ArrayLike) -> Floats:
         row = np.array(coefficients, dtype=float)

@@ -1,0 +1,46 @@
+"""Figure 6 of the paper from the shaped reference to the drives' commands, in one compiled function.
+
+The boxes are in their own modules; called one by one from Python, they would take three times as long.
+"""
+
+from tvist_controller._compiled import compiled
+from tvist_controller.control.differentiator import Floats, differentiate
+from tvist_controller.control.joint_controllers import command_drives
+from tvist_plant.chain import collect_gravity, torques
+
+QD, QDD, TORQUE, STATIC, Q_R, QD_R, TORQUE_FF, SIGNALS = range(8)
+"""Rows of the signals of a tick: q̇* and q̈*, τ* and the part of it that balances gravity, and the command q_r, q̇_r and
+τ_ff; their number.
+"""
+
+
+@compiled
+def to_drives(
+    before: Floats,
+    middle: Floats,
+    last: Floats,
+    period: float,
+    chain: Floats,
+    gravity: float,
+    bodies: Floats,
+    joints: Floats,
+    signals: Floats,
+) -> None:
+    """Compute the drives' commands for the middle one of three shaped references.
+
+    Args:
+        before: First reference, shape (n,) [rad].
+        middle: Second reference q*.
+        last: Third reference, which is that of this tick.
+        period: Tick [s].
+        chain: Links of the rigid arm with its declared payload, shape (n+1, 22).
+        gravity: Gravitational acceleration [m/s^2].
+        bodies: Scratch, shape (n+1, 28).
+        joints: Parameters of the joint controllers, shape (8, n); their wind-up is changed.
+        signals: Result, shape (7, n), see `SIGNALS`.
+    """
+    rates, torque, static = signals[QD : QDD + 1], signals[TORQUE], signals[STATIC]
+    differentiate(before, middle, last, period, rates)
+    torques(chain, middle, rates[0], rates[1], gravity, bodies, torque)
+    collect_gravity(bodies, gravity, static)
+    command_drives(middle, rates, torque, static, joints, signals[Q_R:])
