@@ -30,6 +30,7 @@ from tvist_controller.planning.plan import QUESTIONS, Plan
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.player import ProgramPlayer
 from tvist_controller.refusal import RefusalError, check_content
+from tvist_controller.report import Report
 from tvist_controller.reporting import Reporter, truth_of
 from tvist_controller.safety_control import SafetyControl
 from tvist_controller.session import NoControlError, Session
@@ -102,10 +103,8 @@ class Controller:
         )  # fmt: skip
         for part in parts:
             self._commands.add(part.rows)
-        self.latest = self._state(self.cycle.standing)
-        """State of the last tick, or the state at rest if the arm has not ticked yet or has been placed somewhere
-        since.
-        """
+        self.report = self._report(self.cycle.standing)
+        """Report of the last tick, or of the arm at rest if it has not ticked yet or was placed somewhere since."""
 
     @property
     def rows(self) -> tuple[Row, ...]:
@@ -191,7 +190,12 @@ class Controller:
 
     # ------------------------------------------------------------------ outputs
 
-    def tick(self) -> tuple[State, list[Event]]:
+    @property
+    def latest(self) -> State:
+        """State of the last tick; see `report`."""
+        return self.report.state
+
+    def tick(self) -> tuple[Report, list[Event]]:
         """Compute one control period."""
         self.begin_tick()
         return self.complete_tick()
@@ -201,7 +205,7 @@ class Controller:
         self._watch_time()
         self.programs.advance(self.tick_number + 1)
 
-    def complete_tick(self) -> tuple[State, list[Event]]:
+    def complete_tick(self) -> tuple[Report, list[Event]]:
         """Compute the rest of a control period that has begun."""
         try:
             sample = self.motion.step()
@@ -214,21 +218,20 @@ class Controller:
         self._stop_reasons.update(self.motion.activity.robot_mode, self.motion.safety_mode)
         self.tick_number += 1
         events, self._events = self._events, []
-        self.latest = self._state(sample)
-        self.programs.steadiness.note(self.latest.actual_q, at_rest=self.cycle.at_rest)
-        return self.latest, events
+        self.report = self._report(sample)
+        self.programs.steadiness.note(sample.measured.q, at_rest=self.cycle.at_rest)
+        return self.report, events
 
-    def _state(self, sample: Sample) -> State:
-        return self._reporter.state(
+    def _report(self, sample: Sample) -> Report:
+        motion, robot_mode = self.motion, self.motion.activity.robot_mode
+        return self._reporter.report(
             self.tick_number,
             sample,
             self.cycle.tvist,
             self.cycle.drive_delay,
-            robot_mode=self.motion.activity.robot_mode,
-            safety_mode=self.motion.safety_mode,
-            runtime=self.motion.runtime,
-            speed=self.motion.motions.speed,
-            setpoint_sequence=self.motion.streams.sequence,
+            modes=(int(robot_mode), int(motion.safety_mode), int(motion.runtime)),
+            speed=motion.motions.speed,
+            setpoint_sequence=motion.streams.sequence,
             missed_ticks=self.counters.missed_ticks,
         )
 
@@ -337,7 +340,7 @@ class Controller:
         self.motion.put(command.mode)
         if command.mode is not None:
             self._stop_reasons.forget()
-        self.latest = self._state(self.cycle.standing)
+        self.report = self._report(self.cycle.standing)
         self._payload.begin_anew()
         self._reporter.forget_modes()
         self.programs.steadiness.forget()

@@ -153,10 +153,11 @@ class ControlCycle:
         # Comparing bytes is several times as fast as comparing arrays.
         alike, unshaped = x_star is x or x_star.tobytes() == x.tobytes(), None
         if not alike or self._unshaped.apart is not None:
-            unshaped = self._unshaped.update(reference, self._shaped.joints, alike=alike)
+            unshaped = self._unshaped.push(reference, self._shaped.joints, alike=alike)
         self._shaped.push(x_star, reference if alike else None)
         self.inverse_dynamics.advance()
-        target, torque, gravity, plain = self._to_drives()  # q*, q̇*, q̈* a tick earlier, τ* [N m]
+        # q*, q̇*, q̈* a tick earlier, the same without the filter, and τ* [N m]
+        target, without, torque, gravity, plain = self._to_drives(unshaped)
         carried = self.inverse_dynamics.carried
         command = self._feed_forward.command(
             target, torque, gravity, carried, plain,
@@ -165,19 +166,26 @@ class ControlCycle:
         measured = self._plant.step(command)
         self._settle(reference, target)
         motors = self._feed_forward.reference
-        return Sample(reference, target, torque, command.torque, measured, unshaped, motors)
+        return Sample(reference, target, torque, command.torque, measured, without, motors)
 
-    def _to_drives(self) -> tuple[Target, Floats, Floats, DriveCommand]:
-        """Return the target, its torque, the part of that which balances gravity, and the command for it."""
-        dynamics = self.inverse_dynamics
-        before, middle, last = self._shaped.joints.window
-        signals = np.empty((SIGNALS, len(middle)))
+    def _to_drives(
+        self, unshaped: Differentiator | None
+    ) -> tuple[Target, Target | None, Floats, Floats, DriveCommand]:
+        """Return the target with and without the filter, its torque, how much of it balances gravity, and the command.
+
+        Args:
+            unshaped: State of motion without the filter; None if it is the same.
+        """
+        dynamics, joints = self.inverse_dynamics, self._shaped.joints
+        window, other = joints.window, (joints if unshaped is None else unshaped).window
+        signals = np.empty((SIGNALS, len(window[1])))
         to_drives(
-            before, middle, last, PERIOD, dynamics.chain, dynamics.gravitation, dynamics.scratch,
-            self._feed_forward.rows, signals,
+            *window, *other, PERIOD, dynamics.chain, dynamics.gravitation, dynamics.scratch, self._feed_forward.rows,
+            signals,
         )  # fmt: skip
-        qd, qdd, torque, gravity, q_r, qd_r, torque_ff = signals
-        return Target(middle, qd, qdd), torque, gravity, DriveCommand(q_r, qd_r, torque_ff)
+        u_qd, u_qdd, qd, qdd, torque, gravity, q_r, qd_r, torque_ff = signals
+        without = None if unshaped is None else Target(other[1], u_qd, u_qdd)
+        return Target(window[1], qd, qdd), without, torque, gravity, DriveCommand(q_r, qd_r, torque_ff)
 
     def _give_up(self, error: StuckError) -> Floats:
         """Return the first reference of the stop from the last shaped one, since the trajectory cannot go on."""
@@ -324,7 +332,7 @@ class ControlCycle:
         self._shaped.reset(q)
         self._unshaped.join()
         self._feed_forward.reset(self.inverse_dynamics.gravity(q))
-        target, torque, gravity, plain = self._to_drives()
+        target, _, torque, gravity, plain = self._to_drives(None)
         command = self._feed_forward.command(target, torque, gravity, self.inverse_dynamics.carried, plain)
         measured = self._plant.reset(command, payload=carried, seed=seed)
         self.standing = Sample(q, target, torque, command.torque, measured)

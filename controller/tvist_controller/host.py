@@ -123,12 +123,12 @@ class Host:
         if io is not None:
             for sink in self._sinks:
                 sink.io(io)
-        state, events = self.controller.complete_tick()
+        report, events = self.controller.complete_tick()
         truth = self.controller.truth() if self.controller.setup.truth else None
         for sink in self._sinks:
             for event in events:
                 sink.event(event)
-            sink.state(state)
+            sink.report(report)
             if truth is not None:
                 sink.truth(truth)
         told = self.standing

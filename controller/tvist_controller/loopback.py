@@ -4,13 +4,14 @@ from collections.abc import Callable
 
 from tvist_controller.controller import Controller
 from tvist_controller.host import Host
+from tvist_controller.report import Report
 from tvist_controller.setup import Setup
 from tvist_controller.sink import Sink, Topic
 from tvist_plant.plant import Plant
 from tvist_protocol.codec import encode
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
-from tvist_protocol.stream import Event, State, Truth
+from tvist_protocol.stream import Event, Truth
 
 
 class LoopbackHost(Sink):
@@ -48,14 +49,17 @@ class LoopbackHost(Sink):
         callbacks = self._callbacks.setdefault(topic, [])
         callbacks.append(callback)
         if topic == "state":
-            callback(encode(self.controller.latest))
+            callback(self.controller.report.encoded)
         elif topic == "io":
             callback(encode(self.controller.io()))
         return lambda: callbacks.remove(callback)
 
-    def state(self, state: State) -> None:
+    def report(self, report: Report) -> None:
         """Pass on a state."""
-        self._put("state", state)
+        callbacks = self._callbacks.get("state")
+        if callbacks:
+            for callback in tuple(callbacks):
+                callback(report.encoded)
 
     def event(self, event: Event) -> None:
         """Pass on an event."""
@@ -73,7 +77,7 @@ class LoopbackHost(Sink):
         """Store an entry."""
         self.entries.append(entry)
 
-    def _put(self, topic: Topic, message: State | Event | Truth | Io) -> None:
+    def _put(self, topic: Topic, message: Event | Truth | Io) -> None:
         callbacks = self._callbacks.get(topic)
         if callbacks:
             data = encode(message)

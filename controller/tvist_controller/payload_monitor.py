@@ -3,11 +3,13 @@
 import numpy as np
 import pinocchio as pin
 
+from tvist_controller._compiled import compiled
 from tvist_controller.control.differentiator import Floats, Target
 from tvist_controller.control.inverse_dynamics import SLEW
+from tvist_plant.chain import BODY, SCRATCH, chain_of, torques
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, carries_weight, rigid_model
-from tvist_plant.plant import PERIOD
+from tvist_plant.plant import GRAVITY, PERIOD
 
 EVERY = 10
 """Number of ticks that are averaged into one measurement."""
@@ -19,6 +21,42 @@ TOLERATED = 0.5
 """Error of the declared mass that is tolerated [kg]."""
 FRICTION = 0.4
 """Share of the Coulomb friction that may be unknown in each joint, with the worst sign [-]."""
+
+
+@compiled
+def add(total: Floats, moment: Floats, expected: Floats) -> None:
+    """Add what a moment has beyond the expected one to a sum, each of shape (n,) [N m]."""
+    for j in range(total.shape[0]):
+        total[j] += moment[j] - expected[j]
+
+
+@compiled
+def correlate(
+    chain: Floats, q: Floats, qd: Floats, qdd: Floats, scratch: Floats, friction: Floats, feedback: Floats
+) -> tuple[float, float, float]:
+    """Compare the feedback of the drives with the torques that a kilogram needs, y.
+
+    Args:
+        chain: Links of which only the kilogram has mass, see `tvist_plant.chain`, shape (n+1, 22).
+        q: Angles, shape (n,) [rad].
+        qd: Velocities, shape (n,) [rad/s].
+        qdd: Accelerations, shape (n,) [rad/s^2].
+        scratch: Scratch, shape (n+1, 28).
+        friction: F of each joint, shape (n,) [N m].
+        feedback: r, shape (n,) [N m].
+
+    Returns:
+        yᵀ W y [1/kg²], yᵀ W r [1/kg] and Σ |y_j| W_j F_j [1/kg].
+    """
+    per_kg = np.empty(q.shape[0])
+    torques(chain, q, qd, qdd, GRAVITY, scratch, per_kg)
+    square = product = bound = 0.0
+    for j in range(q.shape[0]):
+        weighted = per_kg[j] / (friction[j] * friction[j])
+        square += weighted * per_kg[j]
+        product += weighted * feedback[j]
+        bound += abs(weighted) * friction[j]
+    return square, product, bound
 
 
 class PayloadMonitor:
@@ -46,17 +84,17 @@ class PayloadMonitor:
     """
 
     def __init__(self, description: RobotDescription, declared: Payload) -> None:
+        drives = description.drives
         self._judges = carries_weight(description)
-        self._model = rigid_model(description, Payload())
-        for number in range(self._model.njoints):  # only the kilogram has mass in this model
-            self._model.inertias[number] = pin.Inertia.Zero()
-        flange = self._model.frames[self._model.getFrameId(FLANGE)]
-        self._last, self._placement = flange.parentJoint, flange.placement
-        self._data = self._model.createData()
-        self._friction = np.array(description.drives.coulomb_friction)
+        model = rigid_model(description, Payload())
+        flange = model.getFrameId(FLANGE)
+        self._placement = model.frames[flange].placement
+        self._chain = chain_of(model, flange)
+        self._chain[:, BODY:] = 0.0  # only the kilogram has mass in this chain
+        self._scratch = np.zeros((description.joints + 1, SCRATCH))
+        self._sum = np.zeros(description.joints)
         # Without this floor, a joint without friction would dominate the estimate.
-        self._friction = np.maximum(self._friction, 0.01 * np.array(description.limits.torque))
-        self._weight = self._friction**-2
+        self._friction = np.maximum(drives.coulomb_friction, 0.01 * np.array(description.limits.torque))
         self._fade = float(np.exp(-EVERY * PERIOD / MEMORY))
         self.declare(declared)
 
@@ -64,14 +102,14 @@ class PayloadMonitor:
         """Set another declared payload: discard past measurements, and wait until it is fully phased in."""
         self.payload = payload
         kilogram = pin.Inertia(1.0, np.array(payload.com), np.zeros((3, 3)))
-        self._model.inertias[self._last] = self._placement.act(kilogram)
+        self._chain[-2, BODY:] = self._placement.act(kilogram).toDynamicParameters()
         self.reset()
         self._wait = SLEW
 
     def reset(self) -> None:
         """Discard past measurements, since the arm was placed elsewhere, its power was off, or something pushed it."""
         self._wait = 0
-        self._torques: list[tuple[Floats, Floats]] = []
+        self._ticks, self._sum[:] = 0, 0.0
         self._time = self._yy = self._yr = self._bound = 0.0
         self._warned = False
 
@@ -97,19 +135,19 @@ class PayloadMonitor:
         if self._wait > 0:
             self._wait -= 1
             return None
-        self._torques.append((moment, expected))
-        if len(self._torques) < EVERY:
+        add(self._sum, moment, expected)
+        self._ticks += 1
+        if self._ticks < EVERY:
             return None
-        moments, feed_forward = np.sum(self._torques, axis=0) / EVERY
-        feedback = moments - feed_forward
-        self._torques.clear()
-        per_kg = pin.rnea(self._model, self._data, target.q, target.qd, target.qdd)
-        weighted = self._weight * per_kg
+        square, product, bound = correlate(
+            self._chain, target.q, target.qd, target.qdd, self._scratch, self._friction, self._sum
+        )
+        self._ticks, self._sum[:] = 0, 0.0
         fade = self._fade
         self._time = fade * self._time + EVERY * PERIOD
-        self._yy = fade * self._yy + float(weighted @ per_kg)
-        self._yr = fade * self._yr + float(weighted @ feedback)
-        self._bound = fade * self._bound + FRICTION * float(np.abs(weighted) @ self._friction)
+        self._yy = fade * self._yy + square
+        self._yr = fade * self._yr + product / EVERY
+        self._bound = fade * self._bound + FRICTION * bound
         return self._judge()
 
     def _judge(self) -> str | None:

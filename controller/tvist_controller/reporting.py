@@ -2,11 +2,11 @@
 
 from tvist_controller.control.kinematics import ForwardKinematics, rotation_vector
 from tvist_controller.cycle import Sample
+from tvist_controller.report import Report
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 from tvist_plant.plant import PERIOD, ModalPlant, Plant, PlantTruth
-from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
-from tvist_protocol.stream import State, Truth
+from tvist_protocol.stream import Truth
 from tvist_shaping.base import Filter
 
 TRUE_MODES_EVERY = 50
@@ -14,7 +14,7 @@ TRUE_MODES_EVERY = 50
 
 
 class Reporter:
-    """Creates states and truths.
+    """Creates reports and truths.
 
     Args:
         description: The robot.
@@ -25,72 +25,38 @@ class Reporter:
         self._kinematics = ForwardKinematics(description)
         self._true_modes: dict[str, list[float]] = {}
 
-    def state(
+    def report(
         self,
         tick: int,
         sample: Sample,
         tvist: Filter,
         drive_delay: float,
         *,
-        robot_mode: RobotMode,
-        safety_mode: SafetyMode,
-        runtime: RuntimeState,
+        modes: tuple[int, int, int],
         speed: float,
         setpoint_sequence: int | None,
         missed_ticks: int,
-    ) -> State:
-        """Return the state of a tick.
+    ) -> Report:
+        """Return the report of a tick.
 
         Args:
             tick: Number of the tick.
             sample: Signals along the control line.
             tvist: The filter.
             drive_delay: Time by which commands for the drives are later than their targets [s].
-            robot_mode: Present robot mode.
-            safety_mode: Present safety mode.
-            runtime: Whether something moves.
+            modes: Present robot mode, safety mode and runtime state.
             speed: Share of the programmed speed [-].
             setpoint_sequence: Sequence number of the newest accepted set-point.
             missed_ticks: Number of ticks that began too late.
         """
-        target, measured, unshaped, motors = sample.target, sample.measured, sample.unshaped, sample.motors
-        pose, tool_speed = self._kinematics.tool(measured.q, measured.qd)
-        return State(
-            tick=tick,
-            timestamp=tick * PERIOD,
-            robot_mode=int(robot_mode),
-            safety_mode=int(safety_mode),
-            runtime_state=int(runtime),
-            setpoint_sequence=setpoint_sequence,
-            reference_q=sample.reference.tolist(),
-            target_q=target.q.tolist(),
-            target_qd=target.qd.tolist(),
-            target_qdd=target.qdd.tolist(),
-            target_moment=sample.torque.tolist(),
-            actual_q=measured.q.tolist(),
-            actual_qd=measured.qd.tolist(),
-            actual_moment=measured.moment.tolist(),
-            actual_TCP_pose=pose,
-            actual_TCP_speed=tool_speed,
-            actual_tool_accelerometer=measured.accelerometer.tolist(),
-            speed_scaling=speed,
-            estimated_f_d=tvist.f_d.tolist(),
-            estimated_zeta=tvist.zeta.tolist(),
-            shaper_delay=tvist.delay + drive_delay,
-            missed_ticks=missed_ticks,
-            shaper_clipped=tvist.clipped,
-            unshaped_q=None if unshaped is None else unshaped.q.tolist(),
-            unshaped_qd=None if unshaped is None else unshaped.qd.tolist(),
-            unshaped_qdd=None if unshaped is None else unshaped.qdd.tolist(),
-            motor_qd=None if motors is None else motors.qd.tolist(),
-            motor_qdd=None if motors is None else motors.qdd.tolist(),
-            motor_moment=None if motors is None else motors.torque.tolist(),
-            motor_limited=motors is not None and motors.limited,
-        )
+        return Report(
+            tick, sample, modes, speed, tvist.f_d, tvist.zeta, tvist.delay + drive_delay, tvist.clipped,
+            setpoint_sequence, missed_ticks, self._kinematics,
+        )  # fmt: skip
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:
         """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
-        self._kinematics.set_tool(offset)
+        self._kinematics = self._kinematics.with_tool(offset)
 
     def truth(self, tick: int, plant: Plant) -> Truth:
         """Return what a real robot cannot measure, after a tick.

@@ -2,6 +2,7 @@
 
 from typing import Literal
 
+from tvist_controller.report import Report
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
 from tvist_protocol.stream import Event, State, Truth
@@ -15,6 +16,10 @@ class Sink:
 
     By default each method ignores its message.
     """
+
+    def report(self, report: Report) -> None:
+        """Take a tick's report, by default as its state, which takes a while to make."""
+        self.state(report.state)
 
     def state(self, state: State) -> None:
         """Take a tick's state."""

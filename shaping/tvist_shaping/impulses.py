@@ -137,7 +137,7 @@ class Train(NamedTuple):
     @classmethod
     def spaced(cls, a: Sequence[float], distance: float) -> "Train":
         """Return the train of impulses a_j that are `distance` damped periods apart."""
-        return cls(np.array(a, dtype=float), distance * np.arange(len(a)))
+        return cls(np.array(a, dtype=float), distance * np.arange(float(len(a))))
 
     def of(self, f_d: float, zeta: float) -> Impulses:
         """Return the impulses of a mode that is checked: its damped frequency [Hz] and damping ratio [-]."""

@@ -1,5 +1,6 @@
 """Forward kinematics: pose and velocity of the tool from joint angles."""
 
+import copy
 import math
 from collections.abc import Sequence
 
@@ -83,6 +84,12 @@ class ForwardKinematics:
         self._chain = chain_of(model, model.getFrameId(FLANGE))
         self.set_tool((0.0,) * 6)
 
+    def with_tool(self, offset: Sequence[float]) -> "ForwardKinematics":
+        """Return the kinematics of the same arm with another tool; see `set_tool`."""
+        other = copy.copy(self)
+        other.set_tool(offset)
+        return other
+
     def set_tool(self, offset: Sequence[float]) -> None:
         """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
         self._tool = np.concatenate([pin.exp3(np.array(offset[3:])).ravel(), offset[:3]])
@@ -97,10 +104,14 @@ class ForwardKinematics:
         Returns:
             x y z [m] and rotation vector [rad]; linear [m/s] and angular [rad/s] velocity.
         """
+        found = self.motion(q, qd).tolist()
+        return found[:6], found[6:]
+
+    def motion(self, q: Floats, qd: Floats) -> Floats:
+        """Return pose and speed in one array, shape (12,); see `tool`."""
         out = np.empty(12)
         tool_motion(self._chain, self._tool, q, qd, out)
-        found = out.tolist()
-        return found[:6], found[6:]
+        return out
 
 
 def rotation_vector(rotation: Floats) -> list[float]:

@@ -8,9 +8,9 @@ from tvist_controller.control.differentiator import Floats, differentiate
 from tvist_controller.control.joint_controllers import command_drives
 from tvist_plant.chain import collect_gravity, torques
 
-QD, QDD, TORQUE, STATIC, Q_R, QD_R, TORQUE_FF, SIGNALS = range(8)
-"""Rows of the signals of a tick: q̇* and q̈*, τ* and the part of it that balances gravity, and the command q_r, q̇_r and
-τ_ff; their number.
+UNSHAPED_QD, UNSHAPED_QDD, QD, QDD, TORQUE, STATIC, Q_R, QD_R, TORQUE_FF, SIGNALS = range(10)
+"""Rows of the signals of a tick: velocity and acceleration without the filter, q̇* and q̈*, τ* and the part of it that
+balances gravity, and the command q_r, q̇_r and τ_ff; their number.
 """
 
 
@@ -19,6 +19,9 @@ def to_drives(
     before: Floats,
     middle: Floats,
     last: Floats,
+    unshaped_before: Floats,
+    unshaped_middle: Floats,
+    unshaped_last: Floats,
     period: float,
     chain: Floats,
     gravity: float,
@@ -32,14 +35,18 @@ def to_drives(
         before: First reference, shape (n,) [rad].
         middle: Second reference q*.
         last: Third reference, which is that of this tick.
+        unshaped_before: First reference without the filter, shape (n,) [rad].
+        unshaped_middle: Second one.
+        unshaped_last: Third one.
         period: Tick [s].
         chain: Links of the rigid arm with its declared payload, shape (n+1, 22).
         gravity: Gravitational acceleration [m/s^2].
         bodies: Scratch, shape (n+1, 28).
         joints: Parameters of the joint controllers, shape (8, n); their wind-up is changed.
-        signals: Result, shape (7, n), see `SIGNALS`.
+        signals: Result, shape (9, n), see `SIGNALS`.
     """
-    rates, torque, static = signals[QD : QDD + 1], signals[TORQUE], signals[STATIC]
+    rates, torque, static = signals[QD:TORQUE], signals[TORQUE], signals[STATIC]
+    differentiate(unshaped_before, unshaped_middle, unshaped_last, period, signals[UNSHAPED_QD:QD])
     differentiate(before, middle, last, period, rates)
     torques(chain, middle, rates[0], rates[1], gravity, bodies, torque)
     collect_gravity(bodies, gravity, static)

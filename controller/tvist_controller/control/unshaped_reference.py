@@ -1,6 +1,6 @@
 """The reference before shaping, with its derivatives at the tick of the target."""
 
-from tvist_controller.control.differentiator import Differentiator, Floats, Target
+from tvist_controller.control.differentiator import Differentiator, Floats
 
 REACH = 3
 """Number of references that a central difference of second order uses."""
@@ -21,8 +21,8 @@ class UnshapedReference:
         """State of motion of the reference, if one of its last samples was not the shaped one; else None."""
         self._alike = 0
 
-    def update(self, q: Floats, shaped: Differentiator, *, alike: bool) -> Target | None:
-        """Take the reference of this tick and return what the target of the previous tick is without the filter.
+    def push(self, q: Floats, shaped: Differentiator, *, alike: bool) -> Differentiator | None:
+        """Take the reference of this tick.
 
         While `apart` is None, an alike reference need not be passed.
 
@@ -32,7 +32,8 @@ class UnshapedReference:
             alike: Whether the shaped reference of this tick is the same to the last bit.
 
         Returns:
-            None if it is the target, to the last bit.
+            State of motion of which the target of the previous tick is without the filter; None if that is the target
+            itself, to the last bit.
         """
         apart = self.apart
         if apart is None:
@@ -41,4 +42,5 @@ class UnshapedReference:
         if self._alike == REACH:
             self.join()
             return None
-        return apart.update(q)
+        apart.push(q)
+        return apart

@@ -1,7 +1,11 @@
 """The last second of the arm: its measured postures, and how long its target has been at rest."""
 
 from collections import deque
-from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
 
 HISTORY = 1000
 """Number of past postures that are kept: two seconds."""
@@ -13,10 +17,10 @@ class Steadiness:
     """Keeps these tick by tick."""
 
     def __init__(self) -> None:
-        self._postures = deque[Sequence[float]](maxlen=HISTORY)
+        self._postures = deque[Floats](maxlen=HISTORY)
         self._still = 0
 
-    def note(self, q: Sequence[float], *, at_rest: bool) -> None:
+    def note(self, q: Floats, *, at_rest: bool) -> None:
         """Take the measured posture [rad] of a tick, and whether the target is at rest."""
         self._postures.append(q)
         self._still = self._still + 1 if at_rest else 0
@@ -36,6 +40,6 @@ class Steadiness:
         """Number of postures that are known, the present one included."""
         return len(self._postures)
 
-    def past(self, steps: int) -> Sequence[float]:
+    def past(self, steps: int) -> list[float]:
         """Measured posture a number of ticks ago, fewer than `known` [rad]."""
-        return self._postures[-1 - steps]
+        return list(self._postures[-1 - steps].tolist())
