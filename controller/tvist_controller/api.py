@@ -39,6 +39,7 @@ from tvist_controller.setup import Setup, body, paper_payload
 from tvist_controller.sink import Sink
 from tvist_controller.stopping import stopping
 from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, Trajectory, quickest_motion
+from tvist_controller.whole_motion import Driven, DrivenLine, respond
 
 __all__ = [
     "CLEARANCE",
@@ -48,6 +49,8 @@ __all__ = [
     "CollisionModel",
     "ControlCycle",
     "Controller",
+    "Driven",
+    "DrivenLine",
     "ElasticArm",
     "ElasticFeedForward",
     "Host",
@@ -89,6 +92,7 @@ __all__ = [
     "plan_from_rest",
     "quickest_motion",
     "quiet_motion",
+    "respond",
     "resting_after",
     "stopping",
     "truth_of",

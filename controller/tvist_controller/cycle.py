@@ -168,6 +168,12 @@ class ControlCycle:
         motors = self._feed_forward.reference
         return Sample(reference, target, torque, command.torque, measured, without, motors)
 
+    @property
+    def kernel_parts(self) -> tuple[Floats, float, Floats, Floats]:
+        """Links, gravity, scratch and joint controllers, as `line_tick` takes them."""
+        dynamics = self.inverse_dynamics
+        return dynamics.chain, dynamics.gravitation, dynamics.scratch, self._feed_forward.rows
+
     def _to_drives(
         self, unshaped: Differentiator | None
     ) -> tuple[Target, Target | None, Floats, Floats, DriveCommand]:
@@ -176,13 +182,11 @@ class ControlCycle:
         Args:
             unshaped: State of motion without the filter; None if it is the same.
         """
-        dynamics, joints = self.inverse_dynamics, self._shaped.joints
+        joints = self._shaped.joints
         window, other = joints.window, (joints if unshaped is None else unshaped).window
         signals = np.empty((SIGNALS, len(window[1])))
-        to_drives(
-            *window, *other, PERIOD, dynamics.chain, dynamics.gravitation, dynamics.scratch, self._feed_forward.rows,
-            signals,
-        )  # fmt: skip
+        chain, gravitation, scratch, rows = self.kernel_parts
+        to_drives(*window, *other, PERIOD, chain, gravitation, scratch, rows, signals)
         u_qd, u_qdd, qd, qdd, torque, gravity, q_r, qd_r, torque_ff = signals
         without = None if unshaped is None else Target(other[1], u_qd, u_qdd)
         return Target(window[1], qd, qdd), without, torque, gravity, DriveCommand(q_r, qd_r, torque_ff)

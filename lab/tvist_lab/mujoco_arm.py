@@ -2,10 +2,13 @@
 
 import math
 
+import numpy as np
+
 from tvist_lab.second_opinion import SecondOpinion
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import Measurement, PlantError, PlantTruth
+from tvist_plant.model import Floats
+from tvist_plant.plant import Measurement, PlantError, PlantTruth, Response
 
 TIMESTEP = 0.00025
 """Time step at which MuJoCo agrees with `FlexibleArm` [s]."""
@@ -47,11 +50,30 @@ class MujocoArm:
         Raises:
             PlantError: The state is no longer finite.
         """
-        self._arm.step(command)
+        self._arm.step_compiled(command)
         measured = self._measure()
         if not math.isfinite(self._force.dot(self._force)):
             raise PlantError("the state of the arm in MuJoCo is no longer finite")
         return measured
+
+    def play(self, commands: Floats) -> Response:
+        """Move the arm by many periods; see `Playable`.
+
+        Raises:
+            PlantError: The state is no longer finite.
+        """
+        arm, n = self._arm, self._description.joints
+        moved, felt = np.empty((len(commands), 3, n)), np.empty((len(commands), 6))
+        turned = np.empty((len(commands), 3, 3))
+        for k, command in enumerate(commands):
+            arm.step_compiled(DriveCommand(*command))
+            self._force, self._rotation = arm.flange()
+            moved[k] = arm.q, arm.qd, arm.moment()
+            felt[k, :3], felt[k, 3:], turned[k] = self._force, arm.flange_position(), self._rotation
+        if not np.isfinite(felt).all():
+            raise PlantError("the state of the arm in MuJoCo is no longer finite")
+        measured = Measurement(moved[:, 0], moved[:, 1], moved[:, 2], felt[:, :3].copy())
+        return Response(measured, felt[:, :3], felt[:, 3:], turned)
 
     def _measure(self) -> Measurement:
         arm = self._arm

@@ -94,3 +94,26 @@ def tick(memory: Floats, q: Floats, qd: Floats, torque: Floats, out: Floats) -> 
     """Compute one period of an arm on which nothing pushes: `move`, then `evaluate`."""
     move(memory, q, qd, torque)
     return evaluate(memory, out)
+
+
+@compiled
+def play(memory: Floats, commands: Floats, measured: Floats, flange: Floats) -> int:
+    """Compute many periods of an arm on which nothing pushes, one by one as `tick` does.
+
+    Args:
+        memory: Memory of the arm.
+        commands: Rows q_r, q̇_r and τ_ff of each command, shape (T, 3, n).
+        measured: Result, as in `evaluate`, shape (T, 3n+3).
+        flange: Result: rotation and position of the flange after each period, shape (T, 12).
+
+    Returns:
+        Number of periods until the state was no longer finite; T if it always was.
+    """
+    T: int = commands.shape[0]
+    for k in range(T):
+        if not tick(memory, commands[k, 0], commands[k, 1], commands[k, 2], measured[k]):
+            return k
+        end = parts(memory).bodies[-1]
+        for i in range(12):
+            flange[k, i] = end[i]
+    return T

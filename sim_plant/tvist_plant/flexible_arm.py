@@ -9,7 +9,7 @@ import pinocchio as pin
 from tvist_plant._compiled import is_cached
 from tvist_plant.arm_memory import ENCODER_STEP, GRAVITY, LAST, NOW, SUBSTEPS, memory_for, parts
 from tvist_plant.arm_memory import PERIOD as PERIOD_AT
-from tvist_plant.arm_tick import evaluate, move, tick
+from tvist_plant.arm_tick import evaluate, move, play, tick
 from tvist_plant.chain import chain_of
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand, LinearPart, Nonlinear
@@ -19,7 +19,7 @@ from tvist_plant.joint_parameters import packed
 from tvist_plant.model import FlexibleModel, Floats, flexible_model
 from tvist_plant.modes import Modes, modes
 from tvist_plant.outside import Outside
-from tvist_plant.plant import PERIOD, Measurement, PlantError, PlantTruth
+from tvist_plant.plant import PERIOD, Measurement, PlantError, PlantTruth, Response, played
 from tvist_plant.sensors import Accelerometer, gear_phases
 
 SUBSTEPS_OF_A_PERIOD = 4
@@ -164,6 +164,25 @@ class FlexibleArm:
         measured = self._evaluate()
         self._arm.pushed[:] = 0.0
         return measured
+
+    def play(self, commands: Floats) -> Response:
+        """Move the arm by many periods in one call; see `Playable`.
+
+        Raises:
+            PlantError: The state is no longer finite.
+        """
+        if not self._outside.rests:
+            return played(self, commands)
+        T, n = len(commands), self.description.joints
+        out, flange = np.empty((T, self._width)), np.empty((T, 12))
+        if play(self.memory, np.ascontiguousarray(commands, dtype=float), out, flange) < T:
+            raise PlantError("the arm's state is no longer finite")
+        force = out[:, 3 * n :]
+        noisy = np.array([self._accelerometer.read(one) for one in force]).reshape(T, 3)
+        measured = Measurement(out[:, :n], out[:, n : 2 * n], out[:, 2 * n : 3 * n], noisy)
+        if T:
+            self._specific_force = force[-1]
+        return Response(measured, force, flange[:, 9:], flange[:, :9].reshape(T, 3, 3))
 
     def push(self, torque: Floats) -> None:
         """Apply external torques to the joints, until they are changed or the arm is reset.

@@ -7,6 +7,8 @@ implements by having the method: `Pushable`, `Breakable`, `ModalPlant`.
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+import numpy as np
+
 from tvist_plant.description import Payload
 from tvist_plant.drives import DriveCommand
 from tvist_plant.model import Floats
@@ -61,6 +63,20 @@ class PlantTruth:
     """Part of `gear_deflection` that remains at rest in this pose, shape (n,); None: unknown [rad]."""
     static_link_deflection: Floats | None = None
     """Part of `link_deflection` that remains at rest in this pose; None: unknown [rad]."""
+
+
+@dataclass(frozen=True)
+class Response:
+    """What a plant did in T consecutive periods."""
+
+    measured: Measurement
+    """Measurements after each, with arrays of shape (T, n) and (T, 3)."""
+    specific_force: Floats
+    """Specific force in the flange frame without noise, shape (T, 3) [m/s^2]."""
+    flange_position: Floats
+    """Position of the flange, shape (T, 3) [m]."""
+    flange_rotation: Floats
+    """Orientation of the flange, shape (T, 3, 3)."""
 
 
 class Plant(Protocol):
@@ -134,6 +150,21 @@ class Breakable(Protocol):
 
 
 @runtime_checkable
+class Playable(Protocol):
+    """A plant that computes many periods in one call, with the same results to the last bit as one by one."""
+
+    def play(self, commands: Floats) -> Response:
+        """Move the arm by T control periods.
+
+        Args:
+            commands: Position, velocity and torque of the command for the end of each, shape (T, 3, n).
+
+        Raises:
+            PlantError: The state is no longer finite.
+        """
+
+
+@runtime_checkable
 class ModalPlant(Protocol):
     """A plant that knows its vibration modes."""
 
@@ -143,6 +174,28 @@ class ModalPlant(Protocol):
         Args:
             q: Joint positions, shape (n,) [rad]; None for the present ones.
         """
+
+
+def played(plant: Plant, commands: Floats) -> Response:
+    """Let a plant move by T control periods, one by one.
+
+    Args:
+        plant: The plant; it must provide the truth.
+        commands: See `Playable.play`.
+
+    Raises:
+        PlantError: See `Plant.step`.
+        ValueError: The plant does not provide the truth.
+    """
+    rows = []
+    for command in commands:
+        measured, truth = plant.step(DriveCommand(*command)), plant.truth()
+        if truth is None:
+            raise ValueError(f"the plant {type(plant).__name__} does not provide the truth")
+        own = (measured.q, measured.qd, measured.moment, measured.accelerometer)
+        rows.append((*own, truth.specific_force, truth.flange_position, truth.flange_rotation))
+    q, qd, moment, accelerometer, *felt = (np.array(column) for column in zip(*rows, strict=True))
+    return Response(Measurement(q, qd, moment, accelerometer), *felt)
 
 
 def check_measurement(measured: Measurement, joints: int, plant: Plant) -> None:

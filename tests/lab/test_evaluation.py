@@ -15,16 +15,16 @@ from tvist_lab.evaluation.baselines import EQUAL_DURATION, baselines
 from tvist_lab.evaluation.evaluate import WORTH, JudgedMove, Made, MoveJob, evaluate, interval, judge, report
 from tvist_lab.evaluation.line import (
     PAPER,
-    control_line,
+    ControlLine,
     lengthened,
     point_to_point,
     round_a_corner,
     shape,
-    simulate,
 )
 from tvist_lab.evaluation.moves import Move, MovesError, draw_moves, is_free, read_moves, write_moves
 from tvist_lab.evaluation.recipes import Mistaken, Recipe, RecipeError
 from tvist_plant.description import load
+from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD
 from tvist_shaping.estimators.fixed import Fixed
 
@@ -157,7 +157,8 @@ class TestLine:
         reference = point_to_point(start, target)
         shaped, ended = shape(tvist.filter, reference)
         assert ended
-        recording = simulate(control_line(ur5e, start, carried, carried), start, reference, shaped, 3)
+        line = ControlLine(ur5e, start, carried)
+        recording = line.follow(reference, shaped).simulate(FlexibleArm(ur5e, carried), 3)
         np.testing.assert_array_equal(recording["truth_tool_acceleration"][4 : 4 + len(felt)], felt)
 
     def test_a_longer_double_S_takes_the_time_it_is_told(self, move):

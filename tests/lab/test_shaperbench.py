@@ -15,7 +15,7 @@ from tvist_lab.evaluation.causality import check_causal
 from tvist_lab.evaluation.curves import bends, path_error
 from tvist_lab.evaluation.foreign import CandidateError, FromFile, load_shaper
 from tvist_lab.evaluation.leaderboard import leaderboard
-from tvist_lab.evaluation.line import PAPER, control_line, point_to_point, simulate
+from tvist_lab.evaluation.line import PAPER, ControlLine, point_to_point
 from tvist_lab.evaluation.markdown import page
 from tvist_lab.evaluation.moves import Move
 from tvist_lab.evaluation.recipes import Recipe
@@ -318,8 +318,8 @@ class TestArms:
         reference = point_to_point(start, target)
 
         def felt(arm, description=ur5e):
-            cycle = control_line(description, start, ur5e.payload, ur5e.payload, arm)
-            return best_tool_acceleration(simulate(cycle, start, reference, reference, 3))
+            line = ControlLine(description, start, ur5e.payload)
+            return best_tool_acceleration(line.follow(reference, reference).simulate(arm, 3))
 
         return felt
 
@@ -351,8 +351,8 @@ class TestArms:
         start = np.array(ur5e.poses["Q3"])
         at_rest = np.tile(start, (10, 1))
         made = arm.make(ur5e, ur5e.payload, 1)
-        cycle = control_line(ur5e, start, ur5e.payload, ur5e.payload, made)
-        alpha = best_tool_acceleration(simulate(cycle, start, at_rest, at_rest, 1))
+        line = ControlLine(ur5e, start, ur5e.payload)
+        alpha = best_tool_acceleration(line.follow(at_rest, at_rest).simulate(made, 1))
         assert np.abs(alpha).max() < 1e-6
 
     def test_every_seed_scatters_stiffness_and_gains_its_own_way(self, ur5e):

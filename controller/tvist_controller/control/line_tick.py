@@ -3,6 +3,8 @@
 The boxes are in their own modules; called one by one from Python, they would take three times as long.
 """
 
+import numpy as np
+
 from tvist_controller._compiled import compiled
 from tvist_controller.control.differentiator import Floats, differentiate
 from tvist_controller.control.joint_controllers import command_drives
@@ -51,3 +53,41 @@ def to_drives(
     torques(chain, middle, rates[0], rates[1], gravity, bodies, torque)
     collect_gravity(bodies, gravity, static)
     command_drives(middle, rates, torque, static, joints, signals[Q_R:])
+
+
+@compiled
+def all_to_drives(
+    start: Floats,
+    shaped: Floats,
+    period: float,
+    chain: Floats,
+    gravity: float,
+    bodies: Floats,
+    joints: Floats,
+    targets: Floats,
+    commands: Floats,
+) -> None:
+    """Compute the drives' commands for many ticks, one by one as `to_drives` does, from rest.
+
+    Args:
+        start: Shaped reference at rest before them, shape (n,) [rad].
+        shaped: Shaped reference of each tick, shape (T, n) [rad].
+        period: See `to_drives`, as for the next three.
+        chain: Links.
+        gravity: Gravitational acceleration.
+        bodies: Scratch.
+        joints: Parameters of the joint controllers.
+        targets: Result: q*, q̇* and q̈*, shape (T, 3, n).
+        commands: Result: q_r, q̇_r and τ_ff, shape (T, 3, n).
+    """
+    n = start.shape[0]
+    signals = np.empty((SIGNALS, n))
+    before, middle = start, start
+    for k in range(shaped.shape[0]):
+        last = shaped[k]
+        to_drives(before, middle, last, before, middle, last, period, chain, gravity, bodies, joints, signals)
+        for j in range(n):
+            targets[k, 0, j], targets[k, 1, j], targets[k, 2, j] = middle[j], signals[QD, j], signals[QDD, j]
+            for row in range(3):
+                commands[k, row, j] = signals[Q_R + row, j]
+        before, middle = middle, last

@@ -12,14 +12,14 @@ from scipy.spatial.transform import Rotation
 
 from tvist_controller.api import (
     STILL,
-    ControlCycle,
+    Driven,
+    DrivenLine,
     ElasticFeedForward,
     JointLine,
     MotionLimits,
-    Target,
     Trajectory,
     quickest_motion,
-    truth_of,
+    respond,
 )
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import Payload, RobotDescription
@@ -35,6 +35,9 @@ LONGEST = 3.0
 REST = 0.7
 """Time simulated after the end of the shaped reference [s]."""
 
+RESTING = 4
+"""Ticks at rest before the motion."""
+
 Step = Callable[[Floats], Floats]
 """A shaper in operation: converts a sample to a shaped sample, both of shape (n,) [rad]."""
 
@@ -48,28 +51,6 @@ class Unchanged(TvistFilter):
     def filter(self, q_ref: npt.ArrayLike) -> Floats:
         """Return the sample."""
         return np.asarray(q_ref)
-
-
-class Played(Trajectory):
-    """A reference that is completely known.
-
-    Args:
-        q: Its samples, shape (T, n) [rad].
-    """
-
-    def __init__(self, q: Floats) -> None:
-        self._q, self._next = q, 0
-
-    def next(self) -> Floats:
-        """Return the next sample; after the last one, return that again."""
-        q: Floats = self._q[min(self._next, len(self._q) - 1)]
-        self._next += 1
-        return q
-
-    @property
-    def finished(self) -> bool:
-        """Whether the last sample was returned."""
-        return self._next >= len(self._q)
 
 
 def point_to_point(start: Floats, target: Floats, limits: MotionLimits = PAPER) -> Floats:
@@ -149,85 +130,81 @@ def shape(step: Step, reference: Floats) -> tuple[Floats, bool]:
     return np.array(shaped), False
 
 
-def simulate(
-    cycle: ControlCycle,
-    start: Floats,
-    reference: Floats,
-    shaped: Floats,
-    seed: int,
-    delay: float = 0.0,
-    elastic: ElasticFeedForward | None = None,
-) -> Recording:
-    """Let a plant follow a shaped reference from rest, and then rest for a while.
-
-    Args:
-        cycle: The control line, with `Unchanged` as its filter and any plant.
-        start: Joint angles at which the arm rests, shape (n,) [rad].
-        reference: The unshaped reference, which everything is compared with, shape (T, n) [rad].
-        shaped: The reference that the arm follows, shape (T', n) [rad].
-        seed: Seed of sensor noise and gear errors.
-        delay: Delay that the shaper declares [s].
-        elastic: Elastic feed-forward for the drives; None for that of the paper's controller.
-
-    Returns:
-        Columns for the metrics on a common clock, from a tick before the motion on. Targets are those that the drives
-        receive, so that ticks in which a feed-forward differentiates count as delay.
-
-    Raises:
-        ValueError: The plant does not provide the truth.
-    """
-    plant = cycle.plant
-    cycle.use(cycle.tvist, elastic)
-    cycle.reset(start, seed=seed)
-    resting = 4
-    ticks = resting + max(len(shaped), len(reference)) + round(REST / PERIOD)
-    n = len(start)
-    q, target = np.empty((2, ticks, n))
-    qd, qdd = np.empty((2, ticks, n))
-    force, rotation = np.empty((ticks, 3)), np.empty((ticks, 3, 3))
-    for tick in range(ticks):
-        if tick == resting:
-            cycle.start(Played(shaped))
-        sample = cycle.step()
-        truth = truth_of(plant)
-        aim: Target = sample.target
-        target[tick], qd[tick], qdd[tick] = aim.q, aim.qd, aim.qdd
-        force[tick], rotation[tick] = truth.specific_force, truth.flange_rotation
-    late = round(cycle.drive_delay / PERIOD)
-    for column in (target, qd, qdd):
-        column[late:] = column[: ticks - late].copy()
-    q[:resting], q[resting:] = start, reference[-1]
-    q[resting : resting + len(reference)] = reference
-    pose = np.zeros((ticks, 6))
-    pose[:, 3:] = Rotation.from_matrix(rotation).as_rotvec()
-    tick_of = np.arange(ticks, dtype=float)
-    return Recording(
-        {
-            "tick": tick_of, "timestamp": PERIOD * tick_of,
-            "reference_q": q, "target_q": target, "target_qd": qd, "target_qdd": qdd,
-            "truth_tool_acceleration": force, "truth_flange_pose": pose,
-            "shaper_delay": np.full(ticks, delay + cycle.drive_delay),
-        }
-    )  # fmt: skip
-
-
-def control_line(
-    description: RobotDescription,
-    start: Floats,
-    declared: Payload,
-    carried: Payload,
-    plant: Plant | None = None,
-) -> ControlCycle:
-    """Create a control line from shaped reference to arm, without a shaper.
+class ControlLine:
+    """The control line from shaped reference to drives, without a shaper, of one controller.
 
     Args:
         description: The controller's model of the arm.
         start: Joint angles at which the arm rests, shape (n,) [rad].
         declared: Declared payload.
-        carried: Payload that the arm carries.
-        plant: Plant to control; None for the arm of the description.
     """
-    joints = description.joints
-    return ControlCycle(
-        description, Unchanged(joints), q=start, declared=declared, carried=carried, seed=0, plant=plant
-    )
+
+    def __init__(self, description: RobotDescription, start: Floats, declared: Payload) -> None:
+        self._start = start
+        self._line = DrivenLine(description, Unchanged(description.joints), start, declared)
+
+    def follow(
+        self,
+        reference: Floats,
+        shaped: Floats,
+        delay: float = 0.0,
+        elastic: ElasticFeedForward | None = None,
+    ) -> "Following":
+        """Return what any arm's drives get while they follow a shaped reference from rest, and rest for a while.
+
+        Args:
+            reference: The unshaped reference, which everything is compared with, shape (T, n) [rad].
+            shaped: The reference that the arm follows, shape (T', n) [rad].
+            delay: Delay that the shaper declares [s].
+            elastic: Elastic feed-forward for the drives; None for that of the paper's controller.
+        """
+        ticks = RESTING + max(len(shaped), len(reference)) + round(REST / PERIOD)
+        driven = self._line.drive(self._start, shaped, ticks, RESTING, elastic)
+        return Following(self._start, reference, driven, delay)
+
+
+class Following:
+    """A shaped reference, and what the drives of any arm get while they follow it.
+
+    Args:
+        start: Joint angles at which the arm rests, shape (n,) [rad].
+        reference: The unshaped reference, shape (T, n) [rad].
+        driven: What the drives get.
+        delay: Delay that the shaper declares [s].
+    """
+
+    def __init__(self, start: Floats, reference: Floats, driven: Driven, delay: float) -> None:
+        ticks, n = len(driven.targets), len(start)
+        late = round(driven.delay / PERIOD)
+        targets = driven.targets.copy()
+        targets[late:] = driven.targets[: ticks - late]
+        q = np.empty((ticks, n))
+        q[:RESTING], q[RESTING:] = start, reference[-1]
+        q[RESTING : RESTING + len(reference)] = reference
+        tick_of = np.arange(ticks, dtype=float)
+        self._driven = driven
+        self._columns = {
+            "tick": tick_of, "timestamp": PERIOD * tick_of,
+            "reference_q": q, "target_q": targets[:, 0], "target_qd": targets[:, 1], "target_qdd": targets[:, 2],
+            "shaper_delay": np.full(ticks, delay + driven.delay),
+        }  # fmt: skip
+
+    def simulate(self, plant: Plant, seed: int) -> Recording:
+        """Let a plant follow the reference.
+
+        Args:
+            plant: The plant.
+            seed: Seed of sensor noise and gear errors.
+
+        Returns:
+            Columns for the metrics on a common clock, from a tick before the motion on. Targets are those that the
+            drives receive, so that ticks in which a feed-forward differentiates count as delay.
+
+        Raises:
+            ValueError: The plant does not provide the truth.
+        """
+        response = respond(plant, self._driven, seed)
+        pose = np.zeros((len(response.specific_force), 6))
+        pose[:, 3:] = Rotation.from_matrix(response.flange_rotation).as_rotvec()
+        felt = {"truth_tool_acceleration": response.specific_force, "truth_flange_pose": pose}
+        return Recording({**self._columns, **felt})

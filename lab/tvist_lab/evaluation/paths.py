@@ -7,7 +7,7 @@ import numpy as np
 
 from tvist_controller.api import RefusalError, body, elastic_feed_forward, paper_payload
 from tvist_lab.evaluation.evaluate import WORTH, measured
-from tvist_lab.evaluation.line import control_line, simulate
+from tvist_lab.evaluation.line import ControlLine
 from tvist_lab.evaluation.path_shaping import ALONG, JOINTS, UNSLOWED, WAYS, Reference, planned, shaped
 from tvist_lab.evaluation.random_paths import KINDS, Kind, PathDraw, ToolMove
 from tvist_lab.evaluation.shaperbench import kinematics
@@ -16,6 +16,7 @@ from tvist_lab.metrics import in_motion_rms, motions
 from tvist_lab.recordings import Floats, Recording
 from tvist_lab.runners import Processes, in_order
 from tvist_plant.description import RobotDescription
+from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD
 from tvist_protocol.calibration import Calibration
 from tvist_shaping.base import Filter
@@ -126,7 +127,7 @@ def judge(job: PathJob) -> JudgedPath:
     description, move = job.description, found.move
     start = np.array(move.start)
     carried = body(paper_payload(description, move.mass))
-    cycle = control_line(description, start, carried, carried)
+    line, arm = ControlLine(description, start, carried), FlexibleArm(description, carried)
     at = kinematics(description)
     unshaped = found.plans["none"][0]
     path = ToolPath(at, unshaped.sampled())
@@ -135,7 +136,7 @@ def judge(job: PathJob) -> JudgedPath:
         # As for `tvist evaluate`, each path has gear errors of its own, and all ways of it have the same.
         seed = (1_000_003 * job.seed + job.place) % 2**63
         elastic = None if tvist is None else elastic_feed_forward(tvist, description, job.calibration)
-        recording = simulate(cycle, start, reference.q, q, seed, elastic=elastic)
+        recording = line.follow(reference.q, q, elastic=elastic).simulate(arm, seed)
         made, (distance, angle) = measured(recording), path.off(q)
         peaks = [
             [_peak(samples, order) for order in (1, 2)] for samples in (_resting(q), _resting(reference.q))

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from tvist_controller.api import body, paper_payload
 from tvist_lab.evaluation.candidates import Candidate, Task
 from tvist_lab.evaluation.evaluate import QUIET, WORTH, measured
-from tvist_lab.evaluation.line import control_line, point_to_point, simulate
+from tvist_lab.evaluation.line import ControlLine, point_to_point
 from tvist_lab.evaluation.moves import Move
 from tvist_lab.runners import Processes, in_order
 from tvist_plant.description import RobotDescription
@@ -94,15 +94,16 @@ def make(job: ErrorJob) -> Robustness:
     else:
         move = changed(move, mass=move.mass * (1.0 + job.error))
     believed = body(paper_payload(description, move.mass))
-    cycle = control_line(description, start, believed, carried, FlexibleArm(plant, carried))
+    line, arm = ControlLine(description, start, believed), FlexibleArm(plant, carried)
     reference = point_to_point(start, target)
     task = Task(description, move, reference)
-    plain = simulate(cycle, start, reference, reference, job.seed)
+    plain = line.follow(reference, reference).simulate(arm, job.seed)
     unshaped = measured(plain)
     reduced = {}
     for candidate in job.candidates:
         shaped, elastic = candidate.shaped(task), candidate.elastic(task)
-        made = measured(simulate(cycle, start, reference, shaped.q, job.seed, shaped.delay, elastic), plain)
+        following = line.follow(reference, shaped.q, shaped.delay, elastic)
+        made = measured(following.simulate(arm, job.seed), plain)
         reduced[candidate.name] = Reduced(
             1e3 * (made.duration - unshaped.duration),
             100.0 * (1.0 - made.peak / unshaped.peak),

@@ -11,7 +11,7 @@ from tvist_controller.api import body, paper_payload
 from tvist_lab.evaluation.arms import ARMS
 from tvist_lab.evaluation.candidates import Candidate, Task
 from tvist_lab.evaluation.causality import check_causal
-from tvist_lab.evaluation.line import PAPER, control_line, point_to_point, simulate
+from tvist_lab.evaluation.line import PAPER, ControlLine, point_to_point
 from tvist_lab.evaluation.moves import Move, draw_moves
 from tvist_lab.evaluation.running import ShaperFaultError
 from tvist_lab.metrics import (
@@ -129,12 +129,13 @@ def judge(job: BenchJob) -> Scores:
     except ShaperFaultError as fault:
         return Scores((), 0.0, 0.0, 0.0, None, str(fault))
     elastic = job.candidate.elastic(task)
+    following = ControlLine(description, start, believed).follow(
+        task.reference, shaped.q, shaped.delay, elastic
+    )
     scores = []
     for number in job.arms:
         arm = ARMS[number].make(description, carried, job.seed)
-        cycle = control_line(description, start, believed, carried, arm)
-        recording = simulate(cycle, start, task.reference, shaped.q, job.seed, shaped.delay, elastic)
-        scores.append(_score(number, job, recording))
+        scores.append(_score(number, job, following.simulate(arm, job.seed)))
     qd, qdd = np.diff(shaped.q, axis=0) / PERIOD, np.diff(shaped.q, 2, axis=0) / PERIOD**2
     return Scores(
         tuple(scores),

@@ -5,7 +5,7 @@ import numpy as np
 from tvist_controller.api import ElasticFeedForward, body, paper_payload
 from tvist_lab.evaluation.baselines import Baseline
 from tvist_lab.evaluation.conditions import AS_KNOWN, Conditions
-from tvist_lab.evaluation.line import control_line, point_to_point, shape, simulate
+from tvist_lab.evaluation.line import ControlLine, point_to_point, shape
 from tvist_lab.evaluation.moves import Move
 from tvist_lab.evaluation.own_moves import own_move
 from tvist_lab.evaluation.recipes import Recipe
@@ -41,8 +41,8 @@ class Trial:
         self._move = conditions.declared(move)
         self._start = np.array(move.start)
         carried, declared = (body(paper_payload(description, one.mass)) for one in (move, self._move))
-        arm = FlexibleArm(conditions.arm(description, seed), carried)
-        self._cycle = control_line(description, self._start, declared, carried, arm)
+        self._arm = FlexibleArm(conditions.arm(description, seed), carried)
+        self._line = ControlLine(description, self._start, declared)
         if stream:
             self._reference = stopped_stream(description, self._start, seed, self._limits)
         else:
@@ -80,4 +80,5 @@ class Trial:
         return self._follow(shaped)
 
     def _follow(self, shaped: Floats, elastic: ElasticFeedForward | None = None) -> Recording:
-        return simulate(self._cycle, self._start, self._reference, shaped, self._seed, elastic=elastic)
+        following = self._line.follow(self._reference, shaped, elastic=elastic)
+        return following.simulate(self._arm, self._seed)

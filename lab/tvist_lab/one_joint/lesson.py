@@ -8,12 +8,13 @@ import numpy as np
 
 from tvist_controller.api import body, default_calibration, estimator_of, load_calibration, paper_payload
 from tvist_lab.evaluation.evaluate import measured
-from tvist_lab.evaluation.line import control_line, point_to_point, shape, simulate
+from tvist_lab.evaluation.line import ControlLine, point_to_point, shape
 from tvist_lab.evaluation.running import sound
 from tvist_lab.one_joint.closed_form import FlexibleShoulder
 from tvist_lab.one_joint.plucked import pluck
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import RobotDescription, load
+from tvist_plant.flexible_arm import FlexibleArm
 from tvist_shaping import Estimator, Fixed, TvistFilter, shaper
 
 ROBOT = "one-joint"
@@ -174,8 +175,8 @@ def _recorded(description: RobotDescription, way: str, start: Floats, target: Fl
         tvist = TvistFilter(shaper("zv"), _estimator(description, way), joints=description.joints)
         tvist.reset(start)
         shaped = shape(sound(tvist), reference)[0]
-    cycle = control_line(description, start, description.payload, description.payload)
-    return simulate(cycle, start, reference, shaped, seed)
+    line = ControlLine(description, start, description.payload)
+    return line.follow(reference, shaped).simulate(FlexibleArm(description, description.payload), seed)
 
 
 def _estimator(description: RobotDescription, way: str) -> Estimator:
