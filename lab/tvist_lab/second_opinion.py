@@ -10,9 +10,9 @@ import math
 import mujoco
 import numpy as np
 import pinocchio as pin
+from numba import njit
 from numpy.typing import NDArray
 
-from tvist_plant._compiled import compiled
 from tvist_plant.description import Payload, RobotDescription, Tensor
 from tvist_plant.drives import DriveCommand
 from tvist_plant.model import FLANGE, link_frame
@@ -23,7 +23,7 @@ PERIOD = 0.002
 """Time between commands [s]."""
 
 
-@compiled
+@njit(cache=True)
 def drive(
     start: Floats,
     end: Floats,
