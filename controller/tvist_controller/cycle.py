@@ -9,7 +9,7 @@ from tvist_controller.control.differentiator import Differentiator, Floats, Targ
 from tvist_controller.control.drive_feed_forward import DriveFeedForward, MotorReference
 from tvist_controller.control.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.control.inverse_dynamics import SLEW, InverseDynamics
-from tvist_controller.control.line_tick import SIGNALS, to_drives
+from tvist_controller.control.line_tick import Q_R, SIGNALS, STATIC, TORQUE, UNSHAPED_Q, Q, to_drives
 from tvist_controller.control.shaped_reference import ShapedReference
 from tvist_controller.control.unshaped_reference import UnshapedReference
 from tvist_controller.line_filter import LineFilter
@@ -41,6 +41,8 @@ STILL = 1e-7
 class Sample(Struct, frozen=True, eq=False, gc=False):
     """Signals along the control line in one tick."""
 
+    signals: Floats
+    """All signals before the arm, shape (12, n), see `line_tick`."""
     reference: Floats
     """q before shaping, shape (n,) [rad]."""
     target: Target
@@ -51,10 +53,15 @@ class Sample(Struct, frozen=True, eq=False, gc=False):
     """Torque with rotors and friction, as the drives receive it, shape (n,) [N m]."""
     measured: Measurement
     """Measurement of the arm."""
-    unshaped: Target | None = None
-    """What the target is without the filter, at the same tick; None if it is the target itself, to the last bit."""
+    apart: bool = False
+    """Whether the target differs from what it is without the filter."""
     motors: MotorReference | None = None
     """Motion of the motors that elastic feed-forward asks for; None without it."""
+
+    @property
+    def unshaped(self) -> Target | None:
+        """What the target is without the filter, at the same tick; None if it is the target itself, to the last bit."""
+        return Target(*self.signals[UNSHAPED_Q:STATIC]) if self.apart else None
 
 
 class ControlCycle:
@@ -156,17 +163,19 @@ class ControlCycle:
             unshaped = self._unshaped.push(reference, self._shaped.joints, alike=alike)
         self._shaped.push(x_star, reference if alike else None)
         self.inverse_dynamics.advance()
-        # q*, q̇*, q̈* a tick earlier, the same without the filter, and τ* [N m]
-        target, without, torque, gravity, plain = self._to_drives(unshaped)
-        carried = self.inverse_dynamics.carried
+        signals = self._to_drives(unshaped)  # q*, q̇*, q̈* a tick earlier, and τ* [N m]
+        q, qd, qdd, torque = signals[Q : TORQUE + 1]
+        target, plain = Target(q, qd, qdd), DriveCommand(*signals[Q_R:])
         command = self._feed_forward.command(
-            target, torque, gravity, carried, plain,
+            target, torque, signals[STATIC], self.inverse_dynamics.carried, plain,
             may_begin=not (self.unshaped or self.line_filter.fading), may_go_on=not self.unshaped or self.stopping,
         )  # fmt: skip
         measured = self._plant.step(command)
         self._settle(reference, target)
         motors = self._feed_forward.reference
-        return Sample(reference, target, torque, command.torque, measured, without, motors)
+        return Sample(
+            signals, reference, target, torque, command.torque, measured, unshaped is not None, motors
+        )
 
     @property
     def kernel_parts(self) -> tuple[Floats, float, Floats, Floats]:
@@ -174,10 +183,8 @@ class ControlCycle:
         dynamics = self.inverse_dynamics
         return dynamics.chain, dynamics.gravitation, dynamics.scratch, self._feed_forward.rows
 
-    def _to_drives(
-        self, unshaped: Differentiator | None
-    ) -> tuple[Target, Target | None, Floats, Floats, DriveCommand]:
-        """Return the target with and without the filter, its torque, how much of it balances gravity, and the command.
+    def _to_drives(self, unshaped: Differentiator | None) -> Floats:
+        """Return the signals from the shaped reference to the drives, shape (12, n), see `line_tick`.
 
         Args:
             unshaped: State of motion without the filter; None if it is the same.
@@ -187,9 +194,7 @@ class ControlCycle:
         signals = np.empty((SIGNALS, len(window[1])))
         chain, gravitation, scratch, rows = self.kernel_parts
         to_drives(*window, *other, PERIOD, chain, gravitation, scratch, rows, signals)
-        u_qd, u_qdd, qd, qdd, torque, gravity, q_r, qd_r, torque_ff = signals
-        without = None if unshaped is None else Target(other[1], u_qd, u_qdd)
-        return Target(window[1], qd, qdd), without, torque, gravity, DriveCommand(q_r, qd_r, torque_ff)
+        return signals
 
     def _give_up(self, error: StuckError) -> Floats:
         """Return the first reference of the stop from the last shaped one, since the trajectory cannot go on."""
@@ -336,10 +341,13 @@ class ControlCycle:
         self._shaped.reset(q)
         self._unshaped.join()
         self._feed_forward.reset(self.inverse_dynamics.gravity(q))
-        target, _, torque, gravity, plain = self._to_drives(None)
-        command = self._feed_forward.command(target, torque, gravity, self.inverse_dynamics.carried, plain)
+        signals = self._to_drives(None)
+        target, torque, plain = Target(*signals[Q:TORQUE]), signals[TORQUE], DriveCommand(*signals[Q_R:])
+        command = self._feed_forward.command(
+            target, torque, signals[STATIC], self.inverse_dynamics.carried, plain
+        )
         measured = self._plant.reset(command, payload=carried, seed=seed)
-        self.standing = Sample(q, target, torque, command.torque, measured)
+        self.standing = Sample(signals, q, target, torque, command.torque, measured)
         """Signals to report before the first tick from there."""
 
     def declare(self, payload: Payload, ticks: int = SLEW) -> None:

@@ -1,13 +1,32 @@
 """What a tick has computed, as a message that is made, or encoded, when somebody wants it."""
 
+import numpy as np
 from msgspec import Struct
 
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.control.kinematics import ForwardKinematics
 from tvist_controller.cycle import Sample
+from tvist_controller.state_layout import Layout, width, write_state
 from tvist_plant.plant import PERIOD
 from tvist_protocol.codec import encode
 from tvist_protocol.stream import State
+
+Key = tuple[object, ...]
+NO_MOTORS: Floats = np.empty((0, 0))
+
+
+class Layouts:
+    """The layout of the last state, which is usually that of the next."""
+
+    def __init__(self) -> None:
+        self._known: tuple[Key, Layout] | None = None
+
+    def of(self, key: Key, report: "Report") -> Layout:
+        """Return the layout of a report's state, which depends on nothing but the key."""
+        known = self._known
+        if known is None or known[0] != key:
+            known = self._known = key, Layout.of(report.state)
+        return known[1]
 
 
 class Report(Struct, gc=False):
@@ -35,6 +54,8 @@ class Report(Struct, gc=False):
     """Number of ticks that began too late."""
     kinematics: ForwardKinematics
     """Kinematics of the tool, which must not change."""
+    layouts: Layouts
+    """Layouts of such states."""
     made: State | None = None
     written: bytes | None = None
 
@@ -47,10 +68,25 @@ class Report(Struct, gc=False):
 
     @property
     def encoded(self) -> bytes:
-        """The encoded state."""
+        """The encoded state, equal to what the codec makes of it."""
         if self.written is None:
-            self.written = encode(self.state)
+            self.written = self._write() if self.made is None else encode(self.made)
         return self.written
+
+    def _write(self) -> bytes:
+        sample, sequence, tick, f_d = self.sample, self.sequence, self.tick, self.f_d
+        motors, measured = sample.motors, sample.measured
+        key = (
+            width(tick), None if sequence is None else width(sequence), self.modes, self.missed, self.clipped,
+            sample.apart, motors is not None and motors.limited, motors is None, len(f_d),
+        )  # fmt: skip
+        template, places, integers = self.layouts.of(key, self)
+        leading = NO_MOTORS if motors is None else np.array([motors.qd, motors.qdd, motors.torque])
+        return write_state(
+            template, places, integers, tick, sequence or 0, tick * PERIOD, self.speed, self.delay, sample.signals,
+            sample.apart, measured.q, measured.qd, measured.moment, measured.accelerometer,
+            self.kinematics.chain, self.kinematics.offset, f_d, self.zeta, leading,
+        ).tobytes()  # fmt: skip
 
     def _make(self) -> State:
         sample, unshaped, motors = self.sample, self.sample.unshaped, self.sample.motors

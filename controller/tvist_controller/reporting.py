@@ -2,7 +2,7 @@
 
 from tvist_controller.control.kinematics import ForwardKinematics, rotation_vector
 from tvist_controller.cycle import Sample
-from tvist_controller.report import Report
+from tvist_controller.report import Layouts, Report
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 from tvist_plant.plant import PERIOD, ModalPlant, Plant, PlantTruth
@@ -23,6 +23,7 @@ class Reporter:
     def __init__(self, description: RobotDescription) -> None:
         self._joints = description.joints
         self._kinematics = ForwardKinematics(description)
+        self._layouts = Layouts()
         self._true_modes: dict[str, list[float]] = {}
 
     def report(
@@ -51,7 +52,7 @@ class Reporter:
         """
         return Report(
             tick, sample, modes, speed, tvist.f_d, tvist.zeta, tvist.delay + drive_delay, tvist.clipped,
-            setpoint_sequence, missed_ticks, self._kinematics,
+            setpoint_sequence, missed_ticks, self._kinematics, self._layouts,
         )  # fmt: skip
 
     def set_tcp(self, offset: tuple[float, ...]) -> None:

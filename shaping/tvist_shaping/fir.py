@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_shaping._compiled import compiled
+from tvist_shaping._compiled import compiled, compiled_sums
 from tvist_shaping._types import Floats
 from tvist_shaping.errors import FilterError
 
@@ -214,36 +214,42 @@ def solve(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
     return solved
 
 
+@compiled_sums
+def _dot(a: Floats, b: Floats) -> float:
+    """Return the sum of products of two vectors."""
+    total = 0.0
+    for n in range(a.shape[0]):
+        total += a[n] * b[n]
+    return total
+
+
 @compiled
 def _ascend(dual: Floats, rows: Floats, room: Floats, price: Floats, taps: Floats) -> float:
     """Return the value of the dual, and compute the corresponding weights."""
     R, N = rows.shape
     value = float(dual[0])
-    for i in range(R):
-        value -= 0.5 * price[i] * dual[i] * dual[i]
     for n in range(N):
         taps[n] = 0.0
-        if room[n] > 0.0:
-            along = 0.0
-            for i in range(R):
-                along += rows[i, n] * dual[i]
-            if along > 0.0:
-                taps[n] = room[n] * along
-                value -= 0.5 * room[n] * along * along
+    for i in range(R):
+        value -= 0.5 * price[i] * dual[i] * dual[i]
+        for n in range(N):
+            taps[n] += rows[i, n] * dual[i]
+    for n in range(N):
+        along = max(taps[n], 0.0)
+        taps[n] = room[n] * along
+        value -= 0.5 * room[n] * along * along
     return value
 
 
 @compiled
 def _gradient(dual: Floats, rows: Floats, price: Floats, taps: Floats, hessian: Floats) -> float:
     """Return the norm of the dual's gradient, which is stored in the second to last column."""
-    R, N = rows.shape
+    R = rows.shape[0]
     square = 0.0
     for i in range(R):
-        gradient = -price[i] * dual[i]
+        gradient = -price[i] * dual[i] - _dot(rows[i], taps)
         if i == 0:
             gradient += 1.0
-        for n in range(N):
-            gradient -= rows[i, n] * taps[n]
         hessian[i, R] = gradient
         square += gradient * gradient
     return math.sqrt(square)
@@ -253,13 +259,14 @@ def _gradient(dual: Floats, rows: Floats, price: Floats, taps: Floats, hessian: 
 def _newton(rows: Floats, room: Floats, price: Floats, taps: Floats, hessian: Floats) -> bool:  # noqa: C901, PLR0912  a kernel
     """Compute Newton's step in the last column, by Cholesky factorisation."""
     R, N = rows.shape
+    while N > 0 and taps[N - 1] <= 0.0:
+        N -= 1
+    weighted = np.empty(N)
     for i in range(R):
+        for n in range(N):
+            weighted[n] = rows[i, n] * room[n] if taps[n] > 0.0 else 0.0
         for j in range(i + 1):
-            entry = 0.0
-            for n in range(N):
-                if taps[n] > 0.0:
-                    entry += rows[i, n] * room[n] * rows[j, n]
-            hessian[i, j] = entry
+            hessian[i, j] = _dot(weighted, rows[j, :N])
         hessian[i, i] += price[i] + 1e-12
     for i in range(R):
         for j in range(i + 1):

@@ -81,7 +81,8 @@ class ForwardKinematics:
 
     def __init__(self, description: RobotDescription) -> None:
         model = rigid_model(description, Payload())
-        self._chain = chain_of(model, model.getFrameId(FLANGE))
+        self.chain = chain_of(model, model.getFrameId(FLANGE))
+        """The links, see `tvist_plant.chain`, shape (n+1, 22)."""
         self.set_tool((0.0,) * 6)
 
     def with_tool(self, offset: Sequence[float]) -> "ForwardKinematics":
@@ -92,7 +93,8 @@ class ForwardKinematics:
 
     def set_tool(self, offset: Sequence[float]) -> None:
         """Set the tool centre point in the flange frame: x y z [m] and rotation vector [rad]."""
-        self._tool = np.concatenate([pin.exp3(np.array(offset[3:])).ravel(), offset[:3]])
+        self.offset = np.concatenate([pin.exp3(np.array(offset[3:])).ravel(), offset[:3]])
+        """Rotation and position of the tool in the flange frame, shape (12,)."""
 
     def tool(self, q: Floats, qd: Floats) -> tuple[list[float], list[float]]:
         """Return pose and speed in the base frame.
@@ -110,7 +112,7 @@ class ForwardKinematics:
     def motion(self, q: Floats, qd: Floats) -> Floats:
         """Return pose and speed in one array, shape (12,); see `tool`."""
         out = np.empty(12)
-        tool_motion(self._chain, self._tool, q, qd, out)
+        tool_motion(self.chain, self.offset, q, qd, out)
         return out
 
 

@@ -10,9 +10,11 @@ from tvist_controller.control.differentiator import Floats, differentiate
 from tvist_controller.control.joint_controllers import command_drives
 from tvist_plant.chain import collect_gravity, torques
 
-UNSHAPED_QD, UNSHAPED_QDD, QD, QDD, TORQUE, STATIC, Q_R, QD_R, TORQUE_FF, SIGNALS = range(10)
-"""Rows of the signals of a tick: velocity and acceleration without the filter, q̇* and q̈*, τ* and the part of it that
-balances gravity, and the command q_r, q̇_r and τ_ff; their number.
+(
+    REFERENCE, Q, QD, QDD, TORQUE, UNSHAPED_Q, UNSHAPED_QD, UNSHAPED_QDD, STATIC, Q_R, QD_R, TORQUE_FF, SIGNALS,
+) = range(13)  # fmt: skip
+"""Rows of the signals of a tick: the newest reference q, the target q*, q̇* and q̈* with its torque τ*, the same target
+without the filter, the part of τ* that balances gravity, and the command q_r, q̇_r and τ_ff; their number.
 """
 
 
@@ -45,10 +47,13 @@ def to_drives(
         gravity: Gravitational acceleration [m/s^2].
         bodies: Scratch, shape (n+1, 28).
         joints: Parameters of the joint controllers, shape (8, n); their wind-up is changed.
-        signals: Result, shape (9, n), see `SIGNALS`.
+        signals: Result, shape (12, n), see `SIGNALS`.
     """
     rates, torque, static = signals[QD:TORQUE], signals[TORQUE], signals[STATIC]
-    differentiate(unshaped_before, unshaped_middle, unshaped_last, period, signals[UNSHAPED_QD:QD])
+    for j in range(middle.shape[0]):
+        signals[REFERENCE, j], signals[Q, j] = unshaped_last[j], middle[j]
+        signals[UNSHAPED_Q, j] = unshaped_middle[j]
+    differentiate(unshaped_before, unshaped_middle, unshaped_last, period, signals[UNSHAPED_QD:STATIC])
     differentiate(before, middle, last, period, rates)
     torques(chain, middle, rates[0], rates[1], gravity, bodies, torque)
     collect_gravity(bodies, gravity, static)
