@@ -157,6 +157,23 @@ class Filter(ABC):
         self._weigh()
         return self._q_star.copy()
 
+    def filter_all(self, q_ref: npt.ArrayLike) -> Floats:
+        """Shape many samples, one by one as `filter` does, with the same result to the last bit.
+
+        Args:
+            q_ref: References x_i, one for each tick, shape (T, width), finite.
+
+        Returns:
+            Shaped references x*_i, shape (T, width).
+
+        Raises:
+            ShapingError: The samples have another shape.
+        """
+        samples = np.asarray(q_ref, dtype=float)
+        if samples.ndim != 2:
+            raise ShapingError(f"q_ref has shape {samples.shape}, but must be (T, {self.width})")
+        return np.array([self.filter(sample) for sample in samples]).reshape(samples.shape)
+
     def fork(self) -> Self:
         """Return an independent copy of the present state.
 

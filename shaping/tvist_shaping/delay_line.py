@@ -149,6 +149,23 @@ class DelayLine:
         self.still = self.still + 1 if bits == self._bits else 1
         self._bits = bits
 
+    def pushed(self, samples: Floats, head: int) -> None:
+        """Note samples that a kernel has appended already.
+
+        Args:
+            samples: The samples, shape (k, joints), k >= 1.
+            head: Row of the newest one.
+        """
+        rows = [sample.tobytes() for sample in samples[-self.capacity :]]
+        equal = 0
+        for bits in reversed(rows):
+            if bits != rows[-1]:
+                break
+            equal += 1
+        goes_on = equal == len(rows) and rows[0] == self._bits
+        self.still = self.still + len(samples) if goes_on else equal
+        self.head, self._bits = head, rows[-1]
+
     def newest(self, count: int) -> Floats:
         """The latest samples, oldest first, shape (count, joints); count is at most the capacity."""
         ages = np.arange(count - 1, -1, -1)

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from tvist_shaping._compiled import compiled
 from tvist_shaping._types import Floats
@@ -10,10 +11,12 @@ from tvist_shaping.base import Filter
 from tvist_shaping.delay_line import gather
 from tvist_shaping.errors import FilterError, ShaperFailureError
 from tvist_shaping.estimators.base import Estimator
+from tvist_shaping.estimators.polynomial import Polynomial, evaluate
 from tvist_shaping.failures import FAILURES, ROUNDING, failure
 from tvist_shaping.impulses import F_D_RANGE, UNSHAPED, Impulses, decay, product
 from tvist_shaping.shaper import Shaper
 
+Integers = npt.NDArray[np.int64]
 LOWEST, HIGHEST = F_D_RANGE
 
 
@@ -57,6 +60,71 @@ def shape(
     for j in range(delays.shape[0]):
         delays[j] = tau[j] / period
     return tau[-1] <= longest and gather(ring, head, A, delays, scratch, out) < 0
+
+
+@compiled
+def shape_all(
+    samples: Floats,
+    joints: Integers,
+    trigonometric: bool,
+    centre: Floats,
+    scale: Floats,
+    multiples: Integers,
+    coefficients: Floats,
+    ranges: Floats,
+    zeta_max: float,
+    longest: float,
+    period: float,
+    train: Floats,
+    impulses: Floats,
+    ring: Floats,
+    head: int,
+    scratch: Floats,
+    q_star: Floats,
+    modes: Floats,
+    out: Floats,
+) -> tuple[int, bool]:
+    """Shape many samples with the paper's estimator, one by one.
+
+    Args:
+        samples: References, shape (T, joints) [rad].
+        joints: See `evaluate` of the estimator, as for the next six.
+        trigonometric: Likewise.
+        centre: Likewise.
+        scale: Likewise.
+        multiples: Likewise.
+        coefficients: Likewise.
+        ranges: Likewise.
+        zeta_max: See `shape`, as for the next seven.
+        longest: Likewise.
+        period: Likewise.
+        train: Likewise.
+        impulses: Likewise.
+        ring: Likewise.
+        head: Likewise.
+        scratch: Likewise.
+        q_star: Last shaped sample; changed, shape (joints,) [rad].
+        modes: Result: the last modes, shape (2, 1).
+        out: Result: shaped samples, shape (T, joints) [rad].
+
+    Returns:
+        Number of samples shaped before the first mode out of range, and whether the last estimate was clamped.
+    """
+    clamped = False
+    for i in range(samples.shape[0]):
+        head = head + 1 if head + 1 < ring.shape[0] else 0
+        for j in range(samples.shape[1]):
+            ring[head, j] = samples[i, j]
+        clamped = evaluate(
+            q_star, joints, trigonometric, centre, scale, multiples, coefficients, ranges, modes
+        )
+        if not shape(
+            modes[0], modes[1], zeta_max, longest, period, train, impulses, ring, head, scratch, q_star
+        ):
+            return i, clamped
+        for j in range(samples.shape[1]):
+            out[i, j] = q_star[j]
+    return samples.shape[0], clamped
 
 
 class TvistFilter(Filter):
@@ -242,6 +310,26 @@ class TvistFilter(Filter):
             return
         self._suppress(modes)
         line.gather(self.impulses.A, self.impulses.tau / self.period, self._q_star)
+
+    def filter_all(self, q_ref: npt.ArrayLike) -> Floats:
+        """Shape many samples; see `Filter.filter_all`. With the paper's estimator this takes one compiled call."""
+        estimator, line, train = self.estimator, self._line, self._train
+        samples = np.ascontiguousarray(q_ref, dtype=float)
+        fits = samples.ndim == 2 and samples.shape[1:] == (line.joints,) and len(samples) > 0
+        if train is None or self._posture is not None or type(estimator) is not Polynomial or not fits:
+            return super().filter_all(samples)
+        out, modes = np.empty_like(samples), np.array([self.f_d, self.zeta])
+        done, estimator.saturating = shape_all(
+            samples, *estimator.coefficients, self.shaper.zeta_max, self._longest * (1.0 + ROUNDING), self.period,
+            train, self._work, line.ring, line.head, line.scratch, self._q_star, modes, out,
+        )  # fmt: skip
+        if done:
+            line.pushed(samples[:done], (line.head + done) % line.capacity)
+            self.f_d, self.zeta = modes
+            self.clipped, self.fault, self._impulses = False, None, None
+        for i in range(done, len(samples)):
+            out[i] = self.filter(samples[i])
+        return out
 
     def _part(self) -> None:
         super()._part()

@@ -19,8 +19,9 @@ from tvist_lab.evaluation.line import PAPER, ControlLine, point_to_point
 from tvist_lab.evaluation.markdown import page
 from tvist_lab.evaluation.moves import Move
 from tvist_lab.evaluation.recipes import Recipe
-from tvist_lab.evaluation.running import ShaperFaultError, run
+from tvist_lab.evaluation.running import run
 from tvist_lab.evaluation.shaperbench import BenchJob, draw, inspect, jobs, judge
+from tvist_lab.evaluation.sound import ShaperFaultError
 from tvist_lab.evaluation.standing import candidates
 from tvist_lab.metrics import best_tool_acceleration
 from tvist_lab.mujoco_arm import MujocoArm

@@ -92,7 +92,7 @@ def evaluate(
     from tvist_lab.evaluation.evaluate import MoveJob, arm_seed
     from tvist_lab.evaluation.evaluate import evaluate as run
     from tvist_lab.evaluation.evaluate import report as summary
-    from tvist_lab.evaluation.running import ShaperFaultError
+    from tvist_lab.evaluation.sound import ShaperFaultError
     from tvist_plant.description import DescriptionError, load
 
     look.check(figures)

@@ -124,7 +124,7 @@ def _try_out(shapers: tuple[str, ...], known: "Calibration", description: "Robot
 
 def _judged(jobs: "list[PathJob]") -> "list[JudgedPath]":
     from tvist_lab.evaluation.paths import PathsError, compare
-    from tvist_lab.evaluation.running import ShaperFaultError
+    from tvist_lab.evaluation.sound import ShaperFaultError
 
     judged: list[JudgedPath] = []
     with progress(len(jobs), "paths") as bar, told(PathsError, ShaperFaultError):

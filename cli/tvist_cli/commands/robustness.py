@@ -41,8 +41,8 @@ def robustness(
         json: Print one JSON object.
     """
     from tvist_lab.evaluation import robustness as robust
-    from tvist_lab.evaluation.running import ShaperFaultError
     from tvist_lab.evaluation.shaperbench import draw
+    from tvist_lab.evaluation.sound import ShaperFaultError
     from tvist_plant.description import load
 
     look.check(figures)

@@ -11,7 +11,8 @@ from tvist_lab.evaluation.baselines import Baseline
 from tvist_lab.evaluation.line import PAPER, lengthened
 from tvist_lab.evaluation.moves import Move
 from tvist_lab.evaluation.recipes import Recipe
-from tvist_lab.evaluation.running import RunningShaper, Shaped, run, sound
+from tvist_lab.evaluation.running import RunningShaper, Shaped, run
+from tvist_lab.evaluation.sound import Sound
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
@@ -130,7 +131,7 @@ def _from_rest(tvist: Filter, task: Task) -> "Filtering":
     """Return a filter at rest at the start of a move, which is given the target as the robot does it."""
     tvist.reset(task.move.start)
     tvist.aim(task.move.target)
-    return Filtering(sound(tvist), lambda: tvist.delay)
+    return Filtering(Sound(tvist), lambda: tvist.delay)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from tvist_lab.evaluation.candidates import Candidate, Task
-from tvist_lab.evaluation.running import RunningShaper, ShaperFaultError
+from tvist_lab.evaluation.running import RunningShaper
+from tvist_lab.evaluation.sound import ShaperFaultError
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
 

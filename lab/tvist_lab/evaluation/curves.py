@@ -9,7 +9,7 @@ import numpy as np
 from tvist_lab.evaluation.candidates import Candidate, Longer, Task
 from tvist_lab.evaluation.line import round_a_corner
 from tvist_lab.evaluation.moves import Move
-from tvist_lab.evaluation.running import ShaperFaultError
+from tvist_lab.evaluation.sound import ShaperFaultError
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 

@@ -14,7 +14,7 @@ from tvist_controller.api import MotionLimits, paper_payload
 from tvist_lab.evaluation.candidates import Candidate, Task
 from tvist_lab.evaluation.line import PAPER
 from tvist_lab.evaluation.recipes import Recipe
-from tvist_lab.evaluation.running import ShaperFaultError
+from tvist_lab.evaluation.sound import ShaperFaultError
 from tvist_lab.recordings import Floats
 from tvist_lab.words import named
 from tvist_plant.plant import PERIOD

@@ -21,6 +21,7 @@ from tvist_controller.api import (
     quickest_motion,
     respond,
 )
+from tvist_lab.evaluation.sound import Sound
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import PERIOD, Plant
@@ -108,7 +109,7 @@ def lengthened(start: Floats, target: Floats, ticks: int, limits: MotionLimits =
     )
 
 
-def shape(step: Step, reference: Floats) -> tuple[Floats, bool]:
+def shape(step: Step | Sound, reference: Floats) -> tuple[Floats, bool]:
     """Shape a reference that is at rest at its last sample.
 
     Args:
@@ -119,7 +120,8 @@ def shape(step: Step, reference: Floats) -> tuple[Floats, bool]:
         Shaped samples up to the last one that moves and for a while longer, shape (T', n) [rad]; and whether it
         ended.
     """
-    target, shaped = reference[-1], [step(q) for q in reference]
+    target = reference[-1]
+    shaped = list(step.all(reference)) if isinstance(step, Sound) else [step(q) for q in reference]
     quiet = 0
     for _ in range(round(LONGEST / PERIOD)):
         shaped.append(step(target))

@@ -7,7 +7,7 @@ import numpy as np
 from tvist_controller.api import PlannedMotion, Setup, paper_payload, plan_from_rest
 from tvist_lab.evaluation.line import shape
 from tvist_lab.evaluation.random_paths import ToolMove
-from tvist_lab.evaluation.running import sound
+from tvist_lab.evaluation.sound import Sound
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration
@@ -90,8 +90,8 @@ def shaped(reference: Reference, tvist: Filter, way: str) -> Floats:
     if way != ALONG:
         mine.reset(path.posture(path.start))
         mine.aim(path.posture(path.end))
-        return shape(sound(mine), reference.q)[0]
+        return shape(Sound(mine), reference.q)[0]
     mine.reset(path.start, path.posture_of)
     mine.aim(path.end)
-    samples, _ = shape(sound(mine), reference.s)
+    samples, _ = shape(Sound(mine), reference.s)
     return np.array([path.posture(x) for x in samples])

@@ -1,7 +1,6 @@
 """A shaper applied to one reference until it ends, with checks for hidden motion."""
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -9,9 +8,9 @@ import numpy as np
 
 from tvist_controller.api import STILL
 from tvist_lab.evaluation.line import LONGEST
+from tvist_lab.evaluation.sound import ShaperFaultError
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
-from tvist_shaping.base import Filter
 
 WATCHED = 0.5
 """Time for which the output is checked for a tail after it has ended [s]."""
@@ -23,10 +22,6 @@ WARM = 20
 """Number of first ticks whose processing time is ignored, since they may compile code."""
 ENDED = 10
 """Number of ticks at the target after which the output has ended."""
-
-
-class ShaperFaultError(Exception):
-    """A shaper cannot be ranked; the message says why."""
 
 
 @dataclass(frozen=True)
@@ -50,22 +45,6 @@ class RunningShaper(Protocol):
     @property
     def delay(self) -> float | None:
         """Time over which the last output depends on the past [s]; None if the shaper does not declare it."""
-
-
-def sound(tvist: Filter) -> Callable[[Floats], Floats]:
-    """Shape with a filter, but fail when its shaper's function does, so that no figure is based on old weights.
-
-    Returns:
-        Function from sample to shaped sample; it raises `ShaperFaultError` if the shaper's function fails.
-    """
-
-    def step(q: Floats) -> Floats:
-        shaped = tvist.filter(q)
-        if tvist.fault is not None:
-            raise ShaperFaultError(tvist.fault)
-        return shaped
-
-    return step
 
 
 def run(stepper: RunningShaper, reference: Floats) -> Shaped:

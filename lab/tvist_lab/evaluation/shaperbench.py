@@ -13,7 +13,7 @@ from tvist_lab.evaluation.candidates import Candidate, Task
 from tvist_lab.evaluation.causality import check_causal
 from tvist_lab.evaluation.line import PAPER, ControlLine, point_to_point
 from tvist_lab.evaluation.moves import Move, draw_moves
-from tvist_lab.evaluation.running import ShaperFaultError
+from tvist_lab.evaluation.sound import ShaperFaultError
 from tvist_lab.metrics import (
     NotMeasurableError,
     best_tool_acceleration,

@@ -9,7 +9,7 @@ from tvist_lab.evaluation.line import ControlLine, point_to_point, shape
 from tvist_lab.evaluation.moves import Move
 from tvist_lab.evaluation.own_moves import own_move
 from tvist_lab.evaluation.recipes import Recipe
-from tvist_lab.evaluation.running import sound
+from tvist_lab.evaluation.sound import Sound
 from tvist_lab.evaluation.streams import stopped_stream
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import RobotDescription
@@ -66,7 +66,7 @@ class Trial:
             tvist.aim(None)
         else:
             tvist, own = own_move(recipe, description, self._move, self._limits)
-        return self._follow(shape(sound(tvist), own)[0], recipe.elastic(description, tvist))
+        return self._follow(shape(Sound(tvist), own)[0], recipe.elastic(description, tvist))
 
     def baseline(self, baseline: Baseline, recipe: Recipe, ticks: int) -> Recording:
         """Record the motion of a baseline.

@@ -9,7 +9,7 @@ import numpy as np
 from tvist_controller.api import body, default_calibration, estimator_of, load_calibration, paper_payload
 from tvist_lab.evaluation.evaluate import measured
 from tvist_lab.evaluation.line import ControlLine, point_to_point, shape
-from tvist_lab.evaluation.running import sound
+from tvist_lab.evaluation.sound import Sound
 from tvist_lab.one_joint.closed_form import FlexibleShoulder
 from tvist_lab.one_joint.plucked import pluck
 from tvist_lab.recordings import Floats, Recording
@@ -174,7 +174,7 @@ def _recorded(description: RobotDescription, way: str, start: Floats, target: Fl
     if way != "unshaped":
         tvist = TvistFilter(shaper("zv"), _estimator(description, way), joints=description.joints)
         tvist.reset(start)
-        shaped = shape(sound(tvist), reference)[0]
+        shaped = shape(Sound(tvist), reference)[0]
     line = ControlLine(description, start, description.payload)
     return line.follow(reference, shaped).simulate(FlexibleArm(description, description.payload), seed)
 

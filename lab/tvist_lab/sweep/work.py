@@ -9,7 +9,7 @@ from typing import Any
 from tvist_lab.evaluation.conditions import torque_share
 from tvist_lab.evaluation.evaluate import JudgedMove, Made, measured
 from tvist_lab.evaluation.recipes import Recipe
-from tvist_lab.evaluation.running import ShaperFaultError
+from tvist_lab.evaluation.sound import ShaperFaultError
 from tvist_lab.evaluation.trial import Trial
 from tvist_lab.recordings import Recording
 from tvist_lab.runners import TaskError

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -98,6 +99,18 @@ def evaluate(
     return not inside
 
 
+class Coefficients(NamedTuple):
+    """Arguments of `evaluate` between the configuration and the result."""
+
+    joints: npt.NDArray[np.int64]
+    trigonometric: bool
+    centre: Floats
+    scale: Floats
+    multiples: npt.NDArray[np.int64]
+    coefficients: Floats
+    ranges: Floats
+
+
 class Polynomial(Estimator):
     """One mode, whose f_d and ζ are polynomials in the joint angles, clamped to the range of the measurements.
 
@@ -155,9 +168,12 @@ class Polynomial(Estimator):
         if z_low < 0.0 or z_high >= 1.0:
             raise EstimatorError("zeta_range", zeta_range, "within 0 <= ζ < 1")
         self._ranges: Floats = np.array([[f_low, f_high], [z_low, z_high]])
-        self._joints = np.array(self.basis.joints, dtype=np.int64)
-        self._multiples = self.basis.multiples()
-        self._trigonometric = basis == "trigonometric"
+        joints_used = np.array(self.basis.joints, dtype=np.int64)
+        self.coefficients = Coefficients(
+            joints_used, basis == "trigonometric", self.basis.centre, self.basis.scale, self.basis.multiples(),
+            self._coefficients, self._ranges,
+        )  # fmt: skip
+        """What `evaluate` needs."""
         self._joints_needed = max(self.basis.joints) + 1
 
     def __repr__(self) -> str:
@@ -197,17 +213,7 @@ class Polynomial(Estimator):
         if q.shape[0] < self._joints_needed:
             raise EstimatorError("q", q.shape, f"of at least {self._joints_needed} joints")
         modes = np.empty((2, 1))
-        self.saturating = evaluate(
-            q,
-            self._joints,
-            self._trigonometric,
-            self.basis.centre,
-            self.basis.scale,
-            self._multiples,
-            self._coefficients,
-            self._ranges,
-            modes,
-        )
+        self.saturating = evaluate(q, *self.coefficients, modes)
         return modes[0], modes[1]
 
     def _row(self, name: str, coefficients: npt.ArrayLike) -> Floats:
