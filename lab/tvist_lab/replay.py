@@ -13,6 +13,7 @@ from tvist_protocol.commands import HandOver, Setpoint, TakeControl
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError, TvistError
 from tvist_protocol.journal import Entry, message_of
+from tvist_protocol.recorded import THIS_BEHAVIOUR
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.recording import Recorder
 
@@ -87,6 +88,11 @@ def replay_file(
         raise ReplayError("the recorder dropped messages of the journal, so an equal run is not possible")
     used, notes = _used(content.start, own_shapers)
     setup = Setup.from_builtins(content.start, used)
+    if content.behaviour != THIS_BEHAVIOUR:
+        notes.append(
+            f"the recording is of behaviour {content.behaviour}, and this is {THIS_BEHAVIOUR}: the last bits of states "
+            "differ for that reason"
+        )
     done = replay(setup, content.journal, content.states)
     done.notes = notes
     if output is not None:

@@ -27,6 +27,8 @@ def test_a_recorded_run_comes_out_again(path):
     again = replay_file(content)
     states = {state.tick: state for state in again.states}
     assert len(content.states) > 15
+    assert content.behaviour == 1
+    assert any("is of behaviour 1, and this is 2" in note for note in again.notes)
     names = known_fields(content.states)
     for recorded in content.states:
         replayed = states[recorded.tick]

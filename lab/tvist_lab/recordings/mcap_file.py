@@ -21,7 +21,7 @@ from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Info
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
-from tvist_protocol.recorded import END_METADATA, FORMAT, FROM_TICK, METADATA, JsonReader
+from tvist_protocol.recorded import BEHAVIOUR, END_METADATA, FORMAT, FROM_TICK, METADATA, JsonReader
 from tvist_protocol.stream import Event, State, Truth
 
 BLOCK = 8192
@@ -52,6 +52,8 @@ class RecordingFile:
     """Description of the robot when the recording began; None in a file of another program."""
     start: dict[str, Any] | None
     """How the robot's server was started; None in a file of another program."""
+    behaviour: int
+    """Number of the robot's behaviour, see `tvist_protocol.recorded.THIS_BEHAVIOUR`."""
     counts: Mapping[str, int]
     """Number of messages `state`, `truth` and `io`; at least one state."""
     events: tuple[Event, ...]
@@ -223,11 +225,12 @@ class _Content:
             robot=self.robot,
             info=info,
             start=start,
+            behaviour=1 if ours is None else self._integer(ours, BEHAVIOUR) or 1,
             counts=counts,
             events=events,
             journal=tuple(self.objects[tag(Entry)]),
             recording=recording_of_blocks(states, truths, io, events, info),
-            from_tick=None if ours is None else self._from_tick(ours),
+            from_tick=None if ours is None else self._integer(ours, FROM_TICK),
             complete=self.damage is None,
             dropped=dropped,
             note=self._note(states, dropped),
@@ -301,11 +304,11 @@ class _Content:
         except ValueError as error:
             raise self._error(f"has no valid {END_METADATA}: {error}") from error
 
-    def _from_tick(self, ours: Mapping[str, str]) -> int | None:
+    def _integer(self, ours: Mapping[str, str], name: str) -> int | None:
         try:
-            return int(ours[FROM_TICK]) if FROM_TICK in ours else None
+            return int(ours[name]) if name in ours else None
         except ValueError as error:
-            raise self._error(f"has no valid {FROM_TICK}: {error}") from error
+            raise self._error(f"has no valid {name}: {error}") from error
 
     def _json(self, metadata: Mapping[str, str], name: str, kind: Any) -> Any:
         try:

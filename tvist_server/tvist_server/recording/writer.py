@@ -11,9 +11,11 @@ from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, IndexType, Writer
 from tvist_protocol.channels import tag
 from tvist_protocol.info import Info
 from tvist_protocol.recorded import (
+    BEHAVIOUR,
     END_METADATA,
     FORMAT,
     METADATA,
+    THIS_BEHAVIOUR,
     TICK_NS,
     Recorded,
     to_json,
@@ -39,6 +41,7 @@ def heading(info: Info, start: Mapping[str, Any]) -> dict[str, str]:
     """
     return {
         "format": FORMAT,
+        BEHAVIOUR: str(THIS_BEHAVIOUR),
         "info": msgspec.json.encode(info).decode(),
         "start": json.dumps(start, allow_nan=False, sort_keys=True),
     }
