@@ -195,10 +195,11 @@ class Controller:
         """State of the last tick; see `report`."""
         return self.report.state
 
-    def tick(self) -> tuple[Report, list[Event]]:
+    def tick(self) -> tuple[State, list[Event]]:
         """Compute one control period."""
         self.begin_tick()
-        return self.complete_tick()
+        report, events = self.complete_tick()
+        return report.state, events
 
     def begin_tick(self) -> None:
         """Begin a control period: what has timed out ends, and programs have their turn."""

@@ -146,9 +146,9 @@ def _write(setup: Setup, content: RecordingFile, done: Replay, output: Path) -> 
 
 
 def _tick(controller: Controller, setup: Setup, done: Replay) -> None:
-    report, events = controller.tick()
+    state, events = controller.tick()
     controller.programs.sockets.orders.clear()  # what became of them is in the journal
-    done.states.append(report.state)
+    done.states.append(state)
     done.events += events
     if setup.truth:
         done.truths.append(controller.truth())

@@ -6,20 +6,6 @@ from typing import Any, TypeVar, cast
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def compiled_sums(function: F) -> F:
-    """Compile a function as `compiled` does, whose sums may be taken in any order.
-
-    The processor then adds several numbers at once, several times as fast. How many depends on the processor, so the
-    last bits differ between processors; on one they are always the same.
-    """
-    try:
-        from numba import njit
-    except ImportError:
-        function.py_func = function  # type: ignore[attr-defined]
-        return function
-    return cast("F", njit(cache=True, fastmath={"reassoc", "nsz"})(function))
-
-
 def compiled(function: F) -> F:
     """Compile a function; its Python source remains available as `.py_func`. The cache outlives the process.
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_shaping._compiled import compiled, compiled_sums
+from tvist_shaping._compiled import compiled
 from tvist_shaping._types import Floats
 from tvist_shaping.errors import FilterError
 
@@ -101,6 +101,8 @@ class Programme(NamedTuple):
     """Residual of each mode, as the root of the sum of squares over its rows [-], shape (modes,)."""
     rows: Floats
     """Scratch, shape (R, N)."""
+    columns: Floats
+    """Scratch: `rows` transposed, shape (N, R)."""
     hessian: Floats
     """Scratch, shape (R, R + 2)."""
 
@@ -115,6 +117,7 @@ class Programme(NamedTuple):
             taps=np.zeros(taps),
             remains=np.zeros(wanted.modes),
             rows=np.zeros((R, taps)),
+            columns=np.zeros((taps, R)),
             hessian=np.zeros((R, R + 2)),
         )
 
@@ -125,6 +128,7 @@ class Programme(NamedTuple):
             taps=self.taps.copy(),
             remains=self.remains.copy(),
             rows=np.empty_like(self.rows),
+            columns=np.empty_like(self.columns),
             hessian=np.empty_like(self.hessian),
         )
 
@@ -146,7 +150,7 @@ def solve(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
     Returns:
         Whether it was solved; otherwise the taps are the best that were found.
     """
-    spread, weight, dual, taps, remains, rows, hessian = programme
+    spread, weight, dual, taps, remains, rows, columns, hessian = programme
     R, N, modes = dual.shape[0], taps.shape[0], f_d.shape[0]
     room = np.zeros(N)
     price = np.zeros(R)
@@ -169,6 +173,9 @@ def solve(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
                 value *= turn
             price[row] = price[row + 1] = 1.0 / weight[k]
             row += 2
+    for n in range(N):
+        for i in range(R):
+            columns[n, i] = rows[i, n]
     solved = False
     for attempt in range(2):
         if attempt == 1:
@@ -176,10 +183,10 @@ def solve(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
             dual[0] = ENERGY
         value = _ascend(dual, rows, room, price, taps)
         for _ in range(STEPS):
-            if _gradient(dual, rows, price, taps, hessian) <= SOLVED:  # False for NaN
+            if _gradient(dual, columns, price, taps, hessian) <= SOLVED:  # False for NaN
                 solved = True
                 break
-            if not _newton(rows, room, price, taps, hessian):
+            if not _newton(columns, room, price, taps, hessian):
                 break
             slope = 0.0
             for i in range(R):
@@ -214,15 +221,6 @@ def solve(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
     return solved
 
 
-@compiled_sums
-def _dot(a: Floats, b: Floats) -> float:
-    """Return the sum of products of two vectors."""
-    total = 0.0
-    for n in range(a.shape[0]):
-        total += a[n] * b[n]
-    return total
-
-
 @compiled
 def _ascend(dual: Floats, rows: Floats, room: Floats, price: Floats, taps: Floats) -> float:
     """Return the value of the dual, and compute the corresponding weights."""
@@ -242,31 +240,39 @@ def _ascend(dual: Floats, rows: Floats, room: Floats, price: Floats, taps: Float
 
 
 @compiled
-def _gradient(dual: Floats, rows: Floats, price: Floats, taps: Floats, hessian: Floats) -> float:
+def _gradient(dual: Floats, columns: Floats, price: Floats, taps: Floats, hessian: Floats) -> float:
     """Return the norm of the dual's gradient, which is stored in the second to last column."""
-    R = rows.shape[0]
+    N, R = columns.shape
+    gradient = np.empty(R)
+    for i in range(R):
+        gradient[i] = -price[i] * dual[i]
+    gradient[0] += 1.0
+    for n in range(N):
+        if taps[n] > 0.0:
+            for i in range(R):
+                gradient[i] -= columns[n, i] * taps[n]
     square = 0.0
     for i in range(R):
-        gradient = -price[i] * dual[i] - _dot(rows[i], taps)
-        if i == 0:
-            gradient += 1.0
-        hessian[i, R] = gradient
-        square += gradient * gradient
+        hessian[i, R] = gradient[i]
+        square += gradient[i] * gradient[i]
     return math.sqrt(square)
 
 
 @compiled
-def _newton(rows: Floats, room: Floats, price: Floats, taps: Floats, hessian: Floats) -> bool:  # noqa: C901, PLR0912  a kernel
+def _newton(columns: Floats, room: Floats, price: Floats, taps: Floats, hessian: Floats) -> bool:  # noqa: C901, PLR0912  a kernel
     """Compute Newton's step in the last column, by Cholesky factorisation."""
-    R, N = rows.shape
-    while N > 0 and taps[N - 1] <= 0.0:
-        N -= 1
-    weighted = np.empty(N)
+    N, R = columns.shape
     for i in range(R):
-        for n in range(N):
-            weighted[n] = rows[i, n] * room[n] if taps[n] > 0.0 else 0.0
         for j in range(i + 1):
-            hessian[i, j] = _dot(weighted, rows[j, :N])
+            hessian[i, j] = 0.0
+    # Weight by weight, so that a processor can treat several entries at once without adding in another order.
+    for n in range(N):
+        if taps[n] > 0.0:
+            for i in range(R):
+                weighted = columns[n, i] * room[n]
+                for j in range(i + 1):
+                    hessian[i, j] += weighted * columns[n, j]
+    for i in range(R):
         hessian[i, i] += price[i] + 1e-12
     for i in range(R):
         for j in range(i + 1):

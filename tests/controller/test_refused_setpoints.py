@@ -26,6 +26,9 @@ class Sink:
     def __init__(self):
         self.events, self.entries, self.states = [], [], []
 
+    def report(self, report):
+        self.state(report.state)
+
     def state(self, state):
         self.states.append(state)
 

@@ -57,6 +57,9 @@ class Sink:
     def __init__(self):
         self.states, self.entries = [], []
 
+    def report(self, report):
+        self.state(report.state)
+
     def state(self, state):
         self.states.append(state)
 

@@ -28,7 +28,10 @@ LIGHT = {"mass": 2.0, "com": (0.0, 0.0, 0.04), "inertia": (0.002, 0.0, 0.0, 0.00
 class Sink:
     def __init__(self):
         self.entries, self.states, self.events = [], [], []
-        self.journal, self.state, self.event = self.entries.append, self.states.append, self.events.append
+        self.journal, self.event = self.entries.append, self.events.append
+
+    def report(self, report):
+        self.states.append(report.state)
 
     def io(self, io):
         pass

@@ -126,9 +126,9 @@ class Subject:
     def tick(self, count: int = 1) -> None:
         """Advance time by a number of ticks."""
         for _ in range(count):
-            report, events = self.controller.tick()
+            state, events = self.controller.tick()
             self.references.append(self.controller.cycle.position)
-            self.actual.append(report.sample.measured.q)
+            self.actual.append(np.array(state.actual_q))
             self.events += events
 
     def until_rest(self, most: int = 20_000) -> bool:
