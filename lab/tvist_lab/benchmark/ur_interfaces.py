@@ -1,11 +1,16 @@
 """Load that clients of UR's interfaces, and programs beside them, put on a served robot."""
 
+import asyncio
+import statistics
+import sys
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any
 
 from tvist_lab.benchmark.in_turn import in_turn
 from tvist_lab.benchmark.one_robot import punctuality
+from tvist_lab.benchmark.process import cpu_seconds
 from tvist_lab.benchmark.programs import idle_loop
 from tvist_lab.benchmark.readers import readers
 from tvist_lab.served import Served, free_port, served
@@ -16,36 +21,77 @@ CLIENTS = 10
 """Number of RTDE clients at 500 Hz, each with a different recipe."""
 PAIRS = 5
 """Number of pairs of runs, without and with a program."""
+ROUNDS = 5
+"""Number of rounds of measurements, whose medians count."""
 ADDRESS = "127.0.0.1"
 
 
 async def ur_interfaces(seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
     """Measure a robot without clients at its UR interfaces, and with ten clients that read every tick.
 
+    In between, ten such clients read from a process that does nothing but send packages of the same sizes.
+
     Args:
         seconds: Duration of each measurement [s].
         tell: Called with a description of each measurement before it starts.
     """
-    port = str(free_port())
-    async with served(_options(port)) as server:
+    port, bare_port = str(free_port()), str(free_port())
+    part = seconds / ROUNDS
+    idle, busy, bare, ticks = list[float](), list[float](), list[float](), list[dict[str, Any]]()
+    said: list[dict[str, int]] = []
+    missed_alone = 0
+    async with served(_options(port)) as server, _sender(bare_port) as sender:
         await server.robot.state()
-        tell(f"a robot whose interfaces are open, without clients, for {seconds:g} s")
-        alone, idle = await punctuality(server, seconds)
-        tell(f"{CLIENTS} RTDE clients for {seconds:g} s")
-        async with readers("rtde_clients", ADDRESS, port, str(CLIENTS)) as said:
-            tick, busy = await punctuality(server, seconds)
+        for number in range(ROUNDS):
+            tell(
+                f"round {number + 1} of {ROUNDS}: a robot without and with {CLIENTS} RTDE clients, and a bare sender"
+            )
+            alone, share = await punctuality(server, part)
+            idle.append(share)
+            missed_alone += alone["missed"]
+            async with readers("rtde_clients", ADDRESS, port, str(CLIENTS)) as counts:
+                tick, share = await punctuality(server, part)
+            said += counts
+            ticks.append(tick)
+            busy.append(share)
+            without = await _share(sender, part)
+            async with readers("rtde_clients", ADDRESS, bare_port, str(CLIENTS)):
+                bare.append(await _share(sender, part) - without)
+    cost = statistics.median(more - less for more, less in zip(busy, idle, strict=True))
+    missed = sum(tick["missed"] for tick in ticks)
+    each = 1e6 * PERIOD / CLIENTS
     return {
         "clients": CLIENTS,
         "seconds": seconds,
-        "us_per_client_and_tick": 1e6 * (busy - idle) * PERIOD / CLIENTS,
-        "missed": tick["missed"],
-        "missed_without_clients": alone["missed"],
-        "missed_percent": 100.0 * tick["missed"] * PERIOD / seconds,
-        "late_p50_us": tick["late_p50_us"],
-        "late_p99_us": tick["late_p99_us"],
+        "us_per_client_and_tick": each * cost,
+        "bare_us_per_client_and_tick": each * statistics.median(bare),
+        "bare_ratio": cost / statistics.median(bare),
+        "missed": missed,
+        "missed_without_clients": missed_alone,
+        "missed_percent": 100.0 * missed * PERIOD / seconds,
+        "late_p50_us": statistics.median(tick["late_p50_us"] for tick in ticks),
+        "late_p99_us": statistics.median(tick["late_p99_us"] for tick in ticks),
         "samples_received": sum(one["received"] for one in said),
         "samples_lost": sum(one["lost"] for one in said),
     }
+
+
+@asynccontextmanager
+async def _sender(port: str) -> AsyncIterator[int]:
+    """Run the process that only sends; yield its number."""
+    command = [sys.executable, "-m", "tvist_lab.benchmark.bare_send", ADDRESS, port]
+    process = await asyncio.create_subprocess_exec(*command, stdin=asyncio.subprocess.PIPE)
+    try:
+        yield process.pid
+    finally:
+        await process.communicate(b"")
+
+
+async def _share(pid: int, seconds: float) -> float:
+    """Share of a core that a process uses."""
+    used, began = cpu_seconds(pid), time.monotonic()
+    await asyncio.sleep(seconds)
+    return (cpu_seconds(pid) - used) / (time.monotonic() - began)
 
 
 async def with_a_program(seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
