@@ -23,23 +23,27 @@ PAIRS = 5
 """Number of pairs of runs, without and with a program."""
 ROUNDS = 5
 """Number of rounds of measurements, whose medians count."""
+SHORTEST = 2.0
+"""Shortest time of a measurement [s]: telemetry comes once a second."""
 ADDRESS = "127.0.0.1"
 
 
 async def ur_interfaces(seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
     """Measure a robot without clients at its UR interfaces, and with ten clients that read every tick.
 
-    In between, ten such clients read from a process that does nothing but send packages of the same sizes.
+    The clients have ten recipes or all the same one. In between, ten of them read from a process that does nothing but
+    send packages of the same sizes.
 
     Args:
         seconds: Duration of each measurement [s].
         tell: Called with a description of each measurement before it starts.
     """
     port, bare_port = str(free_port()), str(free_port())
-    part = seconds / ROUNDS
-    idle, busy, bare, ticks = list[float](), list[float](), list[float](), list[dict[str, Any]]()
+    part = max(SHORTEST, seconds / ROUNDS)
+    shares: dict[str, list[float]] = {what: [] for what in ("none", "recipes", "one", "single", "bare")}
+    ticks: list[dict[str, Any]] = []
     said: list[dict[str, int]] = []
-    missed_alone = 0
+    missed_alone = 0.0
     async with served(_options(port)) as server, _sender(bare_port) as sender:
         await server.robot.state()
         for number in range(ROUNDS):
@@ -47,33 +51,49 @@ async def ur_interfaces(seconds: float, tell: Callable[[str], None]) -> dict[str
                 f"round {number + 1} of {ROUNDS}: a robot without and with {CLIENTS} RTDE clients, and a bare sender"
             )
             alone, share = await punctuality(server, part)
-            idle.append(share)
+            shares["none"].append(share)
             missed_alone += alone["missed"]
-            async with readers("rtde_clients", ADDRESS, port, str(CLIENTS)) as counts:
-                tick, share = await punctuality(server, part)
-            said += counts
-            ticks.append(tick)
-            busy.append(share)
+            for what, clients, recipes in (
+                ("recipes", CLIENTS, CLIENTS),
+                ("one", CLIENTS, 1),
+                ("single", 1, 1),
+            ):
+                async with readers("rtde_clients", ADDRESS, port, str(clients), str(recipes)) as counts:
+                    tick, share = await punctuality(server, part)
+                shares[what].append(share)
+                said += counts
+                if what == "recipes":
+                    ticks.append(tick)
             without = await _share(sender, part)
-            async with readers("rtde_clients", ADDRESS, bare_port, str(CLIENTS)):
-                bare.append(await _share(sender, part) - without)
-    cost = statistics.median(more - less for more, less in zip(busy, idle, strict=True))
+            async with readers("rtde_clients", ADDRESS, bare_port, str(CLIENTS), str(CLIENTS)):
+                shares["bare"].append(await _share(sender, part) - without)
+    bare = statistics.median(shares["bare"]) / CLIENTS
+    recipes_cost = _median_difference(shares["recipes"], shares["none"]) / CLIENTS
+    one_cost = _median_difference(shares["one"], shares["none"]) / CLIENTS
+    further_cost = _median_difference(shares["one"], shares["single"]) / (CLIENTS - 1)
     missed = sum(tick["missed"] for tick in ticks)
-    each = 1e6 * PERIOD / CLIENTS
     return {
         "clients": CLIENTS,
-        "seconds": seconds,
-        "us_per_client_and_tick": each * cost,
-        "bare_us_per_client_and_tick": each * statistics.median(bare),
-        "bare_ratio": cost / statistics.median(bare),
+        "seconds": part * ROUNDS,
+        "us_per_client_and_tick": 1e6 * PERIOD * recipes_cost,
+        "same_recipe_us_per_client_and_tick": 1e6 * PERIOD * one_cost,
+        "further_client_us_per_tick": 1e6 * PERIOD * further_cost,
+        "bare_us_per_client_and_tick": 1e6 * PERIOD * bare,
+        "bare_ratio": recipes_cost / bare,
+        "same_recipe_bare_ratio": one_cost / bare,
+        "further_client_bare_ratio": further_cost / bare,
         "missed": missed,
         "missed_without_clients": missed_alone,
-        "missed_percent": 100.0 * missed * PERIOD / seconds,
+        "missed_percent": 100.0 * missed * PERIOD / (part * ROUNDS),
         "late_p50_us": statistics.median(tick["late_p50_us"] for tick in ticks),
         "late_p99_us": statistics.median(tick["late_p99_us"] for tick in ticks),
         "samples_received": sum(one["received"] for one in said),
         "samples_lost": sum(one["lost"] for one in said),
     }
+
+
+def _median_difference(more: list[float], less: list[float]) -> float:
+    return statistics.median(one - other for one, other in zip(more, less, strict=True))
 
 
 @asynccontextmanager
@@ -102,7 +122,7 @@ async def with_a_program(seconds: float, tell: Callable[[str], None]) -> dict[st
         tell: Called with a description of each measurement before it starts.
     """
     port = str(free_port())
-    async with served(_options(port)) as server, readers("rtde_clients", ADDRESS, port, "1"):
+    async with served(_options(port)) as server, readers("rtde_clients", ADDRESS, port, "1", "1"):
         figures = await in_turn(server, _idle_loop, PAIRS, seconds, "an idle loop", tell)
     return {
         "pairs": PAIRS,
