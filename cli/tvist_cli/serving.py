@@ -10,7 +10,8 @@ from tvist_cli.output import say
 if TYPE_CHECKING:
     from tvist_controller.setup import Setup
     from tvist_server.config import ServeConfig
-    from tvist_server.server import Server
+    from tvist_server.server import Recording, Server
+    from tvist_server.workers import Workers
 
 
 def say_if_compiling() -> None:
@@ -48,26 +49,25 @@ def introduction(setups: Sequence["Setup"], profile: str | None) -> str:
     return f"a server of {len(names)} robots ({listed}; {how}) listens"
 
 
-def say_who_can_reach(server: "Server", config: "ServeConfig") -> None:
+def say_who_can_reach(server: "Server | Workers", config: "ServeConfig", robots: int) -> None:
     """Say where UR's interfaces are open, and where anyone can move the robots."""
     for address, ports in server.ur:
         listed = ", ".join(f"{interface} {port}" for interface, port in ports.items())
         say(f"UR's interfaces are open on {address}: {listed}")
     if server.metrics is not None:
         say(f"figures for Prometheus are on {server.metrics.page}")
-    whom = "this robot" if len(server.robots) == 1 else "these robots"
+    whom = "this robot" if robots == 1 else "these robots"
     for endpoint in config.endpoints if config.insecure else ():
         say(f"anyone who can reach {endpoint} can move {whom}")
 
 
-def say_recorded(server: "Server") -> list[str]:
+def say_recorded(recordings: "Sequence[Recording]") -> list[str]:
     """Say where each robot was recorded; return the errors that have ended recordings."""
-    recorders = [robot.recorder for robot in server.robots if robot.recorder is not None]
-    for recorder in recorders:
-        if recorder.error is None:
-            note = f", {recorder.dropped} messages dropped" if recorder.dropped else ""
-            say(f"recorded into {recorder.place or f'a file that is no longer {recorder.path}'}{note}")
-    return [recorder.error for recorder in recorders if recorder.error is not None]
+    for recording in recordings:
+        if recording.error is None:
+            note = f", {recording.dropped} messages dropped" if recording.dropped else ""
+            say(f"recorded into {recording.place}{note}")
+    return [recording.error for recording in recordings if recording.error is not None]
 
 
 def leave(server: "Server", code: int) -> None:

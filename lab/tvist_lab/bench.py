@@ -4,7 +4,9 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
-from tvist_lab.benchmark.many_robots import robots_at_500_hz
+from tvist_lab.benchmark.many_robots import robots_at_500_hz, us_per_robot_and_tick
+from tvist_lab.benchmark.memory import memory
+from tvist_lab.benchmark.observed import observed
 from tvist_lab.benchmark.one_robot import one_robot
 from tvist_lab.benchmark.parts import parts
 from tvist_lab.benchmark.programs import programs
@@ -29,5 +31,9 @@ def bench(seconds: float, tell: Callable[[str], None]) -> dict[str, Any]:
         result |= asyncio.run(one_robot(seconds, tell))
         result["ur_interfaces"] = asyncio.run(ur_interfaces(seconds, tell))
         result["ur_interfaces_with_a_program"] = asyncio.run(with_a_program(OF_MANY * seconds, tell))
+        result["observers"] = asyncio.run(observed(OF_MANY * seconds, tell))
+        result["memory"] = asyncio.run(memory(tell))
+        result["robot_us_per_tick"] = asyncio.run(us_per_robot_and_tick(OF_MANY * seconds, tell))
+        result["line_share_of_robot"] = result["line_us_per_tick"] / result["robot_us_per_tick"]
         result["robots_at_500_hz"] = asyncio.run(robots_at_500_hz(max(2.0, OF_MANY * seconds), tell))
     return result

@@ -19,7 +19,7 @@ from tvist_protocol.errors import ProtocolError
 from tvist_protocol.info import Clock
 from tvist_protocol.values import Namespace, RobotName, Seed
 from tvist_server.durations import ticks_of
-from tvist_server.fleet import members
+from tvist_server.fleet import MOST, members
 from tvist_server.initial import read_state, shaped_by
 from tvist_server.profiles import PLAIN, PROFILES, Profile, ProfileName
 from tvist_server.program_folder import ProgramFolder
@@ -49,6 +49,8 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     """Name of a robot that comes with the package, or path of a robot file."""
     robots: str | None = None
     """Several robots, ROBOT[*COUNT] separated by commas and named after their files; replaces `name` and `robot`."""
+    workers: Annotated[int, Meta(ge=1, le=256)] = 1
+    """Number of processes that the robots are spread over."""
     listen: tuple[str, ...] | None = None
     """Zenoh endpoints to listen on; default: `DEFAULT_ENDPOINT`, and none with `connect`."""
     connect: tuple[str, ...] = ()
@@ -122,7 +124,7 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         if self.robots is None:
             return [self.setup()]
         try:
-            found = members(self.robots)
+            found = members(self.robots, MOST * self.workers)
         except ValueError as error:
             raise ConfigError(str(error)) from error
         # Each robot starts as it would alone, apart from the noise.
@@ -208,17 +210,6 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         places = [f"on {', '.join(self.endpoints)}"] if self.endpoints else []
         places += [f"through the router at {', '.join(self.connect)}"] if self.connect else []
         return " and ".join(places) + (f" in namespace {self.namespace}" if self.namespace else "")
-
-    def check_network(self) -> None:
-        """Check what the options of the network ask of each other.
-
-        Raises:
-            ConfigError: They exclude each other.
-        """
-        if self.connect and self.endpoints and self.security is not None:
-            raise ConfigError(
-                "connect, listen and security exclude each other: the router checks certificates, so leave listen out"
-            )
 
     def command_line(self, command: str, name: str) -> str:
         """Return the command line that reaches a robot from this machine.

@@ -21,13 +21,17 @@ class Member:
     """Name of the robot on the network."""
 
 
-def members(text: str) -> list[Member]:
+def members(text: str, most: int = MOST) -> list[Member]:
     """Parse a list of robots such as `ur5e*2,other.toml`: ROBOT[*COUNT], separated by commas.
 
     A robot is named after its file. A robot that is listed several times gets a number: `ur5e-1`, `ur5e-2`.
 
+    Args:
+        text: The list.
+        most: Largest number of robots.
+
     Raises:
-        ValueError: A count or a name is invalid, two robots would have the same name, or there are more than `MOST`.
+        ValueError: A count or a name is invalid, two robots would have the same name, or there are more than `most`.
     """
     robots: list[str] = []
     for entry in text.split(","):
@@ -36,9 +40,11 @@ def members(text: str) -> list[Member]:
             raise ValueError(
                 f"robots is {text!r}: must be a list such as ur5e*2,other.toml; a robot is missing"
             )
-        robots += [robot] * (_count(entry, count) if star else 1)
-        if len(robots) > MOST:
-            raise ValueError(f"robots is {text!r}: one process serves at most {MOST} robots")
+        robots += [robot] * (_count(entry, count, most) if star else 1)
+        if len(robots) > most:
+            raise ValueError(
+                f"robots is {text!r}: one process serves at most {MOST} robots, and more workers serve more"
+            )
     stems = [Path(robot).stem for robot in robots]
     total, so_far = Counter(stems), Counter[str]()
     found: list[Member] = []
@@ -63,10 +69,10 @@ def recording_of(record: str, name: str) -> Path:
     return path.with_name(f"{path.stem}-{name}{path.suffix}")
 
 
-def _count(entry: str, count: str) -> int:
+def _count(entry: str, count: str, most: int) -> int:
     number = int(count) if count.isascii() and count.isdigit() and len(count) < 10 else 0
-    if not 1 <= number <= MOST:
+    if not 1 <= number <= most:
         raise ValueError(
-            f"robots has {entry.strip()!r}: the count after * must be a whole number from 1 to {MOST}"
+            f"robots has {entry.strip()!r}: the count after * must be a whole number from 1 to {most}"
         )
     return number

@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from threading import Thread
+from typing import Any, NamedTuple
 
 from tvist_controller.controller import Controller
 from tvist_controller.setup import Setup
@@ -27,6 +28,7 @@ from tvist_server.gateways.metrics import Metrics
 from tvist_server.gateways.network import Network
 from tvist_server.gateways.ur.interfaces import UrInterfaces
 from tvist_server.robot import ServedRobot
+from tvist_server.spread import Share, check_together
 from tvist_server.ur_ports import InterfaceName
 
 LEAVE = 0.6
@@ -37,12 +39,24 @@ INSTANCE_BYTES = 4
 """Random bytes that tell the tokens of this run from those of earlier ones."""
 
 
+class Recording(NamedTuple):
+    """What became of a recording."""
+
+    place: str
+    """Where it is, in words."""
+    dropped: int
+    """Number of messages that it had no room for."""
+    error: str | None
+    """What has ended it early."""
+
+
 class Server:
     """One or more robots on the network.
 
     Args:
         config: Configuration of the robots.
         observe: Makes an observer of a robot's messages, which then tells people about it instead of the console.
+        share: The robots that this process serves, if others serve the rest [all of them].
 
     Raises:
         ConfigError: The configuration is invalid.
@@ -50,24 +64,24 @@ class Server:
         GatewayError: The server cannot listen on an endpoint.
     """
 
-    def __init__(self, config: ServeConfig, observe: Callable[[Controller], Sink] | None = None) -> None:
-        config.check_network()
+    def __init__(
+        self,
+        config: ServeConfig,
+        observe: Callable[[Controller], Sink] | None = None,
+        share: Share | None = None,
+    ) -> None:
         setups = config.setups()
+        check_together(config, len(setups))
+        several = len(setups) > 1
+        share = Share(range(len(setups))) if share is None else share
+        setups = [setups[number] for number in share.numbers]
         if config.clock == "realtime":  # equal runs in lockstep are equal, tokens included
             setups = [replace(setup, instance=secrets.token_hex(INSTANCE_BYTES)) for setup in setups]
         self._observed = observe is not None
-        try:
-            check_endpoints("connect", config.connect)
-            # A router checks the certificates of those who reach the robot through it.
-            listen, guard = guarded(
-                config.endpoints,
-                [setup.name for setup in setups],
-                security=None if config.connect else config.security,
-                insecure=config.insecure,
-                namespace=config.namespace or "",
-            )
-        except ExposureError as error:
-            raise ConfigError(str(error)) from error
+        # A process that others reach through the first one needs no protection of its own.
+        listen, guard = (
+            protected(config, [setup.name for setup in setups]) if share.router is None else ([], {})
+        )
         self.robots: list[ServedRobot] = []
         self.metrics: Metrics | None = None
         """Figures for Prometheus; None if they are not published."""
@@ -76,27 +90,31 @@ class Server:
         reading."""
         try:
             for setup in setups:
-                self.robots.append(_robot(setup, config, observe, several=len(setups) > 1))
+                self.robots.append(_robot(setup, config, observe, several=several))
             self._couriers, self._clocks = _drivers(config, self.robots)
             lockstep = config.clock != "realtime"
             self._network = Network(
                 listen,
                 guard,
                 lockstep=lockstep,
-                connect=config.connect,
-                security=config.security,
+                connect=config.connect if share.router is None else (share.router,),
+                security=config.security if share.router is None else None,
                 namespace=config.namespace or "",
-                on_router=partial(self._tell_router, ", ".join(config.connect)),
+                on_router=partial(self._tell_router, ", ".join(config.connect))
+                if share.router is None
+                else None,
             )
             self._console = Console()
-            self.metrics = None if config.metrics is None else Metrics(config.metrics)
+            self.metrics = (
+                None if config.metrics is None or share.router is not None else Metrics(config.metrics)
+            )
             self._interfaces: list[UrInterfaces] = []
             self.ur: list[tuple[str, dict[InterfaceName, int]]] = []
             """Address and ports of each robot's UR interfaces; empty if they are not open."""
-            for number, robot in enumerate(self.robots):
+            for here, (number, robot) in enumerate(zip(share.numbers, self.robots, strict=True)):
                 # In real time the clock wakes the courier; in lockstep each message does.
                 robot.open(
-                    self._gateways(robot, config, number), self._couriers[number].wake if lockstep else None
+                    self._gateways(robot, config, number), self._couriers[here].wake if lockstep else None
                 )
         except BaseException:  # a signal, too
             self.discard()
@@ -221,6 +239,19 @@ class Server:
         """Why a robot has stopped ticking; None if all of them tick."""
         return next((robot.failure for robot in self.robots if robot.failure is not None), None)
 
+    @property
+    def recordings(self) -> list[Recording]:
+        """What became of the recordings, after `close`."""
+        recorders = [robot.recorder for robot in self.robots if robot.recorder is not None]
+        return [
+            Recording(
+                str(recorder.place or f"a file that is no longer {recorder.path}"),
+                recorder.dropped,
+                recorder.error,
+            )
+            for recorder in recorders
+        ]
+
     def _tell_telemetry(self) -> None:
         # In lockstep each robot has a clock of its own.
         clocks = self._clocks if len(self._clocks) > 1 else self._clocks * len(self.robots)
@@ -239,6 +270,30 @@ def _robot(
     try:
         return ServedRobot(setup, path, dump, observe, programs, config.ur_allow, keep)
     except ValueError as error:
+        raise ConfigError(str(error)) from error
+
+
+def protected(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
+    """Return the endpoints to listen on, and the settings that protect them.
+
+    Args:
+        config: Configuration.
+        names: Names of the robots that are reached there.
+
+    Raises:
+        ConfigError: An endpoint is none, or other machines could reach an unprotected one.
+    """
+    try:
+        check_endpoints("connect", config.connect)
+        # A router checks the certificates of those who reach the robot through it.
+        return guarded(
+            config.endpoints,
+            names,
+            security=None if config.connect else config.security,
+            insecure=config.insecure,
+            namespace=config.namespace or "",
+        )
+    except ExposureError as error:
         raise ConfigError(str(error)) from error
 
 

@@ -206,11 +206,11 @@ class _Job:
             told_of = introduction(setups, config.profile_in_force)
             say(f"{told_of} {config.place} while {named(self.file)} runs")
 
-        say_who_can_reach(server, config)
+        say_who_can_reach(server, config, 1)
         asyncio.run(served.run(ready, self.tell))
         ending.close()
         self.tell.clear()
-        return served.watch, say_recorded(server), server
+        return served.watch, say_recorded(server.recordings), server
 
 
 def _failure(file: Path, watch: "ProgramWatch", errors: list[str]) -> Failure | None:

@@ -2,7 +2,8 @@
 
 import asyncio
 import time
-from typing import Annotated, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -18,12 +19,18 @@ from tvist_cli.serving import (
     ur_ports,
 )
 
+if TYPE_CHECKING:
+    from tvist_controller.setup import Setup
+    from tvist_server.config import ServeConfig
+    from tvist_server.ending import Ending
+
 
 def serve(
     *,
     name: str | None = None,
     robot: str | None = None,
     robots: str | None = None,
+    workers: int | None = None,
     listen: list[str] | None = None,
     connect: list[str] | None = None,
     namespace: str | None = None,
@@ -63,6 +70,8 @@ def serve(
         robot: Name of a robot that comes with the package, or path of a robot file [ur5e].
         robots: Serve several robots, given as `ROBOT[*COUNT]` separated by commas: `ur5e*2,other.toml` serves
             ur5e-1, ur5e-2 and other. Replaces --name and --robot.
+        workers: Number of processes that the robots are spread over, behind the same endpoint; each further one uses
+            one more core. If one dies, all end, with exit code 1 [1].
         listen: Zenoh endpoint to listen on, repeatable [tcp/127.0.0.1:7447; none with --connect].
         connect: Endpoint of a router through which clients reach the robot, repeatable: the robot uses the first that
             answers. If none does within 10 s, the command fails; a router that is lost later is looked for again.
@@ -117,7 +126,7 @@ def serve(
         config: TOML file with any of these options; options on the command line take precedence.
     """
     given: dict[str, Any] = {
-        "name": name, "robot": robot, "robots": robots, "listen": listen, "connect": connect,
+        "name": name, "robot": robot, "robots": robots, "workers": workers, "listen": listen, "connect": connect,
         "namespace": namespace, "metrics": metrics, "security": security,
         "insecure": insecure or None, "profile": lower(profile), "payload": payload,
         "overload": overload or None, "shaper": lower(shaper), "shape_servo": shape_servo or None,
@@ -141,24 +150,47 @@ def serve(
         content |= {key: value for key, value in given.items() if value is not None}
         checked = from_mapping(content, "configuration" if config is None else f"configuration {config}")
         ending = Ending()
+        if checked.workers > 1:
+            _several(checked, ending, began)
+            return
         # Now there is something to clean up, which an exception sees to.
         with told(GatewayError, RecorderError), ending.at_once():
             server = Server(checked)
 
-    def ready() -> None:
-        took = time.monotonic() - began
-        say(
-            f"{introduction([robot.setup for robot in server.robots], checked.profile_in_force)} "
-            f"{checked.place}, "
-            f"clock {checked.clock}; ready after {took:.1f} s. Press Control+C to stop."
-        )
-
-    say_who_can_reach(server, checked)
-    asyncio.run(server.run(ready, ending))
+    setups = [robot.setup for robot in server.robots]
+    say_who_can_reach(server, checked, len(setups))
+    asyncio.run(server.run(lambda: _say_ready(setups, checked, began), ending))
     ending.close()
     if server.failure is not None:
         raise Failure(server.failure)
-    errors = say_recorded(server)
+    errors = say_recorded(server.recordings)
     if errors:
         raise Failure("; ".join(errors))
     leave(server, 0)
+
+
+def _several(config: "ServeConfig", ending: "Ending", began: float) -> None:
+    """Serve the robots in several processes."""
+    from tvist_server.gateways.base import GatewayError
+    from tvist_server.workers import Workers, WorkersError
+
+    with told(WorkersError, GatewayError):
+        with ending.at_once():
+            workers = Workers(config)
+        say_who_can_reach(workers, config, len(workers.setups))
+        try:
+            workers.run(lambda: _say_ready(workers.setups, config, began), ending)
+        finally:
+            ending.close()
+            errors = say_recorded(workers.recordings)
+    if errors:
+        raise Failure("; ".join(errors))
+
+
+def _say_ready(setups: "Sequence[Setup]", config: "ServeConfig", began: float) -> None:
+    took = time.monotonic() - began
+    spread = f" in {config.workers} processes" if config.workers > 1 else ""
+    say(
+        f"{introduction(setups, config.profile_in_force)} {config.place}{spread}, "
+        f"clock {config.clock}; ready after {took:.1f} s. Press Control+C to stop."
+    )

@@ -10,6 +10,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from tvist_client.transports.session import close_session, open_session
+from tvist_lab.benchmark.process import cpu_seconds
 from tvist_lab.served import ServedError, served
 from tvist_protocol import keys
 from tvist_protocol.codec import decode_telemetry
@@ -23,6 +24,8 @@ TRIES = 2
 """Number of tries, of which the better counts, since other load on the machine only ever adds lateness."""
 MISSED = 0.001
 """Share of its ticks that each robot may miss [-]."""
+SEVERAL, SLOWER = 8, 0.25
+"""Number of robots whose processor time is measured, and their speed relative to real time."""
 SETTLE = 2
 """Number of telemetry messages ignored at first, so that the start is not measured."""
 
@@ -47,6 +50,34 @@ async def robots_at_500_hz(seconds: float, tell: Callable[[str], None]) -> int:
         elif (failed := failed + 1) == FAILURES:
             break
     return most
+
+
+async def us_per_robot_and_tick(seconds: float, tell: Callable[[str], None]) -> float:
+    """Return the processor time of a process with `SEVERAL` robots, for each of their ticks [µs].
+
+    A client reads every state of every robot. They run at a fraction of their speed, so that none is late.
+
+    Args:
+        seconds: How long it is measured [s].
+        tell: Called with a description of each measurement before it starts.
+    """
+    tell(f"{SEVERAL} robots at speed {SLOWER:g} for {seconds:g} s")
+    ticks = 0
+
+    def count(_: zenoh.Sample) -> None:
+        nonlocal ticks
+        ticks += 1
+
+    options = ["--robots", f"ur5e*{SEVERAL}", "--speed", str(SLOWER)]
+    async with served(options, "ur5e-1", several=True) as server:
+        session = await asyncio.to_thread(open_session, server.endpoint)
+        session.declare_subscriber(f"{keys.PREFIX}/*/state", Callback(count, indirect=False))
+        await asyncio.sleep(SETTLE)
+        used, before = cpu_seconds(server.pid), ticks
+        await asyncio.sleep(seconds)
+        used, ticked = cpu_seconds(server.pid) - used, ticks - before
+        await asyncio.to_thread(close_session, session)
+    return 1e6 * used / max(1, ticked)
 
 
 async def worst_share(number: int, seconds: float) -> float:

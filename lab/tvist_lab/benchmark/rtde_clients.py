@@ -1,6 +1,6 @@
-"""Clients of RTDE that read at 500 Hz, each with a different recipe, all in this process.
+"""Clients of RTDE that read at 500 Hz, with so many different recipes, all in this process.
 
-    python -m tvist_lab.benchmark.rtde_clients ADDRESS PORT COUNT
+    python -m tvist_lab.benchmark.rtde_clients ADDRESS PORT COUNT RECIPES
 
 A line on stdout says that all of them read. They read until stdin ends; then another line gives the numbers of
 packages that each received and missed.
@@ -98,9 +98,9 @@ class Client:
         return data
 
 
-def main(address: str, port: int, count: int) -> None:
+def main(address: str, port: int, count: int, recipes: int) -> None:
     """Read until stdin ends."""
-    clients = [Client(address, port, recipe(number)) for number in range(count)]
+    clients = [Client(address, port, recipe(number % recipes)) for number in range(count)]
     selector = selectors.DefaultSelector()
     for client in clients:
         selector.register(client.socket, selectors.EVENT_READ, client)
@@ -119,4 +119,4 @@ def main(address: str, port: int, count: int) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
+    main(sys.argv[1], *map(int, sys.argv[2:]))

@@ -112,6 +112,31 @@ def router_access(roles: Mapping[str, Role]) -> dict[str, Any]:
     }
 
 
+def with_robots_behind(
+    access: Mapping[str, Any], robots: Sequence[str], namespace: str, protocol: str
+) -> dict[str, Any]:
+    """Return `access_control` settings that also let the robots themselves connect, over a protocol of their own.
+
+    Args:
+        access: Settings for clients, see `access_control` and `open_access`.
+        robots: Names of the robots.
+        namespace: Namespace of the robots.
+        protocol: Protocol over which nobody but them can connect.
+    """
+    places = [_at(namespace, robot) for robot in robots]
+    # What reaches a client of a robot leaves the robot, and the reverse.
+    own = [_turned(rule, "robots") for rule in (*_viewing(places), *_operating(places))]
+    return {
+        **access,
+        "rules": [*access["rules"], *own],
+        "subjects": [*access["subjects"], {"id": "robots", "link_protocols": [protocol]}],
+        "policies": [
+            *access["policies"],
+            {"id": "robots", "rules": [rule["id"] for rule in own], "subjects": ["robots"]},
+        ],
+    }
+
+
 def _turned(rule: dict[str, Any], name: str) -> dict[str, Any]:
     """Return a rule for the other end of a link."""
     flow = "egress" if rule["flows"] == ["ingress"] else "ingress"

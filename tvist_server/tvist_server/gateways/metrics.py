@@ -48,6 +48,9 @@ class MetricsGateway(Gateway):
         elif isinstance(message, Event):
             self.events[message.kind] += 1
 
+    def look(self) -> None:
+        """Take what has arrived since the last look; before the figures are read."""
+
     def close(self) -> None:
         """Do nothing, since the figures of the last second may still be read."""
 
@@ -83,8 +86,12 @@ class Metrics(Collector):
     def gateway(self, namespace: str, robot: str) -> MetricsGateway:
         """Create the gateway of a robot."""
         gateway = MetricsGateway(namespace, robot)
-        self._robots.append(gateway)
+        self.add(gateway)
         return gateway
+
+    def add(self, gateway: MetricsGateway) -> None:
+        """Publish the figures of one more robot."""
+        self._robots.append(gateway)
 
     def close(self) -> None:
         """Stop listening."""
@@ -96,6 +103,8 @@ class Metrics(Collector):
         """Yield the figures of all robots; robots that have sent no telemetry yet have only those of their states."""
         from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 
+        for robot in self._robots:
+            robot.look()
         states = [(robot.labels, robot.state) for robot in self._robots if robot.state is not None]
         told = [(robot.labels, robot.telemetry) for robot in self._robots if robot.telemetry is not None]
         ticks = CounterMetricFamily("tvist_ticks", "Control periods since the start.", labels=LABELS)

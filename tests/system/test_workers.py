@@ -1,0 +1,153 @@
+"""Several processes behind one endpoint: a client sees one server, and the processes live and end together."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import urllib.request
+
+import psutil
+import pytest
+from tests.conformance.served import PATIENCE, Served, free_endpoint, refused_to_start
+from tests.conformance.wire import Q1, Wire
+from tests.places import free_port, own_address
+
+from tvist_client.check import check
+from tvist_lab.recordings.mcap_file import read
+from tvist_lab.replay import replay_file
+
+pytestmark = pytest.mark.slow
+
+LOCKSTEP = ("--robots", "ur5e*3", "--workers", "2", "--clock", "lockstep")
+NAMES = ["ur5e-1", "ur5e-2", "ur5e-3"]
+
+
+def workers(served):
+    return psutil.Process(served.process.pid).children()
+
+
+def states(endpoint, name, ticks=200):
+    """States of a robot that is stepped, as bytes of what they say."""
+    with Wire(endpoint, name) as wire:
+        wire.listen("state")
+        with wire.control() as token:
+            wire.command("move_j", token=token, q=[1.0, *Q1[1:]])
+            wire.step(token, ticks)
+            wire.until(ticks)
+        return [state for state in wire.received["state"] if state["tick"] > 0]
+
+
+@pytest.fixture(scope="module")
+def served():
+    with Served(*LOCKSTEP, name=None) as served:
+        yield served
+
+
+def test_all_are_found_behind_one_endpoint_and_told_once(served):
+    assert check(served.endpoint).robots == NAMES
+    ready = [line for line in served.lines if "listens" in line]
+    assert len(ready) == 1
+    assert f"{', '.join(NAMES)}; shaper zv) listens on {served.endpoint} in 2 processes" in ready[0]
+    assert len(workers(served)) == 2
+
+
+def test_no_state_is_lost_and_all_are_those_of_one_process(served):
+    with Served(*LOCKSTEP[:2], *LOCKSTEP[4:], name=None) as alone:
+        for name in (NAMES[0], NAMES[2]):
+            behind, direct = states(served.endpoint, name), states(alone.endpoint, name)
+            assert [state["tick"] for state in behind] == list(range(1, 201))
+            assert behind == direct
+
+
+def test_nobody_but_the_processes_speaks_for_a_robot(served):
+    with Wire(served.endpoint, "ur5e-2") as forger, Wire(served.endpoint, "ur5e-2") as wire:
+        wire.listen("state", "event")
+        forger.session.put(wire.key("event"), b"forged")
+        assert wire.info()["name"] == "ur5e-2"  # goes the same way
+        assert not wire.received["event"]
+
+
+def test_a_signal_to_all_processes_ends_all_in_order(tmp_path):
+    number = signal.SIGINT
+    path = tmp_path / "out.mcap"
+    served = Served(*LOCKSTEP, "--record", str(path), name=None)
+    with served:
+        states(served.endpoint, "ur5e-3")
+        children = workers(served)
+        for child in children:  # as a terminal or a supervisor does
+            child.send_signal(number)
+        assert served.end(number) == 0
+        assert psutil.wait_procs(children, PATIENCE)[1] == []
+        served.assert_quiet()
+    assert all(f"recorded into {tmp_path / f'out-{name}.mcap'}\n" in served.said for name in NAMES)
+    recording = read(tmp_path / "out-ur5e-3.mcap")
+    assert recording.complete
+    assert replay_file(recording).first_difference is None
+
+
+def test_a_dead_process_is_told_with_its_robots_and_ends_all(tmp_path):
+    served = Served(*LOCKSTEP, "--record", str(tmp_path / "out.mcap"), name=None)
+    try:
+        served.wait_until_ready()
+        states(served.endpoint, "ur5e-1")
+        first, second = sorted(workers(served), key=lambda child: child.pid)
+        second.kill()
+        assert served.wait() == 1
+        assert (
+            "worker 2 of 2 (ur5e-2, ur5e-3) was ended by SIGKILL: the other robots were stopped"
+            in served.said
+        )
+        assert not first.is_running()
+        assert read(tmp_path / "out-ur5e-1.mcap").complete
+        served.assert_quiet()
+    finally:
+        served.kill()
+
+
+def test_the_processes_end_with_the_first_one():
+    served = Served(*LOCKSTEP, name=None)
+    try:
+        served.wait_until_ready()
+        children = workers(served)
+        served.process.kill()
+        assert psutil.wait_procs(children, PATIENCE)[1] == []
+    finally:
+        served.kill()
+
+
+def test_a_port_that_is_taken_leaves_neither_processes_nor_recordings(served, tmp_path):
+    options = (*LOCKSTEP, "--record", tmp_path / "out.mcap")
+    code, said = refused_to_start(*options, endpoint=served.endpoint)
+    assert code == 1
+    assert "the port is in use" in said
+    port, address = free_port(), own_address(9)
+    with Served(*LOCKSTEP, "--ur-address", address, "--ur-port", f"rtde={port}", name=None):
+        code, said = refused_to_start(*options, "--ur-address", address, "--ur-port", f"rtde={port}")
+    assert code == 1
+    assert f"cannot listen on {address} port" in said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_in_a_namespace_with_figures_for_prometheus():
+    port = free_port()
+    with Served(*LOCKSTEP, "--namespace", "hall-3", "--metrics", str(port), name=None):
+        page, until = "", time.monotonic() + PATIENCE
+        while page.count("tvist_ticks_total{") < 3 and time.monotonic() < until:
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics") as answer:
+                page = answer.read().decode()
+        for name in NAMES:
+            assert f'tvist_ticks_total{{namespace="hall-3",robot="{name}"}}' in page
+
+
+def test_through_a_router_of_a_fleet():
+    endpoint = free_endpoint()
+    command = [sys.executable, "-m", "tvist_cli", "router", "--listen", endpoint]
+    with subprocess.Popen(
+        command, stderr=subprocess.PIPE, env={**os.environ, "PYTHONUNBUFFERED": "1"}
+    ) as router:
+        router.stderr.readline()
+        with Served(*LOCKSTEP, router=endpoint, name=None):
+            assert check(endpoint).robots == NAMES
+        router.terminate()
+        router.stderr.read()

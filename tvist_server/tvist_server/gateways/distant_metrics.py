@@ -1,0 +1,42 @@
+"""Figures of a robot of another process for Prometheus, from the messages that it publishes."""
+
+import zenoh
+from zenoh.handlers import Callback, RingChannel
+
+from tvist_protocol import keys
+from tvist_protocol.codec import decode_event, decode_state, decode_telemetry
+from tvist_server.gateways.metrics import MetricsGateway
+
+
+class DistantMetrics(MetricsGateway):
+    """Keeps the newest messages of a robot that another process serves.
+
+    Args:
+        session: The router to which that process is connected.
+        namespace: Namespace of the robot; empty if it has none.
+        robot: Name of the robot.
+    """
+
+    def __init__(self, session: zenoh.Session, namespace: str, robot: str) -> None:
+        super().__init__(namespace, robot)
+        # Nobody looks at 500 states a second: Zenoh keeps the newest, without a call of Python for each.
+        newest: RingChannel[zenoh.Sample] = RingChannel(1)
+        self._states = session.declare_subscriber(keys.within(namespace, keys.state(robot)), newest)
+        session.declare_subscriber(
+            keys.within(namespace, keys.event(robot)), Callback(self._on_event, indirect=False)
+        )
+        session.declare_subscriber(
+            keys.within(namespace, keys.telemetry(robot)), Callback(self._on_telemetry, indirect=False)
+        )
+
+    def look(self) -> None:
+        """Take the newest state."""
+        sample = self._states.try_recv()
+        if sample is not None:
+            self.state = decode_state(sample.payload.to_bytes())
+
+    def _on_event(self, sample: zenoh.Sample) -> None:
+        self.events[decode_event(sample.payload.to_bytes()).kind] += 1
+
+    def _on_telemetry(self, sample: zenoh.Sample) -> None:
+        self.telemetry = decode_telemetry(sample.payload.to_bytes())

@@ -1,0 +1,68 @@
+"""How the robots of one server are spread over processes, and which options that excludes."""
+
+import multiprocessing
+from dataclasses import dataclass
+from itertools import pairwise
+
+from tvist_server.config import ConfigError, ServeConfig
+
+LOCAL = "unixsock-stream/"
+"""Beginning of the endpoints that only the server's own processes may use if there are several."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """The robots that one of several processes serves."""
+
+    numbers: range
+    """Places of the robots in the list of all."""
+    router: str | None = None
+    """Endpoint of the process that clients connect to; None if this process has the endpoints of the configuration."""
+
+
+def shares(robots: int, workers: int) -> list[range]:
+    """Return the robots of each process: neighbours, and nowhere more than one more than elsewhere.
+
+    Args:
+        robots: Number of robots.
+        workers: Number of processes, at most `robots`.
+    """
+    bounds = [worker * robots // workers for worker in range(workers + 1)]
+    return [range(first, last) for first, last in pairwise(bounds)]
+
+
+def check_together(config: ServeConfig, robots: int) -> None:
+    """Check what the options of network and processes ask of each other.
+
+    Args:
+        config: Configuration.
+        robots: Number of robots that it names.
+
+    Raises:
+        ConfigError: They exclude each other.
+    """
+    if config.connect and config.endpoints and config.security is not None:
+        raise ConfigError(
+            "connect, listen and security exclude each other: the router checks certificates, so leave listen out"
+        )
+    if config.workers == 1:
+        return
+    if config.workers > robots:
+        raise ConfigError(f"workers is {config.workers}: must be at most the number of robots, {robots}")
+    if "fork" not in multiprocessing.get_all_start_methods():
+        raise ConfigError(f"workers is {config.workers}: this system cannot fork processes, so give 1")
+    if config.connect and config.endpoints:
+        raise ConfigError(
+            "connect, listen and workers exclude each other: each process connects to the router, so leave listen out"
+        )
+    if config.connect and config.metrics is not None:
+        raise ConfigError(
+            "connect, metrics and workers exclude each other: run a server for each process, with metrics on ports of "
+            "their own"
+        )
+    for endpoint in config.endpoints:
+        if endpoint.startswith(LOCAL):
+            raise ConfigError(
+                f"listen is {endpoint}, and workers is {config.workers}: Unix sockets are for the server's own "
+                "processes, so listen on tcp/ or tls/"
+            )

@@ -1,0 +1,259 @@
+"""Several processes that serve robots behind one endpoint.
+
+Clients connect to the first process, which has no robots. It is a router, to which the others connect over a socket
+that nobody else can open. Each robot ticks in one of the others, as it would in a process of its own.
+"""
+
+import contextlib
+import gc
+import multiprocessing
+import multiprocessing.process
+import signal
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+from typing import Any
+
+from tvist_client.transports.session import close_session
+from tvist_controller.controller import Controller
+from tvist_controller.host import Host
+from tvist_controller.planner import Planner
+from tvist_controller.setup import Setup
+from tvist_server.config import ConfigError, ServeConfig
+from tvist_server.ending import Ending
+from tvist_server.gateways.access import with_robots_behind
+from tvist_server.gateways.distant_metrics import DistantMetrics
+from tvist_server.gateways.endpoints import protocol
+from tvist_server.gateways.metrics import Metrics
+from tvist_server.gateways.network import REALTIME, open_router
+from tvist_server.server import Recording, protected
+from tvist_server.spread import LOCAL, Share, check_together, shares
+from tvist_server.ur_ports import InterfaceName
+from tvist_server.worker import Ended, Made, News, Ready, Refused, work
+
+END = 15.0
+"""Longest wait for a process to end its recordings and leave [s]; then it is killed."""
+
+
+class WorkersError(Exception):
+    """Robots cannot be served, or some have stopped; the message says which and why."""
+
+
+@dataclass
+class _Worker:
+    """One process, from here."""
+
+    number: int
+    process: multiprocessing.process.BaseProcess
+    pipe: Connection
+    names: str
+    """Its robots, in words."""
+    told: Ended | None = None
+    """What it said at its end."""
+
+
+class Workers:
+    """The first process: it starts the others, lets clients reach them, and ends with them.
+
+    Args:
+        config: Configuration of the robots.
+
+    Raises:
+        ConfigError: The configuration is invalid.
+        UserFileError: A file that is named has the wrong kind of content.
+        GatewayError: The server cannot listen on an endpoint.
+        WorkersError: A process cannot serve its robots.
+    """
+
+    def __init__(self, config: ServeConfig) -> None:
+        self.setups = config.setups()
+        check_together(config, len(self.setups))
+        self._names = [setup.name for setup in self.setups]
+        self._listen, self._guard = protected(config, self._names)
+        self._config = config
+        self.ur: list[tuple[str, dict[InterfaceName, int]]] = []
+        """Address and ports of each robot's UR interfaces; empty if they are not open."""
+        self.recordings: list[Recording] = []
+        """What became of the recordings, after `run`."""
+        self.metrics: Metrics | None = None
+        self._session: Any = None
+        self._folder = tempfile.TemporaryDirectory(prefix="tvist-")
+        self._workers: list[_Worker] = []
+        for setup in {id(setup.description): setup for setup in self.setups}.values():
+            _rehearse(setup)
+        try:
+            self._fork()
+            self._open()  # after the forks, since it starts threads
+            for worker in self._workers:
+                worker.pipe.send(True)
+            for worker in self._workers:
+                self.ur += self._made(worker)
+        except BaseException:  # a signal, too
+            self.close()
+            raise
+
+    def run(self, ready: Callable[[], None], ending: Ending) -> None:
+        """Serve until a signal comes.
+
+        Args:
+            ready: Function to call once all robots tick and answer.
+            ending: The shutdown requested by signals.
+
+        Raises:
+            WorkersError: A process has died or a robot has stopped; all others were ended in order.
+        """
+        heard, wake = multiprocessing.Pipe(duplex=False)
+        ending.hear(lambda: wake.send(None))
+        why: str | None = None
+        try:
+            for worker in self._workers:
+                worker.pipe.send(True)
+            waiting: dict[Any, _Worker] = {worker.pipe: worker for worker in self._workers}
+            starting = len(waiting)
+            while why is None:
+                for source in wait([heard, *waiting]):
+                    if source is heard:
+                        return
+                    worker = waiting[source]
+                    news = self._news(worker)
+                    if not isinstance(news, Ready):
+                        why = why or self._why(worker, news)
+                        continue
+                    starting -= 1
+                    if starting == 0:
+                        ready()
+        finally:
+            failures = self.close()
+        said = [*([why] if why is not None else []), *failures]
+        if said:
+            raise WorkersError("; ".join(said) + ": the other robots were stopped, too")
+
+    def close(self) -> list[str]:
+        """End the other processes, then the network; return what went wrong. A second call does nothing."""
+        workers, self._workers = self._workers, []
+        for worker in workers:
+            with contextlib.suppress(OSError):  # it has died
+                worker.pipe.send(False)
+        failures = [failure for worker in workers for failure in self._end(worker)]
+        if self.metrics is not None:
+            self.metrics.close()
+        if self._session is not None:
+            close_session(self._session)
+        self._folder.cleanup()
+        return failures
+
+    # ------------------------------------------------------------------ start
+
+    def _fork(self) -> None:
+        gc.collect()
+        gc.freeze()  # what exists stays shared memory: the collector writes to no object that it does not look at
+        context = multiprocessing.get_context("fork")
+        parts = shares(len(self.setups), self._config.workers)
+        pipes = [multiprocessing.Pipe() for _ in parts]
+        router = None if self._config.connect else self._inside
+        for number, part in enumerate(parts):
+            # A process that keeps another one's pipe open would hide the end of the first process from it.
+            rest = [
+                end for other, pair in enumerate(pipes) for end in pair if (other, end) != (number, pair[1])
+            ]
+            arguments = self._config, Share(part, router), pipes[number][1], rest
+            process = context.Process(target=_work, args=arguments, name=f"tvist-worker-{number + 1}")
+            process.start()
+            self._workers.append(_Worker(number + 1, process, pipes[number][0], _listed(self._names, part)))
+        for _, theirs in pipes:
+            theirs.close()
+        gc.unfreeze()
+
+    @property
+    def _inside(self) -> str:
+        """Endpoint for the processes; the folder is this user's alone."""
+        return f"{LOCAL}{Path(self._folder.name) / 'robots'}"
+
+    def _open(self) -> None:
+        config, lockstep = self._config, self._config.clock != "realtime"
+        if not config.connect:
+            inside, place = self._inside, config.namespace or ""
+            access = with_robots_behind(
+                self._guard["access_control"], self._names, place, protocol(self._inside)
+            )
+            settings = {**({} if lockstep else REALTIME), **self._guard, "access_control": access}
+            self._session = open_router([*self._listen, inside], [], settings, None)
+        if config.metrics is not None:
+            self.metrics = Metrics(config.metrics)
+            for name in self._names:
+                self.metrics.add(DistantMetrics(self._session, config.namespace or "", name))
+
+    def _made(self, worker: _Worker) -> list[tuple[str, dict[InterfaceName, int]]]:
+        news = self._news(worker)
+        if isinstance(news, Made):
+            return news.ur
+        if isinstance(news, Refused) and news.misuse:
+            raise ConfigError(news.why)
+        raise WorkersError(self._why(worker, news))
+
+    # ------------------------------------------------------------------ life and end
+
+    def _news(self, worker: _Worker) -> News | None:
+        """Return what a process says; None if it has died."""
+        try:
+            news: News = worker.pipe.recv()
+        except (EOFError, OSError):
+            return None
+        if isinstance(news, Ended):
+            worker.told = news
+            self.recordings += news.recordings
+        return news
+
+    def _why(self, worker: _Worker, news: News | None) -> str:
+        """Say why a process serves its robots no more."""
+        if isinstance(news, Refused):
+            return news.why
+        if isinstance(news, Ended) and news.failure is not None:
+            return news.failure
+        worker.process.join(END)
+        code = worker.process.exitcode
+        how = (
+            f"was ended by {signal.Signals(-code).name}"
+            if code and code < 0
+            else f"ended with exit code {code}"
+        )
+        return f"worker {worker.number} of {self._config.workers} ({worker.names}) {how}"
+
+    def _end(self, worker: _Worker) -> list[str]:
+        """Wait for the end of a process that was told to end; return what went wrong."""
+        already = worker.told is not None or not worker.process.is_alive()
+        while worker.told is None and worker.pipe.poll(END) and self._news(worker) is not None:
+            pass
+        worker.process.join(END)
+        if worker.process.is_alive():
+            worker.process.kill()
+            worker.process.join()
+            return [f"worker {worker.number} ({worker.names}) did not end within {END:g} s and was killed"]
+        failure = None if worker.told is None else worker.told.failure
+        return [] if failure is None or already else [failure]
+
+
+def _work(config: ServeConfig, share: Share, first: Connection, others: Sequence[Connection]) -> None:
+    """Begin a process; wait until its network is there."""
+    for end in others:
+        end.close()
+    signals = Ending()  # from now on a signal ends only the first process
+    signals.close()
+    try:
+        if first.recv():
+            work(config, share, first)
+    except (EOFError, OSError):  # the first process has given up
+        return
+
+
+def _rehearse(setup: Setup) -> None:
+    """Compile and load what a robot needs, so that the other processes have it, and share its memory."""
+    Planner(setup).rehearse()
+    Host(Controller(setup)).tick()
+
+
+def _listed(names: Sequence[str], part: range) -> str:
+    first, last = names[part[0]], names[part[-1]]
+    return first if len(part) == 1 else f"{first}, {last}" if len(part) == 2 else f"{first} to {last}"
