@@ -23,7 +23,7 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_sessionstart(session):
-    """Compile the kernels before tests run side by side: numba's cache is not made for several that write at once.
+    """Compile the kernels before tests run side by side, so that not each process does.
 
     Programs that tests start hear signals also under nohup, as a handler, unlike SIG_IGN, is not inherited.
     """

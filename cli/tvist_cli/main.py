@@ -46,6 +46,7 @@ COMMANDS = {
     "shaperbench": "Rank shapers, your own included, on ten simulated arms.",
     "search": "Search for cases in which a robot breaks its promises.",
     "bench": "Measure how fast tvist runs on this machine.",
+    "kernels": "Compile ahead what a robot computes at every tick, so that no start has to.",
     "keys": "Create TLS certificates for a robot and its clients.",
     "completion": "Print the script by which a shell completes commands, options and their values.",
 }

@@ -14,13 +14,17 @@ if TYPE_CHECKING:
     from tvist_server.workers import Workers
 
 
-def say_if_compiling() -> None:
-    """Say that the start takes longer if nothing is in numba's cache yet."""
-    from tvist_controller.kinematics.inverse import is_compiled as planning_is_compiled
-    from tvist_plant.flexible_arm import is_compiled
+def compile_if_new() -> None:
+    """Compile what is not on disk yet, on all processors, and say so, since the start then takes long."""
+    from tvist_server.kernels import KernelsError, are_compiled, compile_ahead
 
-    if not (is_compiled() and planning_is_compiled()):
-        say("compiling the arm's equations; this happens once and takes up to a minute")
+    if are_compiled():
+        return
+    say("compiling the arm's equations for this processor; this happens once and takes up to a minute")
+    try:
+        compile_ahead()
+    except KernelsError as error:  # the robot compiles for itself
+        say(f"warning: the next start compiles again: {error}")
 
 
 def ur_ports(given: Sequence[str] | None) -> dict[str, int] | None:

@@ -1,22 +1,16 @@
-"""Compile functions with numba."""
+"""Compile the functions of the controller, so that other threads can run while they do."""
 
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
-from numba import njit
+from tvist_shaping.compiling import compiled as compile_function
+from tvist_shaping.compiling import is_cached
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+__all__ = ["compiled", "is_cached"]
+
 
 def compiled(function: F) -> F:
-    """Compile `function`; its Python source remains available as `.py_func`; the cache outlives the process.
-
-    Other threads can run while it does.
-    """
-    return cast("F", njit(cache=True, nogil=True)(function))
-
-
-def is_cached(function: Any) -> bool:
-    """Return whether a compiled function's machine code is on disk already; otherwise its first call takes seconds."""
-    return any(Path(function.stats.cache_path).glob(f"*.{function.__name__}-*.nbi"))
+    """Compile `function`, see `tvist_shaping.compiling`; it does not hold the interpreter's lock while it runs."""
+    return compile_function(function, nogil=True)

@@ -42,7 +42,15 @@ class Planner:
 
     def rehearse(self) -> None:
         """Compile what plans use, before any is needed: it takes long where nothing is in numba's cache."""
+        self.rehearse_postures()
+        self.rehearse_plans()
+
+    def rehearse_postures(self) -> None:
+        """Compile inverse kinematics."""
         self._reachable.rehearse()
+
+    def rehearse_plans(self) -> None:
+        """Compile what is not inverse kinematics."""
         rehearse()
         self._paths.rehearse()
         self._scripts.rehearse()

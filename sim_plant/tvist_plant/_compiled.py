@@ -1,25 +1,5 @@
-"""Compile functions with numba, or use them as plain Python if numba is not installed."""
+"""Compile the functions of the plant."""
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any, TypeVar, cast
+from tvist_shaping.compiling import compiled, is_cached
 
-F = TypeVar("F", bound=Callable[..., Any])
-
-
-def compiled(function: F) -> F:
-    """Compile `function`; its Python source remains available as `.py_func`; the cache outlives the process."""
-    try:
-        from numba import njit
-    except ImportError:  # pragma: no cover
-        function.py_func = function  # type: ignore[attr-defined]
-        return function
-    return cast("F", njit(cache=True)(function))
-
-
-def is_cached(function: Callable[..., Any]) -> bool:
-    """Return whether a compiled function's machine code is on disk already; otherwise its first call takes seconds."""
-    stats = getattr(function, "stats", None)
-    if stats is None:  # pragma: no cover  numba is missing: there is nothing to compile
-        return True
-    return any(Path(stats.cache_path).glob(f"*.{function.__name__}-*.nbi"))
+__all__ = ["compiled", "is_cached"]

@@ -84,6 +84,7 @@ MISUSE = [
     (("move",), ["target is missing"]),
     (("analyze",), ["file is missing"]),
     (("keys",), ["folder is missing"]),
+    (("kernels", "--processes", "0"), ["processes is 0", "at least 1"]),
     (("move", "Q1", "Q2"), ["'Q2'"]),
     (("replay", "a", "b", "c"), ["'c'"]),
     (("move", "Q1", "--velocity"), ["--velocity needs a value"]),

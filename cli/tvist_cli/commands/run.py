@@ -13,7 +13,7 @@ from tvist_cli.misuse import lower
 from tvist_cli.output import print_json, say
 from tvist_cli.program_output import Tell
 from tvist_cli.scripts import named, placed, read_script
-from tvist_cli.serving import introduction, leave, say_if_compiling, say_recorded, say_who_can_reach
+from tvist_cli.serving import compile_if_new, introduction, leave, say_recorded, say_who_can_reach
 
 if TYPE_CHECKING:
     from tvist_lab.programs.watch import ProgramWatch
@@ -90,7 +90,7 @@ def run(
         "ur": ur or None, "ur_allow": ur_allow,
     }  # fmt: skip
     checked = _configuration(given, config, lockstep=lockstep)
-    say_if_compiling()
+    compile_if_new()
     job = _Job(file, text, inputs or (), timeout, Tell(quiet=json))
     watch, errors, server = job.in_lockstep(checked) if lockstep else job.in_real_time(checked)
     job.tell(watch)

@@ -11,9 +11,9 @@ from tvist_cli.failure import Failure, told
 from tvist_cli.misuse import lower
 from tvist_cli.output import say
 from tvist_cli.serving import (
+    compile_if_new,
     introduction,
     leave,
-    say_if_compiling,
     say_recorded,
     say_who_can_reach,
     ur_ports,
@@ -138,7 +138,7 @@ def serve(
         "ur_ports": ur_ports(ur_port), "ur_allow": ur_allow,
     }  # fmt: skip
     began = time.monotonic()
-    say_if_compiling()
+    compile_if_new()
     from tvist_server.config import ConfigError, from_mapping, read_toml
     from tvist_server.ending import Ending
     from tvist_server.gateways.base import GatewayError

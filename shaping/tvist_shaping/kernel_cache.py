@@ -1,0 +1,181 @@
+"""Machine code of kernels on disk: one file for each kernel, sources, processor and types of the arguments.
+
+numba's own cache has one file for each kernel that lists the others. It is renewed if the file with the kernel
+changes, but not if a kernel in another file does that this one calls; and two processes that fill it at once can give
+each other's machine code the wrong name. Here a file's name says all that its content depends on, so that nothing is
+ever renewed, and it appears whole.
+"""
+
+# The types of numba are not whole.
+# mypy: disable-error-code="no-untyped-call,attr-defined"
+
+import contextlib
+
+# mypy: disable-error-code="no-untyped-call,attr-defined"
+# The types of numba are not whole.
+import hashlib
+import os
+import pickle
+import sys
+import uuid
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import llvmlite
+import numba
+from numba.core import config
+from numba.core.caching import CompileResultCacheImpl, _Cache, _cache_log
+from numba.core.registry import cpu_target
+from numba.core.serialize import dumps
+from numba.misc.appdirs import AppDirs
+
+from tvist_shaping.kernel_sources import digest
+
+DIGITS = 16
+"""Hexadecimal digits of each hash in a file's name."""
+CHECKSUM_BYTES = 32
+
+unkept: dict[str, str] = {}
+"""Why machine code could not be kept in any folder, by the folder that was tried last."""
+
+
+class KernelCache(_Cache):
+    """The machine code of one kernel, for numba's dispatcher.
+
+    Args:
+        function: The kernel's Python source.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+        self._name = f"{function.__module__}.{function.__qualname__}".replace("<locals>", "_")
+        self._content = _Content(function)
+        self._enabled = True
+
+    @cached_property
+    def _sources(self) -> str:
+        """Hash of what the machine code depends on among our sources; computed when a kernel is first called."""
+        return _short(digest(self._function.__module__) + self._function.__code__.co_code.hex())
+
+    @cached_property
+    def _folders(self) -> list[Path]:
+        return folders(Path(self._function.__code__.co_filename).parent)
+
+    @property
+    def cache_path(self) -> str:
+        """The folder in which machine code is looked for first."""
+        return str(self._folders[0])
+
+    def holds(self) -> bool:
+        """Return whether there is machine code of this kernel for this processor, for any types."""
+        pattern = f"{self._name}.{self._sources}-{_machine(cpu_target.target_context)}-*.kernel"
+        return any(True for folder in self._folders for _ in folder.glob(pattern))
+
+    def load_overload(self, sig: object, target_context: Any) -> Any:
+        """Return the kernel for types of arguments; None if there is none on disk, or the file is damaged."""
+        target_context.refresh()
+        name = self._file(sig, target_context)
+        for folder in self._folders if self._enabled else ():
+            with contextlib.suppress(OSError):
+                content = (folder / name).read_bytes()
+                checksum, code = content[:CHECKSUM_BYTES], content[CHECKSUM_BYTES:]
+                if hashlib.sha256(code).digest() == checksum:
+                    _cache_log("[cache] data loaded from %r", str(folder / name))  # with NUMBA_DEBUG_CACHE=1
+                    return self._content.rebuild(target_context, pickle.loads(code))  # noqa: S301  written by us
+        return None
+
+    def save_overload(self, sig: object, data: Any) -> None:
+        """Write a kernel into the first folder that can be written in; if there is none, note it in `unkept`."""
+        if not self._enabled or not self._content.check_cachable(data):
+            return
+        code = dumps(self._content.reduce(data))
+        name = self._file(sig, data.target_context)
+        failed: dict[str, str] = {}
+        for folder in self._folders:
+            try:
+                _write(folder / name, hashlib.sha256(code).digest() + code)
+            except OSError as error:
+                failed = {str(folder): error.strerror or str(error)}
+                continue
+            _cache_log("[cache] data saved to %r", str(folder / name))
+            self._forget_older(folder, name)
+            return
+        unkept.update(failed)
+
+    def enable(self) -> None:
+        """Use the disk again."""
+        self._enabled = True
+
+    def disable(self) -> None:
+        """Do not use the disk."""
+        self._enabled = False
+
+    def flush(self) -> None:
+        """Remove this kernel's machine code for all sources, processors and types."""
+        for folder in self._folders:
+            _remove(folder.glob(f"{self._name}.*.kernel"))
+
+    def _file(self, sig: object, target_context: Any) -> str:
+        return f"{self._name}.{self._sources}-{_machine(target_context)}-{_short(str(sig))}.kernel"
+
+    def _forget_older(self, folder: Path, name: str) -> None:
+        """Remove what this kernel was before its sources changed, on this machine."""
+        machine = name.split("-")[-2]
+        older = (
+            file
+            for file in folder.glob(f"{self._name}.*-{machine}-*.kernel")
+            if self._sources not in file.name
+        )
+        _remove(older)
+
+
+class _Content(CompileResultCacheImpl):
+    """How numba turns a compiled function into something to write, and back; where to is ours."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        # As the base does, without a search for a folder: both are for warnings.
+        self._lineno = function.__code__.co_firstlineno
+        self._py_file = function.__code__.co_filename
+        self._locator = self
+
+
+def folders(sources: Path) -> list[Path]:
+    """Return the folders to look for the machine code of a folder's kernels, and to write it, in this order.
+
+    Args:
+        sources: Folder of the modules with the kernels.
+    """
+    below = f"{sources.name}-{_short(str(sources))}"
+    if config.CACHE_DIR:  # NUMBA_CACHE_DIR
+        return [Path(config.CACHE_DIR) / below]
+    user = Path(AppDirs(appname="tvist", appauthor=False).user_cache_dir)
+    return [sources / "__pycache__", user / "kernels" / below]
+
+
+def _machine(target_context: Any) -> str:
+    """Hash of the processor with its features, and of what compiles and loads for it."""
+    versions = (sys.version, numba.__version__, llvmlite.__version__)
+    return _short(repr((target_context.codegen().magic_tuple(), versions)))
+
+
+def _write(file: Path, content: bytes) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    draft = file.with_name(f"{uuid.uuid4().hex}.draft")
+    try:
+        draft.write_bytes(content)
+        os.replace(draft, file)  # noqa: PTH105  whole, or not at all
+    except OSError:
+        _remove(iter([draft]))
+        raise
+
+
+def _remove(files: Iterator[Path]) -> None:
+    for file in files:
+        with contextlib.suppress(OSError):  # another process did, or may not be disturbed
+            file.unlink()
+
+
+def _short(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:DIGITS]

@@ -1,0 +1,67 @@
+"""What a kernel's machine code depends on among our own sources."""
+
+import hashlib
+import re
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+OURS = "tvist_"
+"""How the names of our packages begin."""
+_IMPORT = re.compile(
+    rf"^(?:from[ ]+({OURS}[\w.]+)[ ]+import[ ]+(\([^)]*\)|[^\n]*)|import[ ]+({OURS}[\w.]+))", re.MULTILINE
+)
+
+
+def digest(module: str) -> str:
+    """Return a hash of the contents of a module and of all modules of ours that it imports at its top, transitively.
+
+    The machine code of a kernel contains that of the kernels which it calls, and the values of constants, wherever
+    they are from. A module that is imported within a function cannot add to it.
+
+    Args:
+        module: Full name of the module.
+    """
+    found: set[str] = set()
+    waiting = [module]
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting += _read(name)[1]
+    together = hashlib.sha256()
+    for name in sorted(found):
+        together.update(f"{name} {_read(name)[0]}\n".encode())
+    return together.hexdigest()
+
+
+@cache
+def _read(module: str) -> tuple[str, tuple[str, ...]]:
+    """Return the hash of a module's source, and the modules of ours that it imports at its top."""
+    file = _file(module)
+    if file is None:
+        return "", ()
+    content = file.read_bytes()
+    imported = set()
+    for origin, names, whole in _IMPORT.findall(content.decode()):
+        imported.add(origin or whole)
+        # `from package import name`: the name may be that of a module.
+        for name in re.findall(r"^\s*\(?\s*(\w+)|,\s*(\w+)", names):
+            inner = f"{origin}.{name[0] or name[1]}"
+            if _file(inner) is not None:
+                imported.add(inner)
+    return hashlib.sha256(content).hexdigest(), tuple(sorted(imported))
+
+
+@cache
+def _file(module: str) -> Path | None:
+    """Return the file of a module, found without importing it; None if there is none."""
+    top, *inner = module.split(".")
+    spec = find_spec(top)
+    if spec is None or spec.origin is None:
+        return None
+    place = Path(spec.origin)
+    if inner:
+        place = place.parent.joinpath(*inner)
+        place = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
+    return place if place.is_file() else None
