@@ -10,12 +10,12 @@ import math
 import mujoco
 import numpy as np
 import pinocchio as pin
-from numba import njit
 from numpy.typing import NDArray
 
 from tvist_plant.description import Payload, RobotDescription, Tensor
 from tvist_plant.drives import DriveCommand
 from tvist_plant.model import FLANGE, link_frame
+from tvist_shaping.compiling import compiled
 
 Floats = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ PERIOD = 0.002
 """Time between commands [s]."""
 
 
-@njit(cache=True)
+@compiled
 def drive(
     start: Floats,
     end: Floats,
