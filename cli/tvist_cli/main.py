@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from tvist_cli.overview import ABOUT, overview
 from tvist_server.ending import ending_signals
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
 
     app = cyclopts.App(
         name="tvist",
-        help="A robot controller for a flexible arm in simulation, with time-varying input shaping.",
+        help=ABOUT,
         version=version("tvist"),
         help_format="markdown",  # joins the lines of a docstring
         default_parameter=cyclopts.Parameter(negative=(), validator=finite, show_default=_default),
@@ -108,6 +109,12 @@ def _run() -> None:
         for number in ending_signals():
             if number != signal.SIGINT:
                 signal.signal(number, lambda *_: os._exit(0))
+    if sys.argv[1:] in (["--help"], ["-h"]):
+        try:
+            print(overview(COMMANDS), flush=True)
+        except BrokenPipeError:  # the reader has seen enough
+            os._exit(1)
+        return
     # The matrices are small: threads for them would only slow down each other and the control loop.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:

@@ -5,7 +5,8 @@ import threading
 
 import pytest
 
-from tvist_server.clock import PRIORITY, Lockstep, Mailbox, Realtime
+from tvist_server import punctual
+from tvist_server.clock import Lockstep, Mailbox, Realtime
 
 pytestmark = pytest.mark.realtime
 
@@ -101,7 +102,7 @@ def test_real_time_priority_is_asked_for_by_the_tick_thread_itself(monkeypatch):
     served([Mailbox(FakeHost())], priority=True)
     ((thread, which, policy, parameter),) = asked
     assert (thread, which, policy) == ("tvist-tick", 0, os.SCHED_FIFO)
-    assert parameter.sched_priority == PRIORITY
+    assert parameter.sched_priority == punctual.PRIORITY
     served([Mailbox(FakeHost())])
     assert len(asked) == 1
 

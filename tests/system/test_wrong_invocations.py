@@ -84,6 +84,8 @@ MISUSE = [
     (("move",), ["target is missing"]),
     (("analyze",), ["file is missing"]),
     (("keys",), ["folder is missing"]),
+    (("bench", "--lateness", "0"), ["lateness is 0", "more than 0"]),
+    (("serve", "--processor", "-1"), ["processor", "0"]),
     (("kernels", "--processes", "0"), ["processes is 0", "at least 1"]),
     (("move", "Q1", "Q2"), ["'Q2'"]),
     (("replay", "a", "b", "c"), ["'c'"]),

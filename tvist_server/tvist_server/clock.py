@@ -6,8 +6,6 @@ In both cases one thread owns a controller, and other threads reach the controll
 import contextlib
 import ctypes
 import logging
-import os
-import sys
 import threading
 import time
 from abc import ABC, abstractmethod
@@ -16,6 +14,7 @@ from collections.abc import Callable, Sequence
 from tvist_controller.host import Host
 from tvist_server.jobs import Do, Jobs
 from tvist_server.lateness import Lateness, Punctuality
+from tvist_server.punctual import PRIORITY, bind, take_priority
 from tvist_server.schedule import Schedule
 
 log = logging.getLogger(__name__)
@@ -31,8 +30,6 @@ REPEAT_EVERY = 1.0
 """Time after which a robot in lockstep publishes its last state again, if there was no step meanwhile [s]."""
 SET_TIMER_SLACK = 29
 """Option of prctl for the timer slack: the largest delay with which a thread may be woken, in nanoseconds."""
-PRIORITY = 50
-"""Real-time priority of the tick thread: the middle of the range 1 to 99."""
 
 
 class Mailbox:
@@ -149,6 +146,7 @@ class Realtime(Clock):
         period: Tick [s].
         speed: Simulation speed relative to real time [-].
         priority: Whether to ask the system for real-time priority.
+        processor: Processor to bind the thread to; None to run on any.
     """
 
     def __init__(
@@ -159,20 +157,30 @@ class Realtime(Clock):
         speed: float = 1.0,
         *,
         priority: bool = False,
+        processor: int | None = None,
     ) -> None:
         super().__init__(robots)
         self._hand_on = hand_on
         self._period = period / speed
-        self._priority = priority
+        self._priority, self._processor = priority, processor
+        self._asked = threading.Event()
+        self.granted: list[str] = []
+        """What the system has granted the thread, in words; complete after `start`."""
+
+    def start(self) -> None:
+        """Start the thread, and wait until it has asked for what it is to have."""
+        super().start()
+        self._asked.wait()
 
     def punctuality(self, robot: Mailbox) -> Punctuality:
         """Lateness since the last call."""
         return robot.lateness.look()
 
     def _run(self) -> None:
-        _wake_sharply()
-        if self._priority:
-            _ask_for_priority()
+        try:
+            self._ask()
+        finally:
+            self._asked.set()
         robots, now, sleep = self._robots, time.monotonic, time.sleep
         alone, handed_on = len(robots) == 1, -HAND_ON_EVERY
         schedule = Schedule(len(robots), self._period, now())
@@ -198,28 +206,20 @@ class Realtime(Clock):
             robot.jobs.do_waiting()
         self._hand_on()
 
+    def _ask(self) -> None:
+        """Ask the system for what belongs to the calling thread."""
+        _wake_sharply()
+        if self._priority and take_priority():
+            self.granted.append(f"real-time priority {PRIORITY}")
+        if self._processor is not None and bind(self._processor):
+            self.granted.append(f"bound to processor {self._processor}")
+
+
+def _nothing() -> None:
+    pass
+
 
 def _wake_sharply() -> None:
     """Ask for exact wake-ups of the calling thread; by default the system may delay them by 50 µs."""
     with contextlib.suppress(OSError, AttributeError):  # elsewhere ticks are that much later
         ctypes.CDLL(None).prctl(SET_TIMER_SLACK, 1, 0, 0, 0)
-
-
-def _ask_for_priority() -> None:
-    """Give the calling thread real-time priority; if that is not permitted, log it and continue."""
-    if sys.platform != "linux":
-        log.warning("real-time priority is only for Linux, so the control loop runs at normal priority")
-        return
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
-    except OSError as error:
-        log.warning(
-            "real-time priority is not permitted (%s), so the control loop runs at normal priority: "
-            "it needs CAP_SYS_NICE, or a limit (ulimit -r) of %d",
-            error.strerror,
-            PRIORITY,
-        )
-
-
-def _nothing() -> None:
-    pass

@@ -75,14 +75,17 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     shape_servo: bool = False
     """Shape `servoj`, `speedj` and `speedl` of programs where they begin at rest."""
     calibration: str | None = None
-    """Name of a calibration that comes with the package, or path of one; "none" for a robot yet to be identified;
-    default: the one that comes with the package for this robot."""
+    """Name of a calibration that comes with the package, path of one, or "none"; default: the package's, if any."""
     clock: Clock = "realtime"
     """What advances simulation time."""
     speed: Annotated[float, Meta(gt=0, le=100)] = 1.0
     """Simulation speed relative to real time [-]; only with the clock realtime."""
     realtime_priority: bool = False
     """Run the control loop with real-time priority, if the system permits it; only with the clock realtime."""
+    processor: Annotated[int, Meta(ge=0, le=4095)] | None = None
+    """Processor for the control loop, and for no other thread of the server; only with the clock realtime."""
+    lock_memory: bool = False
+    """Keep the server's memory from being swapped out, if the system permits it."""
     start: str | tuple[float, ...] | None = None
     """Initial pose: a name from the robot file, or joint angles [rad]."""
     state: str | None = None
@@ -139,9 +142,6 @@ class ServeConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
     def program_folder(self, name: str) -> ProgramFolder | None:
         """Return the folder with a robot's programs; None if there is none.
-
-        Args:
-            name: Name of the robot.
 
         Raises:
             ConfigError: `programs` is not a folder.

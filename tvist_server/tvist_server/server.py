@@ -27,6 +27,7 @@ from tvist_server.gateways.exposure import ExposureError, check_endpoints, guard
 from tvist_server.gateways.metrics import Metrics
 from tvist_server.gateways.network import Network
 from tvist_server.gateways.ur.interfaces import UrInterfaces
+from tvist_server.punctual import leave_processor, lock_memory
 from tvist_server.robot import ServedRobot
 from tvist_server.spread import Share, check_together
 from tvist_server.ur_ports import InterfaceName
@@ -78,6 +79,9 @@ class Server:
         if config.clock == "realtime":  # equal runs in lockstep are equal, tokens included
             setups = [replace(setup, instance=secrets.token_hex(INSTANCE_BYTES)) for setup in setups]
         self._observed = observe is not None
+        self._lock_memory, self._processor = config.lock_memory, config.processor
+        self.granted: list[str] = []
+        """What the system has granted so that ticks are on time, in words; complete after `start`."""
         # A process that others reach through the first one needs no protection of its own.
         listen, guard = (
             protected(config, [setup.name for setup in setups]) if share.router is None else ([], {})
@@ -173,6 +177,11 @@ class Server:
         gc.collect()
         gc.freeze()
         sys.setswitchinterval(1e-4)
+        if self._lock_memory and lock_memory():
+            self.granted.append("memory is locked")
+        realtime = any(isinstance(clock, Realtime) for clock in self._clocks)
+        if realtime and self._processor is not None and leave_processor(self._processor):
+            self.granted.append(f"processor {self._processor} is left to the control loop")
         self._console.start()
         for courier in self._couriers:
             courier.start()
@@ -180,6 +189,7 @@ class Server:
             robot.start()
         for clock in self._clocks:
             clock.start()
+            self.granted += clock.granted if isinstance(clock, Realtime) else []
 
     def close(self) -> None:
         """Shut down in order: stop the clocks, close the recordings, deliver pending messages to clients that read."""
@@ -322,7 +332,14 @@ def _drivers(config: ServeConfig, robots: Sequence[ServedRobot]) -> tuple[list[C
     """
     if config.clock == "realtime":
         courier, driven = Courier([robot.hand_on for robot in robots]), [robot.driven for robot in robots]
-        clock = Realtime(driven, courier.wake, PERIOD, config.speed, priority=config.realtime_priority)
+        clock = Realtime(
+            driven,
+            courier.wake,
+            PERIOD,
+            config.speed,
+            priority=config.realtime_priority,
+            processor=config.processor,
+        )
         return [courier], [clock]
     couriers = [Courier([robot.hand_on]) for robot in robots]
     return couriers, [Lockstep(robot.driven, robot.repeat) for robot in robots]

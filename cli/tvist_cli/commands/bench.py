@@ -21,6 +21,7 @@ def bench(
     reading: float | None = None,
     fleet: int | None = None,
     fixture: int | None = None,
+    lateness: float | None = None,
     json: bool = False,
 ) -> None:
     """Measure the plant, the filter, the whole control cycle, a served robot, and how many robots one core can run.
@@ -41,11 +42,14 @@ def bench(
             fleet needs to be found and to come back after a router was killed.
         fixture: Instead, compare how long the pytest fixture tvist_robot takes, in sessions of this many tests, with
             how long tvist serve takes to start.
+        lateness: Instead, compare the ticks that a served robot misses with those that a bare thread misses which
+            sleeps to the same deadlines, in turn: for this many minutes alone, as many with ten clients, and as many
+            with ten clients, real-time priority and locked memory.
         json: Print one JSON object.
     """
     _check(
         seconds,
-        {"soak": soak, "reverse": reverse, "reading": reading},
+        {"soak": soak, "reverse": reverse, "reading": reading, "lateness": lateness},
         {"hostile": hostile, "viewed": viewed},
     )
     if fixture is not None and fixture < 2:
@@ -59,6 +63,7 @@ def bench(
         (reverse, lambda: _reverse(reverse or 0.0, json)),
         (reading, lambda: _reading(reading or 0.0, json)),
         (fixture, lambda: _fixture(fixture or 0, json)),
+        (lateness, lambda: _lateness(lateness or 0.0, json)),
         (soak, lambda: _soak(soak or 0.0, json)),
         (0.0, lambda: _all(seconds, json)),
     )
@@ -181,6 +186,18 @@ def _fixture(tests: int, json: bool) -> None:
         return
     rows = [(key, f"{value:.4g}") for key, value in result.items()]
     table(f"the fixture tvist_robot in sessions of {tests} tests", ("what", "figure"), rows)
+
+
+def _lateness(minutes: float, json: bool) -> None:
+    from tvist_lab.benchmark.on_time import on_time
+
+    result = asyncio.run(on_time(minutes, tell=say))
+    if json:
+        print_json(result)
+        return
+    for name, figures in result.items():
+        rows = [(key, f"{value:.4g}") for key, value in figures.items()]
+        table(f"missed ticks, {name.replace('_', ' ')}", ("what", "figure"), rows)
 
 
 def _pairs(result: dict[str, Any], title: str) -> None:

@@ -46,6 +46,8 @@ def serve(
     clock: str | None = None,
     speed: float | None = None,
     realtime_priority: bool = False,
+    processor: int | None = None,
+    lock_memory: bool = False,
     start: str | None = None,
     state: str | None = None,
     seed: int | None = None,
@@ -98,6 +100,9 @@ def serve(
         clock: realtime, or lockstep, in which a client steps the simulation [realtime].
         speed: Simulation speed relative to real time [1].
         realtime_priority: Run the control loop with real-time priority (SCHED_FIFO), if the system permits it.
+        processor: Run the control loop on this processor, counted from 0, and all other threads of the server on others
+            [any].
+        lock_memory: Keep the server's memory from being swapped out, if the system permits it.
         start: Pose to start in: a name from the robot file, such as Q1, Q2 or Q3, or joint angles in rad separated by
             commas [Q1].
         state: TOML or JSON file with the state to start in: any of q, payload (the carried one), mode, shaper, seed.
@@ -131,7 +136,8 @@ def serve(
         "insecure": insecure or None, "profile": lower(profile), "payload": payload,
         "overload": overload or None, "shaper": lower(shaper), "shape_servo": shape_servo or None,
         "calibration": calibration, "clock": lower(clock), "speed": speed,
-        "realtime_priority": realtime_priority or None, "start": start, "state": state, "seed": seed,
+        "realtime_priority": realtime_priority or None, "processor": processor,
+        "lock_memory": lock_memory or None, "start": start, "state": state, "seed": seed,
         "record": record, "keep": keep, "dump": dump, "truth": truth or None, "quiet": quiet,
         "floor": floor, "compensate_sag": compensate_sag, "programs": programs,
         "ur": (ur or ur_address is not None or ur_port is not None) or None, "ur_address": ur_address,
@@ -158,8 +164,14 @@ def serve(
             server = Server(checked)
 
     setups = [robot.setup for robot in server.robots]
+
+    def ready() -> None:
+        if server.granted:
+            say(f"on time: {'; '.join(server.granted)}")
+        _say_ready(setups, checked, began)
+
     say_who_can_reach(server, checked, len(setups))
-    asyncio.run(server.run(lambda: _say_ready(setups, checked, began), ending))
+    asyncio.run(server.run(ready, ending))
     ending.close()
     if server.failure is not None:
         raise Failure(server.failure)
