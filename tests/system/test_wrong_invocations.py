@@ -45,6 +45,8 @@ def assert_said(ended, code, words):
 
 
 MISUSE = [
+    (("serve", "--robots", "ur5e*2", "--workers", "3"), ["workers is 3", "number of robots, 2"]),
+    (("serve", "--workers", "2"), ["workers is 2", "number of robots, 1"]),
     # fleets
     (("fleet", "stop"), ["names of robots", "--all"]),
     (("fleet", "stop", "left", "--all"), ["not both"]),
