@@ -156,6 +156,10 @@ def serve(
         content |= {key: value for key, value in given.items() if value is not None}
         checked = from_mapping(content, "configuration" if config is None else f"configuration {config}")
         ending = Ending()
+        if checked.workers > 1 and checked.processor is not None:
+            raise ConfigError(
+                f"processor is {checked.processor}: --workers needs one for each, so leave it out"
+            )
         if checked.workers > 1:
             _several(checked, ending, began)
             return
