@@ -5,6 +5,7 @@ The modules behind it may change; `tvist_lab` imports nothing else of this packa
 
 from tvist_controller.about import info_of
 from tvist_controller.ahead import resting_after
+from tvist_controller.boxes import BOXES, Box, Place
 from tvist_controller.calibrations import available as calibrations
 from tvist_controller.calibrations import default_for as default_calibration
 from tvist_controller.calibrations import estimator_of
@@ -20,6 +21,7 @@ from tvist_controller.cycle import STILL, ControlCycle
 from tvist_controller.elastic_source import elastic_feed_forward
 from tvist_controller.from_rest import plan_from_rest
 from tvist_controller.host import Host
+from tvist_controller.instruments.snapshot import Instruments
 from tvist_controller.kinematics.tool import ToolKinematics, turned
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.mode_source import ModeSource
@@ -33,6 +35,7 @@ from tvist_controller.quiet.elastic_arm import ElasticArm
 from tvist_controller.quiet.interior_point import Programme, inside, optimize
 from tvist_controller.quiet.quiet_motion import quiet_motion
 from tvist_controller.refusal import RefusalError
+from tvist_controller.report import Report
 from tvist_controller.reporting import truth_of
 from tvist_controller.safety import TORQUE_SHARE
 from tvist_controller.setup import Setup, body, paper_payload
@@ -42,10 +45,12 @@ from tvist_controller.trajectory import JointLine, MotionLimits, PlannedMotion, 
 from tvist_controller.whole_motion import Driven, DrivenLine, respond
 
 __all__ = [
+    "BOXES",
     "CLEARANCE",
     "FAR",
     "STILL",
     "TORQUE_SHARE",
+    "Box",
     "CollisionModel",
     "ControlCycle",
     "Controller",
@@ -54,17 +59,20 @@ __all__ = [
     "ElasticArm",
     "ElasticFeedForward",
     "Host",
+    "Instruments",
     "InverseDynamics",
     "JointLine",
     "LoopbackHost",
     "ModeSource",
     "MotionLimits",
     "OwnShaper",
+    "Place",
     "PlannedMotion",
     "Presence",
     "Programme",
     "RecordedShaper",
     "RefusalError",
+    "Report",
     "ScriptCompiler",
     "Setup",
     "Sink",

@@ -1,19 +1,31 @@
 """`tvist bench`: measure how fast tvist runs on this machine."""
 
-import asyncio
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from tvist_cli.failure import Failure, interrupted, told
-from tvist_cli.output import err, number, out, print_json, say, table
+from tvist_cli.figure_files import AS_USUAL, FigureOptions
+from tvist_cli.output import err, print_json
+from tvist_lab.benchmark.names import PartName
 
 MOST = 2000
 """Largest number of simulated publishers of a fleet."""
+Study = Callable[[], None]
 
 
 def bench(
     *,
     seconds: float = 10.0,
+    only: Annotated[list[PartName] | None, Parameter(consume_multiple=True)] = None,
+    shapers: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    against: Path | None = None,
+    boxes: bool = False,
+    markdown: Path | None = None,
+    figures: Path | None = None,
+    look: FigureOptions = AS_USUAL,
     soak: float | None = None,
     hostile: int | None = None,
     viewed: int | None = None,
@@ -24,10 +36,21 @@ def bench(
     lateness: float | None = None,
     json: bool = False,
 ) -> None:
-    """Measure the plant, the filter, the whole control cycle, a served robot, and how many robots one core can run.
+    """Measure how fast tvist runs, every figure beside a reference that is measured in turn in the same run.
+
+    The references are the same arm in MuJoCo, Python's compiler, a bare send() and the line of one robot. Figures of
+    served robots that have none are printed below.
 
     Args:
-        seconds: Seconds to observe a served robot in real time, with one client and a recorder; 0 skips this part.
+        seconds: Seconds of each measurement of a robot in real time; 0 skips what serves robots.
+        only: Parts to measure [all].
+        shapers: Further shapers with which the line is measured, besides zv and auto.
+        against: File with what tvist bench --json printed before, to compare with: prints for each figure the change of
+            its ratio to its reference, and whether it is beyond chance.
+        boxes: Instead, print where a tick's time goes: in each box of the paper's Figure 6, and in what is around them.
+        markdown: With --boxes, file to write a page with the tables to.
+        figures: With --boxes, folder to write a figure of the tables to.
+        look: How to write the figure.
         soak: Serve a robot under load for this many minutes instead, and report whether memory and timing stay stable.
         hostile: Instead, compare how late a served robot's ticks are with and without 100 messages a second of every
             type and size, valid and invalid, in this many pairs of runs of --seconds each.
@@ -47,6 +70,8 @@ def bench(
             with ten clients, real-time priority and locked memory.
         json: Print one JSON object.
     """
+    from tvist_cli import bench_studies as run
+
     _check(
         seconds,
         {"soak": soak, "reverse": reverse, "reading": reading, "lateness": lateness},
@@ -56,19 +81,28 @@ def bench(
         raise Failure(f"fixture is {fixture}: must be at least 2 tests", code=2)
     if fleet is not None and not (2 <= fleet <= MOST and seconds > 0.0):
         raise Failure(f"fleet is {fleet}: must be 2 to {MOST} publishers, and seconds more than 0", code=2)
-    studies: tuple[tuple[float | None, Callable[[], None]], ...] = (
-        (fleet, lambda: _fleet(fleet or 0, seconds, json)),
-        (hostile, lambda: _hostile(hostile or 0, seconds, json)),
-        (viewed, lambda: _viewed(viewed or 0, seconds, json)),
-        (reverse, lambda: _reverse(reverse or 0.0, json)),
-        (reading, lambda: _reading(reading or 0.0, json)),
-        (fixture, lambda: _fixture(fixture or 0, json)),
-        (lateness, lambda: _lateness(lateness or 0.0, json)),
-        (soak, lambda: _soak(soak or 0.0, json)),
-        (0.0, lambda: _all(seconds, json)),
+    studies: dict[str, tuple[float | None, Study]] = {
+        "boxes": (boxes or None, lambda: run.boxes(shapers or (), markdown, figures, look, json)),
+        "fleet": (fleet, lambda: run.fleet(fleet or 0, seconds, json)),
+        "hostile": (hostile, lambda: run.hostile(hostile or 0, seconds, json)),
+        "viewed": (viewed, lambda: run.viewed(viewed or 0, seconds, json)),
+        "reverse": (reverse, lambda: run.reverse(reverse or 0.0, json)),
+        "reading": (reading, lambda: run.reading(reading or 0.0, json)),
+        "fixture": (fixture, lambda: run.fixture(fixture or 0, json)),
+        "lateness": (lateness, lambda: run.lateness(lateness or 0.0, json)),
+        "soak": (soak, lambda: run.soak(soak or 0.0, json)),
+    }
+    asked = [name for name, (value, _) in studies.items() if value is not None]
+    _check_together(
+        asked,
+        {"only": only, "shapers": shapers, "against": against, "markdown": markdown, "figures": figures},
     )
+    look.check(figures)
     try:
-        next(study for asked, study in studies if asked is not None)()
+        if asked:
+            studies[asked[0]][1]()
+        else:
+            _all(seconds, only, shapers or (), against, json)
     except KeyboardInterrupt:
         raise interrupted("the measurements so far are lost; the served robots have stopped") from None
 
@@ -86,136 +120,44 @@ def _check(seconds: float, durations: dict[str, float | None], runs: dict[str, i
             )
 
 
-def _all(seconds: float, json: bool) -> None:
+def _check_together(asked: Sequence[str], given: dict[str, object]) -> None:
+    """Refuse options that would do nothing."""
+    if len(asked) > 1:
+        raise Failure(
+            f"--{asked[0]} and --{asked[1]} each run instead of the other: give one of them", code=2
+        )
+    study = asked[0] if asked else None
+    about = {"markdown": ("boxes",), "figures": ("boxes",), "shapers": ("boxes", None)}
+    for name, value in given.items():
+        if value is not None and study not in about.get(name, (None,)):
+            if study is None:
+                raise Failure(f"--{name} is about --boxes: give that too, or leave --{name} out", code=2)
+            raise Failure(f"--{name} does nothing with --{study}: leave it out", code=2)
+
+
+def _all(
+    seconds: float, only: Sequence[PartName] | None, shapers: Sequence[str], against: Path | None, json: bool
+) -> None:
+    from tvist_cli.bench_tables import print_changes, print_run
+    from tvist_lab.bench import PARTS
     from tvist_lab.bench import bench as run
+    from tvist_lab.benchmark.saved_run import as_json, changes, changes_as_json, load_run
+    from tvist_server.config import ConfigError
 
-    result = run(seconds, tell=lambda what: err.print(f"measuring {what} ..."))
+    if only is not None and seconds == 0.0 and (served := [name for name in only if PARTS[name].serves]):
+        raise Failure(f"only names {served[0]}, which needs seconds of more than 0", code=2)
+    if only is not None and shapers and "line" not in only:
+        raise Failure("--shapers is about the part line: add it to --only, or leave --shapers out", code=2)
+    saved = None
+    if against is not None:
+        with told(OSError):
+            saved = load_run(against)
+    with told(ConfigError, code=2):
+        result = run(seconds, lambda what: err.print(f"measuring {what} ..."), only, shapers)
+    found = [] if saved is None else changes(saved, result)
     if json:
-        print_json(result)
+        print_json(as_json(result) | ({} if saved is None else {"against": changes_as_json(found)}))
         return
-    flat = {key: value for key, value in result.items() if not isinstance(value, dict)}
-    table("on this machine", ("what", "figure"), [(key, f"{value:.4g}") for key, value in flat.items()])
-    for key, values in result.items():
-        if isinstance(values, dict):
-            table(key, ("what", "figure"), [(name, f"{value:.4g}") for name, value in values.items()])
-    out.print("These figures hold for this machine under its current load; compare ratios, not microseconds.")
-
-
-def _hostile(pairs: int, seconds: float, json: bool) -> None:
-    from tvist_lab.benchmark.hostile import hostile
-
-    result = asyncio.run(hostile(pairs, seconds, tell=err.print))
-    if json:
-        print_json(result)
-        return
-    _pairs(result, f"{pairs} pairs of {seconds:g} s, {result['messages_per_second']:g} messages a second")
-
-
-def _viewed(pairs: int, seconds: float, json: bool) -> None:
-    from tvist_lab.benchmark.viewed import viewed
-
-    result = asyncio.run(viewed(pairs, seconds, tell=err.print))
-    if json:
-        print_json(result)
-        return
-    _pairs(result, f"{pairs} pairs of {seconds:g} s, without and with a page")
-    figures = {key: value for key, value in result.items() if not isinstance(value, dict)}
-    table("the page", ("what", "figure"), [(key, f"{value:.4g}") for key, value in figures.items()])
-
-
-def _fleet(count: int, seconds: float, json: bool) -> None:
-    from tvist_lab.benchmark.fleet import FleetError
-    from tvist_lab.benchmark.fleet import fleet as run
-
-    with told(FleetError):
-        result = run(count, seconds, tell=say)
-    if json:
-        print_json(result)
-        return
-    flat = {key: value for key, value in result.items() if isinstance(value, float | int)}
-    table(
-        f"{count} publishers, two routers",
-        ("what", "figure"),
-        [(key, f"{value:.4g}") for key, value in flat.items()],
-    )
-    rates = result["rates"]
-    unwatched = [(f"unwatched {key}", f"{value:.4g}") for key, value in result["unwatched"].items()]
-    table("nobody subscribes", ("what", "figure"), unwatched)
-    table(
-        "everything is watched",
-        ("what", *(f"{each['rate_hz']:g} Hz each" for each in rates)),
-        [(key, *(number(each[key], 4) for each in rates)) for key in rates[0] if key != "rate_hz"],
-    )
-
-
-def _reverse(seconds: float, json: bool) -> None:
-    from tvist_lab.benchmark.reverse import reverse
-
-    result = asyncio.run(reverse(seconds, tell=say))
-    if json:
-        print_json(result)
-        return
-    rows = [(key, f"{value:.6g}") for key, value in result.items()]
-    table("a program steered over a socket", ("what", "figure"), rows)
-
-
-def _reading(minutes: float, json: bool) -> None:
-    from tvist_lab.benchmark.reading import reading
-
-    result = asyncio.run(reading(minutes, tell=say))
-    if json:
-        print_json(result)
-        return
-    flat = {key: value for key, value in result.items() if not isinstance(value, dict)}
-    table(
-        f"a recording of {minutes:g} min",
-        ("what", "figure"),
-        [(key, f"{value:.6g}") for key, value in flat.items()],
-    )
-    formats = {key: value for key, value in result.items() if isinstance(value, dict)}
-    rows = [(key, *(f"{figure:.4g}" for figure in value.values())) for key, value in formats.items()]
-    table("export", ("format", "write s", "read s", "bytes", "equal"), rows)
-
-
-def _fixture(tests: int, json: bool) -> None:
-    from tvist_lab.benchmark.fixture import fixture
-
-    result = fixture(tests, tell=say)
-    if json:
-        print_json(result)
-        return
-    rows = [(key, f"{value:.4g}") for key, value in result.items()]
-    table(f"the fixture tvist_robot in sessions of {tests} tests", ("what", "figure"), rows)
-
-
-def _lateness(minutes: float, json: bool) -> None:
-    from tvist_lab.benchmark.on_time import on_time
-
-    result = asyncio.run(on_time(minutes, tell=say))
-    if json:
-        print_json(result)
-        return
-    for name, figures in result.items():
-        rows = [(key, f"{value:.4g}") for key, value in figures.items()]
-        table(f"missed ticks, {name.replace('_', ' ')}", ("what", "figure"), rows)
-
-
-def _pairs(result: dict[str, Any], title: str) -> None:
-    rows = [
-        (what, *(f"{result[what][name]:.4g}" for name in ("without", "with", "difference", "interval")))
-        for what in ("late_p99_us", "missed")
-    ]
-    table(title, ("a run", "without", "with", "difference", "± (95 %)"), rows)
-
-
-def _soak(minutes: float, json: bool) -> None:
-    from tvist_lab.benchmark.soak import soak
-
-    say(
-        f"serving a robot in real time for {minutes:g} minutes with a recorder, a set-point stream and five observers"
-    )
-    result = asyncio.run(soak(minutes, tell=say))
-    if json:
-        print_json(result)
-        return
-    table("soak", ("what", "figure"), [(key, f"{value:.6g}") for key, value in result.items()])
+    print_run(result)
+    if saved is not None:
+        print_changes(saved, result, found)

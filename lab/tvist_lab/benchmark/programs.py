@@ -4,14 +4,11 @@ import gc
 import sys
 import threading
 import time
-from collections.abc import Callable
-from typing import Any
-
-import numpy as np
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from tvist_controller.api import LoopbackHost, ScriptCompiler
-from tvist_lab.benchmark.in_turn import mean_and_interval
-from tvist_lab.benchmark.parts import BATCHES
+from tvist_lab.benchmark.figure import Figure, figure, in_alternation
 from tvist_lab.in_process import free_setup
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import TakeControl
@@ -26,6 +23,10 @@ TICKS = 250
 """Number of ticks of a run."""
 PAIRS = 40
 """Number of pairs of runs."""
+COMPILED = 10
+"""Number of times that it is compiled."""
+BUSY = 1_000_000
+"""Number to which a thread counts for comparison."""
 LISTENS = 1e-4
 """Time between two looks at the clock while a program is compiled [s]."""
 SWITCHES = 1e-4
@@ -69,37 +70,37 @@ def long_program() -> str:
     return text + "  sync()\n" * (LINES - 1 - text.count("\n")) + "end\n"
 
 
-def programs(tell: Callable[[str], None]) -> dict[str, float]:
-    """Return the cost of the idle loop relative to an empty tick, and the times of compiling the long program.
+def programs(tell: Callable[[str], None]) -> dict[str, Figure]:
+    """Measure the idle loop beside an empty tick, and compiling the long program beside Python's own compiler.
 
     Args:
         tell: Called with a description of each measurement before it starts.
     """
     tell("a program's idle loop")
-    ratio, interval = mean_and_interval(_ratios())
+    ticks = in_alternation({"empty": _ticks(None), "loop": _ticks(idle_loop())}, PAIRS)
     tell(f"compiling a program of {LINES} lines")
-    compiling, held_up = _compiling()
+    ours, theirs = _our_compiler(), _python_compiler()
+    compiling = in_alternation({"ours": lambda: _took(ours), "python": lambda: _took(theirs)}, COMPILED)
+    with _often_switching():
+        waiting = in_alternation(
+            {"ours": lambda: _longest_wait(ours), "python": lambda: _longest_wait(_busy)}, COMPILED
+        )
     return {
-        "idle_loop_ratio": ratio,
-        "idle_loop_interval": interval,
-        "compile_ms": compiling,
-        "compile_holds_up_ms": held_up,
-    }
-
-
-def _ratios() -> np.ndarray[Any, Any]:
-    """Cost of a tick with the idle loop relative to one without, of each pair of runs [-]."""
-    without, loaded = _ticks(None), _ticks(idle_loop())
-    found = []
-    for pair in range(PAIRS):
-        first, second = (without, loaded) if pair % 2 == 0 else (loaded, without)
-        took = {first: first(), second: second()}
-        found.append(took[loaded] / took[without] - 1.0)
-    return np.array(found)
+        "idle_loop_us_per_tick": figure(
+            "a tick with a client library's idle loop", "µs", ticks["loop"], "an empty tick", ticks["empty"]
+        ),
+        "compile_ms": figure(
+            f"compiling {LINES} lines", "ms", compiling["ours"], "Python's compiler", compiling["python"]
+        ),
+        "compile_holds_up_ms": figure(
+            "how long compiling keeps a thread waiting", "ms", waiting["ours"],
+            "a thread that counts", waiting["python"],
+        ),
+    }  # fmt: skip
 
 
 def _ticks(text: str | None) -> Callable[[], float]:
-    """Return what runs a robot for some ticks, at rest and with a program, and returns its processor time [s]."""
+    """Return what runs a robot at rest, with a program or without, and returns the processor time of a tick [µs]."""
     host = LoopbackHost(free_setup(truth=False))
     host.subscribe("state", len)
     host.subscribe("io", len)
@@ -113,39 +114,54 @@ def _ticks(text: str | None) -> Callable[[], float]:
     def run() -> float:
         began = time.thread_time()
         host.request("bench", step)
-        return time.thread_time() - began
+        return 1e6 * (time.thread_time() - began) / TICKS
 
     run()
     assert (host.controller.programs.state == "PLAYING") == (text is not None)
     return run
 
 
-def _compiling() -> tuple[float, float]:
-    """Time to compile the long program, and the longest time for which it keeps another thread waiting [ms].
-
-    Each is the least of several repetitions, since other load on the machine only ever adds time.
-    """
+def _our_compiler() -> Callable[[], object]:
     compiler = ScriptCompiler(free_setup().description)
     command = ProgramRun(token="bench", text=long_program())  # noqa: S106  no secret
-    took, held_up = float("inf"), float("inf")
+    return lambda: compiler.compile(command)
+
+
+def _python_compiler() -> Callable[[], object]:
+    """Python's compiler of the same program, which is Python but for the ends of its blocks and the poses."""
+    lines = [line for line in long_program().splitlines() if line.strip() != "end"]
+    text = "\n".join(lines).replace(" p[", " [")
+    return lambda: compile(text, "long_program", "exec")
+
+
+def _took(work: Callable[[], object]) -> float:
+    """Time that something takes [ms]."""
+    gc.collect()
+    began = time.perf_counter()
+    work()
+    return 1e3 * (time.perf_counter() - began)
+
+
+def _busy() -> None:
+    for _ in range(BUSY):
+        pass
+
+
+@contextmanager
+def _often_switching() -> Iterator[None]:
     before = sys.getswitchinterval()
     sys.setswitchinterval(SWITCHES)
     gc.collect()
     gc.freeze()  # as the server does when it starts
     try:
-        for _ in range(2 * BATCHES):
-            began = time.perf_counter()
-            compiler.compile(command)
-            took = min(took, time.perf_counter() - began)
-            held_up = min(held_up, _longest_wait(lambda: compiler.compile(command)))
+        yield
     finally:
         sys.setswitchinterval(before)
         gc.unfreeze()
-    return 1e3 * took, 1e3 * held_up
 
 
 def _longest_wait(work: Callable[[], object]) -> float:
-    """Longest delay of a thread that often wakes up while another one works [s]."""
+    """Longest delay of a thread that often wakes up while another one works [ms]."""
     thread = threading.Thread(target=work)
     longest = 0.0
     thread.start()
@@ -154,4 +170,4 @@ def _longest_wait(work: Callable[[], object]) -> float:
         time.sleep(LISTENS)
         longest = max(longest, time.perf_counter() - asleep - LISTENS)
     thread.join()
-    return longest
+    return 1e3 * longest

@@ -6,19 +6,18 @@ from collections.abc import Callable
 import numpy as np
 
 from tvist_controller.api import DrivenLine, body, respond
-from tvist_lab.benchmark.in_turn import mean_and_interval
+from tvist_lab.benchmark.figure import Figure, figure, in_alternation
 from tvist_lab.evaluation.line import Unchanged, point_to_point
 from tvist_lab.in_process import free_setup
 from tvist_lab.paper.published import pose
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_shaping import TvistFilter, shaper
 
-ROUNDS = 30
-"""Number of rounds, in each of which all of it is measured once."""
+REPETITIONS = 30
 
 
-def whole_motion(tell: Callable[[str], None]) -> dict[str, float]:
-    """Return the time per tick of a whole motion and of its arm [us], and their ratio with its interval.
+def whole_motion(tell: Callable[[str], None]) -> dict[str, Figure]:
+    """Measure a whole motion and its arm.
 
     The motion goes from Q1 to Q3, shaped by zv. What counts is what a study repeats: the filter, the line to the drives
     and the arm, of which each is prepared once.
@@ -47,19 +46,19 @@ def whole_motion(tell: Callable[[str], None]) -> dict[str, float]:
     def alone() -> None:
         respond(arm, driven, 0)
 
-    motion()  # loads compiled code
-    times = np.array([[_seconds(motion), _seconds(alone)] for _ in range(ROUNDS)])
-    ratio, interval = mean_and_interval(times[:, 0] / times[:, 1])
-    run, plant = 1e6 * np.median(times, axis=0) / len(whole)
+    ticks = len(whole)
+    found = in_alternation(
+        {"whole": lambda: _us(motion, ticks), "alone": lambda: _us(alone, ticks)}, REPETITIONS
+    )
     return {
-        "run_us_per_tick": float(run),
-        "plant_us_per_tick": float(plant),
-        "ratio": ratio,
-        "interval": interval,
+        "motion_us_per_tick": figure(
+            "a whole motion in one go", "µs per tick", found["whole"], "its arm alone", found["alone"]
+        )
     }
 
 
-def _seconds(call: Callable[[], None]) -> float:
+def _us(call: Callable[[], None], ticks: int) -> float:
+    """Processor time of a call for each of its ticks [us]."""
     began = time.thread_time()
     call()
-    return time.thread_time() - began
+    return 1e6 * (time.thread_time() - began) / ticks
