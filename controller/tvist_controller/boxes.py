@@ -24,7 +24,6 @@ from tvist_controller.trajectory import Trajectory
 from tvist_plant import flexible_arm
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_shaping.estimators.base import Estimator
-from tvist_shaping.shaper import Shaper
 
 
 class Place(NamedTuple):
@@ -60,7 +59,6 @@ BOXES: tuple[Box, ...] = (
     _box("trajectory generator", "Figure 6", "", (Trajectory, "next")),
     _box("TVIST filter", "Figure 6", "delay line, weighted sum", (LineFilter, "filter")),
     _box("estimator", "TVIST filter", "", (Estimator, "estimate"), (Estimator, "settle")),
-    _box("impulses", "TVIST filter", "", (Shaper, "impulses")),
     _box("look-ahead", "Figure 6", "", (LookAhead, "__call__")),
     _box("unshaped reference", "Figure 6", "", (UnshapedReference, "push")),
     _box("differentiator", "Figure 6", "", (ShapedReference, "push")),
