@@ -11,7 +11,7 @@ leave V.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -126,6 +126,9 @@ def decay(a: Floats, periods: Floats, f_d: float, zeta: float, A: Floats, tau: F
         tau[j] = periods[j] / f_d
 
 
+_decay: Callable[..., None] = decay.py_func  # type: ignore[attr-defined]
+
+
 class Train(NamedTuple):
     """A shaper without damping, of which `decay` makes the impulses of a mode."""
 
@@ -142,7 +145,9 @@ class Train(NamedTuple):
     def of(self, f_d: float, zeta: float) -> Impulses:
         """Return the impulses of a mode that is checked: its damped frequency [Hz] and damping ratio [-]."""
         A, tau = np.empty((2, len(self.a)))
-        decay(self.a, self.periods, f_d, zeta, A, tau)
+        _decay(
+            self.a, self.periods, f_d, zeta, A, tau
+        )  # to load the compiled one would take longer than this
         return Impulses._by_construction(A, tau)  # noqa: SLF001  both come from this package
 
     def at(self, f_d: float, zeta: float) -> Impulses:
