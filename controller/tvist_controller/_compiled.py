@@ -1,4 +1,4 @@
-"""Compile the functions of the controller, so that other threads can run while they do."""
+"""Compile the functions of the controller."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -8,9 +8,14 @@ from tvist_shaping.compiling import is_cached
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-__all__ = ["compiled", "is_cached"]
+__all__ = ["compiled", "compiled_for_ticks", "is_cached"]
 
 
 def compiled(function: F) -> F:
     """Compile `function`, see `tvist_shaping.compiling`; it does not hold the interpreter's lock while it runs."""
     return compile_function(function, nogil=True)
+
+
+def compiled_for_ticks(function: F) -> F:
+    """Compile a function that takes microseconds; it holds the interpreter's lock, which another thread might keep."""
+    return compile_function(function)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tvist_controller._compiled import compiled
+from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.control.differentiator import Floats
 from tvist_plant.plant import PERIOD
 
@@ -13,7 +13,7 @@ ALLOWED = 0.01
 TICKS = round(ALLOWED / PERIOD)
 
 
-@compiled
+@compiled_for_ticks
 def exceeds(values: Floats, limits: Floats) -> bool:
     """Return whether a magnitude exceeds its limit, each argument of shape (n,)."""
     for j in range(limits.shape[0]):  # noqa: SIM110  numba has no generators

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
-from tvist_controller._compiled import compiled
+from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.control.differentiator import Floats, Target
 from tvist_controller.control.inverse_dynamics import SLEW
 from tvist_plant.chain import BODY, SCRATCH, chain_of, torques
@@ -23,14 +23,14 @@ FRICTION = 0.4
 """Share of the Coulomb friction that may be unknown in each joint, with the worst sign [-]."""
 
 
-@compiled
+@compiled_for_ticks
 def add(total: Floats, moment: Floats, expected: Floats) -> None:
     """Add what a moment has beyond the expected one to a sum, each of shape (n,) [N m]."""
     for j in range(total.shape[0]):
         total[j] += moment[j] - expected[j]
 
 
-@compiled
+@compiled_for_ticks
 def correlate(
     chain: Floats, q: Floats, qd: Floats, qdd: Floats, scratch: Floats, friction: Floats, feedback: Floats
 ) -> tuple[float, float, float]:

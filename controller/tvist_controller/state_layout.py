@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from tvist_controller._compiled import compiled
+from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.control.kinematics import tool_motion
 from tvist_controller.control.line_tick import STATIC, TORQUE, UNSHAPED_Q
@@ -40,14 +40,14 @@ def width(number: int | None) -> int:
     return 5 if number < 1 << 32 else 9
 
 
-@compiled
+@compiled_for_ticks
 def write_integer(out: Bytes, at: int, size: int, number: int) -> None:
     """Write an integer of `size` encoded bytes, of which the first names the format unless it is the only one."""
     for k in range(1 if size > 1 else 0, size):
         out[at + k] = (number >> (8 * (size - 1 - k))) & 0xFF
 
 
-@compiled
+@compiled_for_ticks
 def append(numbers: Floats, at: int, rows: Floats) -> int:
     """Copy rows of numbers to a place, and return the place after them."""
     for row in range(rows.shape[0]):
@@ -57,7 +57,7 @@ def append(numbers: Floats, at: int, rows: Floats) -> int:
     return at
 
 
-@compiled
+@compiled_for_ticks
 def gather(
     numbers: Floats,
     speed: float,
@@ -94,7 +94,7 @@ def gather(
     return k + 2 * modes + 1
 
 
-@compiled
+@compiled_for_ticks
 def write_state(
     template: Bytes,
     places: Integers,

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
 
-from tvist_controller._compiled import compiled
+from tvist_controller._compiled import compiled_for_ticks
 
 Floats = npt.NDArray[np.float64]
 
@@ -38,7 +38,7 @@ def central_differences(references: Floats, period: float) -> tuple[Floats, Floa
     return references[1:-1], qd, qdd
 
 
-@compiled
+@compiled_for_ticks
 def differentiate(before: Floats, middle: Floats, last: Floats, period: float, rates: Floats) -> None:
     """Central differences at the middle one of three references, each of shape (n,) [rad].
 

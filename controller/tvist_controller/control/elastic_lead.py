@@ -13,7 +13,7 @@ postures, where joints would have to turn far to move the flange a little (Nakam
 import numpy as np
 import numpy.typing as npt
 
-from tvist_controller._compiled import compiled
+from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.control.differentiator import Floats
 from tvist_controller.elimination import eliminate
 
@@ -25,7 +25,7 @@ RECOVERY = 120.0
 """Rate at which the lead returns to the formula after its acceleration was limited, critically damped [1/s]."""
 
 
-@compiled
+@compiled_for_ticks
 def wanted_lead(
     load: Floats,
     jacobian: Floats,
@@ -74,7 +74,7 @@ def wanted_lead(
             lead[j] += jacobian[row, c] * moved[row]
 
 
-@compiled
+@compiled_for_ticks
 def follow(wanted: Floats, led: Floats, room: Floats, period: float) -> bool:
     """Advance the lead by one tick: to what is wanted, with at most a given acceleration.
 
@@ -104,7 +104,7 @@ def follow(wanted: Floats, led: Floats, room: Floats, period: float) -> bool:
     return limited
 
 
-@compiled
+@compiled_for_ticks
 def motor_reference(
     q: Floats,
     qd: Floats,

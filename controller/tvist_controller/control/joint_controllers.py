@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from tvist_controller._compiled import compiled
+from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.control.differentiator import Floats, Target
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
@@ -16,7 +16,7 @@ ROTOR, COMPLIANCE, YIELDING, COULOMB, VISCOUS, WIDTH, PER_SECOND, WINDUP, ROWS =
 """
 
 
-@compiled
+@compiled_for_ticks
 def command_drives(
     q: Floats, rates: Floats, torque: Floats, gravity: Floats, joints: Floats, command: Floats
 ) -> None:

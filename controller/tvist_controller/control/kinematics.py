@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio as pin
 
-from tvist_controller._compiled import compiled
+from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.control.differentiator import Floats
 from tvist_plant.chain import bend, chain_of, start, step_along, twist
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, rigid_model
 
 
-@compiled
+@compiled_for_ticks
 def turned_by(R: Floats, vector: Floats) -> None:
     """Convert a rotation matrix, shape (3, 3), to a rotation vector of at most half a turn, shape (3,) [rad].
 
@@ -39,7 +39,7 @@ def turned_by(R: Floats, vector: Floats) -> None:
     vector[0], vector[1], vector[2] = factor * x, factor * y, factor * z
 
 
-@compiled
+@compiled_for_ticks
 def tool_motion(chain: Floats, tool: Floats, q: Floats, qd: Floats, out: Floats) -> None:
     """Compute pose and velocity of a point that is fixed to the end of a chain, in the base's axes.
 

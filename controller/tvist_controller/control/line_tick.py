@@ -5,7 +5,7 @@ The boxes are in their own modules; called one by one from Python, they would ta
 
 import numpy as np
 
-from tvist_controller._compiled import compiled
+from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.control.differentiator import Floats, differentiate
 from tvist_controller.control.joint_controllers import command_drives
 from tvist_plant.chain import collect_gravity, torques
@@ -18,7 +18,7 @@ without the filter, the part of τ* that balances gravity, and the command q_r, 
 """
 
 
-@compiled
+@compiled_for_ticks
 def to_drives(
     before: Floats,
     middle: Floats,
@@ -60,7 +60,7 @@ def to_drives(
     command_drives(middle, rates, torque, static, joints, signals[Q_R:])
 
 
-@compiled
+@compiled_for_ticks
 def all_to_drives(
     start: Floats,
     shaped: Floats,
