@@ -163,7 +163,8 @@ class ControlCycle:
             unshaped = self._unshaped.push(reference, self._shaped.joints, alike=alike)
         self._shaped.push(x_star, reference if alike else None)
         self.inverse_dynamics.advance()
-        signals = self._to_drives(unshaped)  # q*, q̇*, q̈* a tick earlier, and τ* [N m]
+        # Differentiator, inverse dynamics and joint controllers: q*, q̇*, q̈* a tick earlier, τ* [N m], the command
+        signals = self._to_drives(unshaped)
         q, qd, qdd, torque = signals[Q : TORQUE + 1]
         target, plain = Target(q, qd, qdd), DriveCommand(*signals[Q_R:])
         command = self._feed_forward.command(

@@ -7,6 +7,9 @@ from math import hypot
 import numpy as np
 import pinocchio as pin
 
+from tvist_controller._compiled import compiled_for_ticks
+from tvist_controller.control.kinematics import tool_motion
+from tvist_plant.chain import SCRATCH, chain_of, sweep
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import FLANGE, Floats, payload_inertia, rigid_model
@@ -49,6 +52,32 @@ def carried(omega: list[float], alpha: list[float], arm: list[float]) -> list[fl
     return add(cross(alpha, arm), cross(omega, cross(omega, arm)))
 
 
+@compiled_for_ticks
+def tool_rates(chain: Floats, tool: Floats, q: Floats, qd: Floats, qdd: Floats, out: Floats) -> None:
+    """Compute the motion of a point that is fixed to the end of a chain; the first twelve are those of `tool_motion`.
+
+    Args:
+        chain: The links, see `tvist_plant.chain`, shape (n+1, 22).
+        tool: See `tool_motion`, shape (12,).
+        q: Joint positions, shape (n,) [rad].
+        qd: Joint velocities, shape (n,) [rad/s].
+        qdd: Joint accelerations, shape (n,) [rad/s^2].
+        out: Result: position [m], rotation vector [rad], velocities and accelerations, each linear and angular, shape
+            (18,).
+    """
+    n = q.shape[0]
+    tool_motion(chain, tool, q, qd, out[:12])
+    bodies = np.empty((n + 1, SCRATCH))
+    sweep(chain, q, qd, qdd, 0.0, bodies)
+    A, V, P = bodies[n, 22:28], bodies[n, 16:22], out[:3]
+    u, v, w = out[6], out[7], out[8]
+    out[12] = A[3] + A[1] * P[2] - A[2] * P[1] + V[1] * w - V[2] * v
+    out[13] = A[4] + A[2] * P[0] - A[0] * P[2] + V[2] * u - V[0] * w
+    out[14] = A[5] + A[0] * P[1] - A[1] * P[0] + V[0] * v - V[1] * u
+    for k in range(3):
+        out[15 + k] = A[k]
+
+
 class RigidBody:
     """The arm as the controller models it.
 
@@ -64,6 +93,9 @@ class RigidBody:
         self._last, self._placement = frame.parentJoint, frame.placement
         self._bare = self._model.inertias[self._last].copy()
         self._payload: Payload | None = None
+        self._chain = chain_of(self._model, self._flange)
+        self._offset: list[float] = []
+        self._tool = np.zeros(12)
         self._elbow = ELBOW + 1 if description.joints > ELBOW else 0
 
     def tool(self, q: list[float], qd: list[float], qdd: list[float], offset: list[float]) -> Tool:
@@ -75,24 +107,13 @@ class RigidBody:
             qdd: Joint accelerations [rad/s²].
             offset: Tool centre point in the flange frame: x y z [m] and rotation vector [rad].
         """
-        model, data, flange = self._model, self._data, self._flange
-        pin.forwardKinematics(model, data, np.array(q), np.array(qd), np.array(qdd))
-        placement = pin.updateFramePlacement(model, data, flange)
-        velocity = pin.getFrameVelocity(model, data, flange, pin.LOCAL_WORLD_ALIGNED)
-        acceleration = pin.getFrameClassicalAcceleration(model, data, flange, pin.LOCAL_WORLD_ALIGNED)
-        position, rotation = placement.translation.tolist(), placement.rotation
-        linear, linear_rate = velocity.linear.tolist(), acceleration.linear.tolist()
-        omega, alpha = velocity.angular.tolist(), acceleration.angular.tolist()
-        if any(offset):
-            arm = (rotation @ np.array(offset[:3])).tolist()
-            rotation = rotation @ pin.exp3(np.array(offset[3:]))
-            position, linear = add(position, arm), add(linear, cross(omega, arm))
-            linear_rate = add(linear_rate, carried(omega, alpha, arm))
-        return Tool(
-            pose=position + pin.log3(rotation).tolist(),
-            speed=linear + omega,
-            acceleration=linear_rate + alpha,
-        )
+        if offset != self._offset:
+            turned = pin.exp3(np.array(offset[3:])).ravel()
+            self._offset, self._tool = list(offset), np.concatenate([turned, offset[:3]])
+        out = np.empty(18)
+        tool_rates(self._chain, self._tool, np.array(q), np.array(qd), np.array(qdd), out)
+        found = out.tolist()
+        return Tool(pose=found[:6], speed=found[6:12], acceleration=found[12:])
 
     def flange_rotation(self, q: list[float]) -> Floats:
         """Rotation from the flange to the base frame, shape (3, 3)."""

@@ -1,11 +1,13 @@
 """The wrench at the tool: the external force and torque, estimated from the drives' torques."""
 
+import math
 from collections.abc import Sequence
-from math import sqrt
 
 import numpy as np
-import pinocchio as pin
 
+from tvist_controller._compiled import compiled_for_ticks
+from tvist_controller.elimination import eliminate
+from tvist_plant.chain import bend, chain_of, start, step_along, twist
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, Floats, rigid_model
 from tvist_protocol.modes import RobotMode
@@ -24,6 +26,91 @@ def since_zeroed(wrench: list[float], zero: list[float] | None) -> list[float]:
     return wrench if zero is None else [felt - none for felt, none in zip(wrench, zero, strict=True)]
 
 
+@compiled_for_ticks
+def determinant(A: Floats) -> float:
+    """Determinant of a matrix, shape (n, n), by elimination with pivots; the matrix is used up."""
+    n, found = A.shape[0], 1.0
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(A[i, k]) > abs(A[pivot, k]):
+                pivot = i
+        if A[pivot, k] == 0.0:
+            return 0.0
+        if pivot != k:
+            found = -found
+            for j in range(k, n):
+                A[k, j], A[pivot, j] = A[pivot, j], A[k, j]
+        found *= A[k, k]
+        for i in range(k + 1, n):
+            factor = A[i, k] / A[k, k]
+            for j in range(k + 1, n):
+                A[i, j] -= factor * A[k, j]
+    return found
+
+
+@compiled_for_ticks
+def jacobian_at(chain: Floats, offset: Floats, q: Floats, J: Floats) -> None:
+    """Jacobian of a point that is fixed to the end of a chain: translation, then rotation, base frame, shape (6, n)."""
+    R, o, S = np.empty((3, 3)), np.empty(3), np.empty(6)
+    start(R, o)
+    n = q.shape[0]
+    for j in range(n):
+        step_along(chain[j], R, o)
+        bend(R, q[j])
+        twist(R, o, S)
+        for k in range(3):
+            J[k, j], J[3 + k, j] = S[3 + k], S[k]
+    step_along(chain[n], R, o)
+    for k in range(3):
+        o[k] += R[k, 0] * offset[0] + R[k, 1] * offset[1] + R[k, 2] * offset[2]
+    for j in range(n):
+        J[0, j] += J[4, j] * o[2] - J[5, j] * o[1]
+        J[1, j] += J[5, j] * o[0] - J[3, j] * o[2]
+        J[2, j] += J[3, j] * o[1] - J[4, j] * o[0]
+
+
+@compiled_for_ticks
+def product(A: Floats, B: Floats) -> Floats:
+    """Product of two small matrices."""
+    found = np.zeros((A.shape[0], B.shape[1]))
+    for i in range(A.shape[0]):
+        for j in range(B.shape[1]):
+            for k in range(A.shape[1]):
+                found[i, j] += A[i, k] * B[k, j]
+    return found
+
+
+@compiled_for_ticks
+def force_at(chain: Floats, offset: Floats, q: Floats, torque: Floats, force: Floats) -> None:
+    """Compute the force that causes torques; see `ToolWrench.at_tool`.
+
+    Args:
+        chain: The links, see `tvist_plant.chain`, shape (n+1, 22).
+        offset: Point in the frame of the end, shape (3,) [m].
+        q: Joint positions, shape (n,) [rad].
+        torque: Torques on the joints, shape (n,) [N m].
+        force: Result: force and torque, shape (6,) [N, N m].
+    """
+    n = q.shape[0]
+    J = np.empty((6, n))
+    jacobian_at(chain, offset, q, J)
+    square = product(J.T, J) if n <= 6 else product(J, J.T)
+    manipulability = math.sqrt(max(determinant(square.copy()), 0.0))
+    if manipulability < NEAR_SINGULAR:
+        damping = DAMPING * (1.0 - manipulability / NEAR_SINGULAR)
+        for k in range(square.shape[0]):
+            square[k, k] += damping * damping
+    known = torque.copy() if n <= 6 else product(J, torque.reshape(n, 1))[:, 0].copy()
+    eliminate(square, known)
+    for k in range(6):
+        force[k] = known[k]
+        if n <= 6:
+            force[k] = 0.0
+            for j in range(n):
+                force[k] += J[k, j] * known[j]
+
+
 class ToolWrench:
     """Estimates the force at the tool centre point that explains the measured torques.
 
@@ -32,9 +119,8 @@ class ToolWrench:
     """
 
     def __init__(self, description: RobotDescription) -> None:
-        self._model = rigid_model(description, Payload())
-        self._data = self._model.createData()
-        self._flange = self._model.getFrameId(FLANGE)
+        model = rigid_model(description, Payload())
+        self._chain = chain_of(model, model.getFrameId(FLANGE))
         drives = description.drives
         self._rotor = np.array(drives.rotor_inertia)
         self._friction = np.array(drives.coulomb_friction)
@@ -64,21 +150,9 @@ class ToolWrench:
             torque: External torque on the joints, shape (n,) [N m].
             offset: Tool centre point in the flange frame [m, rad].
         """
-        jacobian = pin.computeFrameJacobian(
-            self._model, self._data, np.array(q), self._flange, pin.LOCAL_WORLD_ALIGNED
-        ).reshape(6, -1)  # for an arm with one joint, pinocchio returns a one-dimensional array
-        rotation = self._data.oMf[self._flange].rotation
-        if any(offset[:3]):
-            jacobian[:3] -= pin.skew(rotation @ np.array(offset[:3])) @ jacobian[3:]
-        tall = jacobian.shape[1] <= jacobian.shape[0]
-        square = jacobian.T @ jacobian if tall else jacobian @ jacobian.T
-        manipulability = sqrt(max(float(np.linalg.det(square)), 0.0))
-        if manipulability < NEAR_SINGULAR:
-            damping = DAMPING * (1.0 - manipulability / NEAR_SINGULAR)
-            square.flat[:: len(square) + 1] += damping * damping
-        if tall:
-            return np.array(jacobian @ np.linalg.solve(square, torque))
-        return np.array(np.linalg.solve(square, jacobian @ torque))
+        force = np.empty(6)
+        force_at(self._chain, np.array(offset[:3]), np.array(q), torque, force)
+        return force
 
     def of(self, state: State, offset: Sequence[float]) -> list[float]:
         """Return force and torque at the tool centre point in a tick, base frame [N, N m]; zero with the brakes on.
