@@ -33,6 +33,7 @@ class Overload:
         self.limits = np.array(limits, dtype=float)
         self._beyond = np.zeros(len(limits), dtype=int)
         self._any = False
+        exceeds(self.limits, self.limits)  # loads compiled code, which takes many ticks
 
     def joint(self, moment: Floats) -> int | None:
         """Take one more tick and return the joint with the longest excess, if it is too long; else None.

@@ -97,6 +97,9 @@ class PayloadMonitor:
         self._friction = np.maximum(drives.coulomb_friction, 0.01 * np.array(description.limits.torque))
         self._fade = float(np.exp(-EVERY * PERIOD / MEMORY))
         self.declare(declared)
+        still = np.zeros_like(self._sum)  # the first calls load compiled code, which takes many ticks
+        add(still, still, still)
+        correlate(self._chain, still, still, still, self._scratch, self._friction, still)
 
     def declare(self, payload: Payload) -> None:
         """Set another declared payload: discard past measurements, and wait until it is fully phased in."""

@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
+from tvist_controller.instruments.snapshot import Instruments
 from tvist_controller.kinematics.inverse import is_compiled as planning_is_compiled
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.planner import Planner
@@ -77,6 +78,7 @@ def _line() -> None:
     token = control.token
     assert isinstance(ask(MoveJ(token=token, q=(0.1, -3.0, 0.0, -1.5, 0.0, 0.0))), Accepted)
     assert isinstance(ask(SimulationStep(token=token, ticks=MOVE_TICKS)), Done)
+    Instruments(host.controller.setup.description)
 
 
 def _postures() -> None:

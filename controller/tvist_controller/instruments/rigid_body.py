@@ -97,6 +97,8 @@ class RigidBody:
         self._offset: list[float] = []
         self._tool = np.zeros(12)
         self._elbow = ELBOW + 1 if description.joints > ELBOW else 0
+        still = [0.0] * description.joints
+        self.tool(still, still, still, [0.0] * 6)  # loads compiled code, which takes many ticks
 
     def tool(self, q: list[float], qd: list[float], qdd: list[float], offset: list[float]) -> Tool:
         """Compute the motion of the tool centre point.

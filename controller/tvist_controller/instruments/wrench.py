@@ -125,6 +125,8 @@ class ToolWrench:
         self._rotor = np.array(drives.rotor_inertia)
         self._friction = np.array(drives.coulomb_friction)
         self._width, self._linear = drives.friction_width, drives.linear_friction
+        still = np.zeros(description.joints)
+        self.at_tool(still.tolist(), still, (0.0,) * 6)  # loads compiled code, which takes many ticks
 
     def felt(self, state: State) -> Floats:
         """Return the external torque on the joints, shape (n,) [N m].
