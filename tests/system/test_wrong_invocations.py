@@ -107,7 +107,7 @@ MISUSE = [
     (("search", "--stops", "0", "--streams", "0", "--changes", "0", "--sequences", "0"), ["nothing to search"]),
     (("bench", "--seconds", "-1"), ["seconds is -1", "at least 0"]),
     (("bench", "--soak", "0"), ["soak is 0"]),
-    (("bench", "--only", "lines"), ["--only is 'lines'", "line, programs"]),
+    (("bench", "--only", "lines"), ["--only is 'lines'", "line, motion"]),
     (("bench", "--only", "ur", "--seconds", "0"), ["only names ur", "more than 0"]),
     (("bench", "--soak", "1", "--against", "x.json"), ["--against does nothing with --soak"]),
     (("bench", "--markdown", "x.md"), ["--markdown is about --boxes"]),
