@@ -69,6 +69,7 @@ async def _in_turn(
                 threads.append(await bare())
             finally:
                 os.kill(server.pid, signal.SIGCONT)
+            await server.robot.advance(SETTLE_TICKS)  # its next halt begins a lease of its own
     missed, of_thread = np.array(robots), np.array(threads)
     difference, half = mean_and_interval(missed - of_thread)
     return {
